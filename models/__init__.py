@@ -1,1 +1,7 @@
-"""."""
+"""Robots as data, and their mechanics as CasADi Functions. This room knows no solver."""
+
+from .dynamics import Dynamics, RelativeDynamics
+from .files import available, load
+from .robot import Robot
+
+__all__ = ["Dynamics", "RelativeDynamics", "Robot", "available", "load"]

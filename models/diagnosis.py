@@ -1,0 +1,146 @@
+"""What is remarkable about a robot before it moves: the rank of its wrench matrix and why, implausible numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .dynamics import Dynamics
+from .robot import Robot
+
+RANK_TOLERANCE = 1e-9  # of the largest singular value; exact singularities come out near 1e-16
+LEVEL_POSES = 50
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A robot at home, in figures and sentences.
+
+    Attributes
+    ----------
+    rank
+        Of the wrench matrix at home.
+    rank_level, rank_tilted
+        Largest rank among seeded random poses about home, unrotated and rotated.
+    singular_values
+        Of the wrench matrix at home with moments divided by `Robot.length`, largest first.
+    lengths
+        Cable lengths at home [m].
+    reason
+        Why the rank is below six, empty if it is not.
+    warnings
+        Sentences on numbers that can be computed with but are hard to believe.
+    """
+
+    rank: int
+    rank_level: int
+    rank_tilted: int
+    singular_values: np.ndarray  # (min(6, m),)
+    lengths: np.ndarray  # (m,)
+    reason: str
+    warnings: list[str]
+
+
+def diagnose(robot: Robot) -> Diagnosis:
+    """Diagnose `robot` at its home pose, with its carriers at home."""
+    dynamics = Dynamics(robot)
+    scale = np.array([1.0, 1, 1, robot.length, robot.length, robot.length])[:, None]
+    A = dynamics.wrench_matrix(robot.home) / scale
+    lengths = dynamics.cable_lengths(robot.home)
+    singular_values = np.linalg.svd(A, compute_uv=False)
+    level, tilted = _poses_about_home(robot, lengths)
+    rank = _rank(A)
+    return Diagnosis(
+        rank=rank,
+        rank_level=int(_ranks(dynamics.wrench_matrix(level) / scale).max()),
+        rank_tilted=int(_ranks(dynamics.wrench_matrix(tilted) / scale).max()),
+        singular_values=singular_values,
+        lengths=lengths,
+        reason=_why(robot, A, rank, lengths) if rank < 6 else "",
+        warnings=_implausible(robot),
+    )
+
+
+def _poses_about_home(robot: Robot, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(0)
+    level = np.tile(robot.home, (LEVEL_POSES, 1))
+    level[:, :3] += rng.uniform(-0.2, 0.2, size=(LEVEL_POSES, 3)) * lengths.min()
+    level[:, 3:] = 0
+    tilted = level.copy()
+    tilted[:, 3:] = rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
+    return level, tilted
+
+
+def _ranks(A: np.ndarray) -> np.ndarray:
+    values = np.linalg.svd(A, compute_uv=False)
+    return (values > RANK_TOLERANCE * values[..., :1]).sum(axis=-1)
+
+
+def _rank(A: np.ndarray) -> int:
+    return int(_ranks(A[None])[0])
+
+
+def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
+    """The reason for a rank below six, from the cable lines at home."""
+    directions = A[:3].T  # (m, 3)
+    points = _attachment_points(robot)
+    projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    spread = np.linalg.svd(directions, compute_uv=False)
+    if spread[1:].max(initial=0.0) < RANK_TOLERANCE * spread[0]:
+        return "all cables are parallel"
+    meeting = np.linalg.lstsq(projectors.sum(axis=0), (projectors @ points[:, :, None]).sum(axis=0).ravel())[0]
+    distance = np.linalg.norm((projectors @ (meeting - points)[:, :, None])[:, :, 0], axis=1)
+    if distance.max() < RANK_TOLERANCE * lengths.max():
+        return f"all cable lines meet in one point, {_told(meeting)} m, so no cable has a moment about it"
+    if rank == min(6, robot.m) == robot.m:
+        return f"{robot.m} cables span at most {robot.m} of 6 directions"
+    free = np.linalg.svd(A)[0][:, rank:]
+    if free.shape[1] == 1:
+        return f"no cable resists {_motion(free[:, 0], robot)}"
+    return f"no cable resists {free.shape[1]} independent motions"
+
+
+def _attachment_points(robot: Robot) -> np.ndarray:
+    from . import kinematics
+
+    return kinematics.transform(kinematics.ca.DM(robot.home), robot.attachments.T).full().T  # (m, 3)
+
+
+def _motion(twist: np.ndarray, robot: Robot) -> str:
+    """Words for the twist (velocity of the CoM, angular velocity times `Robot.length`) that no cable resists."""
+    velocity, omega = twist[:3], twist[3:] / robot.length
+    if np.linalg.norm(omega) * robot.length < 1e-6:
+        return f"a translation along {_told(velocity / np.linalg.norm(velocity))}"
+    along = omega / np.linalg.norm(omega)
+    pitch = velocity @ along / np.linalg.norm(omega)
+    kind = "a rotation" if abs(pitch) < 1e-6 * robot.length else f"a screw of {pitch:.3g} m/rad"
+    offset = np.cross(omega, velocity) / (omega @ omega)
+    place = "the CoM" if np.linalg.norm(offset) < 1e-6 * robot.length else f"the CoM shifted by {_told(offset)} m"
+    return f"{kind} about {_told(along)} through {place}"
+
+
+def _told(vector: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.4g}" for value in np.round(vector, 9)) + ")"
+
+
+def _implausible(robot: Robot) -> list[str]:
+    warnings = []
+    moments = np.sort(np.linalg.eigvalsh(robot.inertia))
+    if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+        warnings.append(
+            f"platform.inertia: the largest principal moment {moments[2]:.4g} kg m^2 exceeds the sum of the others "
+            f"{moments[0] + moments[1]:.4g}, no rigid body has such moments"
+        )
+    gyration = float(np.sqrt(moments[2] / robot.platform.mass))
+    if gyration > 2 * robot.length:
+        warnings.append(
+            f"platform.inertia: {moments[2]:.3g} kg m^2 at {robot.platform.mass:g} kg is a gyration radius of "
+            f"{gyration:.2g} m, but no attachment is farther than {robot.length:.2g} m from the CoM"
+        )
+    warnings.extend(
+        f"cables[{index}]: t_min equals t_max, {cable.t_max:g} N"
+        for index, cable in enumerate(robot.cables)
+        if cable.t_min == cable.t_max
+    )
+    return warnings

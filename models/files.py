@@ -1,0 +1,44 @@
+"""Robot files: the library that ships with towline, and any YAML file of the same form."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from pathlib import Path
+
+from ..errors import InputError
+from .parsing import read_yaml
+from .robot import Robot
+
+LIBRARY = Path(__file__).parent / "library"
+
+
+def available() -> list[str]:
+    """Names of the robots in the library, sorted."""
+    return sorted(path.stem for path in LIBRARY.glob("*.yaml"))
+
+
+def load(name: str | os.PathLike[str]) -> Robot:
+    """Load a robot of the library by its name, or any robot file by its path.
+
+    Parameters
+    ----------
+    name
+        A name of `available()`, or the path of a YAML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such robot or file, or the file is not a valid robot: one line with file, field and value.
+    """
+    text = os.fspath(name)
+    if text in available():
+        return read_yaml(LIBRARY / f"{text}.yaml", Robot)
+    path = Path(text)
+    if path.suffix in (".yaml", ".yml") or path.exists():
+        return read_yaml(path, Robot)
+    close = difflib.get_close_matches(text, available(), n=1)
+    hint = f", did you mean {close[0]!r}?" if close else ""
+    raise InputError(
+        f"robot: {text!r} is unknown{hint}; accepted: {', '.join(available())}, or the path of a YAML file"
+    )

@@ -1,0 +1,83 @@
+"""Orientation by roll, pitch and yaw: R, the rate matrix P and its derivative, for CasADi SX, MX and DM alike.
+
+    R = Rz(yaw) Ry(pitch) Rx(roll)        from the turned frame into the fixed one
+    Omega = P(roll, pitch) dTheta         body rate in the turned frame, Theta = (roll, pitch, yaw)
+    alpha = dP dTheta + P ddTheta         its derivative (paper F, Eq. 31 lacks the P)
+
+Source: paper F, Eqs. 1, 27, 28, 31 as corrected.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+Matrix: TypeAlias = Any  # CasADi SX, MX or DM: what goes in comes out
+
+
+def rotation(angles: Matrix) -> Matrix:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
+
+    Parameters
+    ----------
+    angles
+        (roll, pitch, yaw), (3, 1), in [rad].
+    """
+    roll, pitch, yaw = ca.vertsplit(angles)
+    sr, cr = ca.sin(roll), ca.cos(roll)
+    sp, cp = ca.sin(pitch), ca.cos(pitch)
+    sy, cy = ca.sin(yaw), ca.cos(yaw)
+    return ca.vertcat(
+        ca.horzcat(cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        ca.horzcat(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        ca.horzcat(-sp, cp * sr, cp * cr),
+    )
+
+
+def rate_matrix(angles: Matrix) -> Matrix:
+    """P, (3, 3): body rate Omega = P dTheta. Singular at pitch = +-90 degrees."""
+    roll, pitch, _ = ca.vertsplit(angles)
+    sr, cr = ca.sin(roll), ca.cos(roll)
+    sp, cp = ca.sin(pitch), ca.cos(pitch)
+    return ca.vertcat(ca.horzcat(1, 0, -sp), ca.horzcat(0, cr, sr * cp), ca.horzcat(0, -sr, cr * cp))
+
+
+def rate_matrix_derivative(angles: Matrix, rates: Matrix) -> Matrix:
+    """Time derivative of P, (3, 3), at the Euler rates dTheta in [rad/s]."""
+    roll, pitch, _ = ca.vertsplit(angles)
+    d_roll, d_pitch, _ = ca.vertsplit(rates)
+    sr, cr = ca.sin(roll), ca.cos(roll)
+    sp, cp = ca.sin(pitch), ca.cos(pitch)
+    return ca.vertcat(
+        ca.horzcat(0, 0, -cp * d_pitch),
+        ca.horzcat(0, -sr * d_roll, cr * cp * d_roll - sr * sp * d_pitch),
+        ca.horzcat(0, -cr * d_roll, -sr * cp * d_roll - cr * sp * d_pitch),
+    )
+
+
+def body_rate(angles: Matrix, rates: Matrix) -> Matrix:
+    """Omega = P dTheta, (3, 1), in the turned frame [rad/s]."""
+    return rate_matrix(angles) @ rates
+
+
+def body_acceleration(angles: Matrix, rates: Matrix, accelerations: Matrix) -> Matrix:
+    """Alpha = dP dTheta + P ddTheta, (3, 1), in the turned frame [rad/s^2]."""
+    return rate_matrix_derivative(angles, rates) @ rates + rate_matrix(angles) @ accelerations
+
+
+def inverse_rate_matrix(angles: Matrix) -> Matrix:
+    """P^-1, (3, 3): dTheta = P^-1 Omega. Infinite at pitch = +-90 degrees."""
+    roll, pitch, _ = ca.vertsplit(angles)
+    sr, cr = ca.sin(roll), ca.cos(roll)
+    tp, cp = ca.tan(pitch), ca.cos(pitch)
+    return ca.vertcat(ca.horzcat(1, sr * tp, cr * tp), ca.horzcat(0, cr, -sr), ca.horzcat(0, sr / cp, cr / cp))
+
+
+def angles_of(R: Matrix) -> Matrix:
+    """(roll, pitch, yaw) of R, (3, 1), in [rad]: pitch in [-90, 90] degrees, roll and yaw in (-180, 180]."""
+    return ca.vertcat(
+        ca.atan2(R[2, 1], R[2, 2]),
+        ca.atan2(-R[2, 0], ca.sqrt(R[2, 1] ** 2 + R[2, 2] ** 2)),
+        ca.atan2(R[1, 0], R[0, 0]),
+    )

@@ -1,0 +1,208 @@
+"""Robot files: what is read is what was written, and what is wrong is told in one line."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from towline.errors import InputError
+from towline.models import Robot, available, load
+from towline.models.diagnosis import diagnose
+from towline.models.files import LIBRARY
+from towline.models.parsing import parse_yaml, to_yaml, write_text
+
+GOOD = """\
+name: crane
+source: a test
+platform: {mass: 1.2, inertia: [1, 1, 1, 0, 0, 0]}
+carriers:
+  - {name: frame, kind: ground}
+  - {name: cart, kind: mobile, home: [0, 0, 3, 0, 0, 0], speed_max: 1, acceleration_max: 1,
+     reach: {min: [-1, -1, 2], max: [1, 1, 4]}}
+cables:
+  - {carrier: frame, anchor: [0, 0, 2], attachment: [0, 0.1, 0], t_min: 0, t_max: 10}
+  - {carrier: cart, anchor: [0, 0, 0], attachment: [0, 0, 0], t_min: 1, t_max: 10, stiffness: 1e4}
+"""
+
+# A change to the file above, and what the one line must name: the field, the value, what is accepted.
+WRONG = {
+    "missing mass": ("mass: 1.2, ", "", r"platform\.mass: is missing; accepted: \[kg\]"),
+    "no mass": ("mass: 1.2", "mass: 0", r"platform\.mass: input should be greater than 0, got 0"),
+    "mass in words": ("mass: 1.2", "mass: heavy", r"platform\.mass: .*valid number.*got 'heavy'"),
+    "mass NaN": ("mass: 1.2", "mass: .nan", r"platform\.mass: .*finite number, got nan"),
+    "mass infinite": ("mass: 1.2", "mass: .inf", r"platform\.mass: .*finite number, got inf"),
+    "negative inertia": ("[1, 1, 1,", "[1, -1, 1,", r"platform\.inertia: .*positive definite.*smallest is -1.*got"),
+    "indefinite inertia": ("1, 0, 0, 0]", "1, 2, 0, 0]", r"platform\.inertia: .*positive definite"),
+    "five inertias": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 0]", r"platform\.inertia\[5\]: is missing"),
+    "limits crossed": (
+        "t_min: 1, t_max: 10",
+        "t_min: 20, t_max: 10",
+        r"cables\[1\]: t_min must not exceed.*20 N.*10 N",
+    ),
+    "pushing cable": ("t_min: 1,", "t_min: -1,", r"cables\[1\]\.t_min: .*greater than or equal to 0, got -1"),
+    "unknown carrier": (
+        "carrier: cart",
+        "carrier: card",
+        r"cables\[1\]\.carrier: 'card' is unknown, accepted: frame, cart",
+    ),
+    "unknown kind": ("kind: ground", "kind: grond", r"carriers\[0\]\.kind: 'grond' is unknown; accepted: .*'ground'"),
+    "no kind": (", kind: ground", "", r"carriers\[0\]\.kind: is missing; accepted: one of ground, mobile, prescribed"),
+    "same carrier twice": ("name: cart", "name: frame", r"carriers\[1\]\.name: 'frame' is there twice"),
+    "typing error": ("attachment: [0, 0.1, 0]", "atachment: [0, 0.1, 0]", r"cables\[0\]\.attachment: is missing"),
+    "unknown key": (
+        "source: a test",
+        "source: a test\nsorce: b",
+        r"sorce: is not a known key, did you mean 'source'\?",
+    ),
+    "key of a carrier": ("speed_max: 1,", "speed_max: 1, speed: 1,", r"carriers\[1\]\.speed: is not a known key"),
+    "home out of reach": ("home: [0, 0, 3,", "home: [0, 0, 5,", r"carriers\[1\]: home must lie in reach.*z 5"),
+    "box inside out": (
+        "min: [-1, -1, 2]",
+        "min: [-1, 3, 2]",
+        r"carriers\[1\]\.reach: min must not exceed max.*along y",
+    ),
+    "zero length": ("anchor: [0, 0, 2]", "anchor: [0, 0.1, 0.75]", r"cables\[0\]: its anchor and attachment coincide"),
+    "no cables": (GOOD[GOOD.index("cables:") :], "cables: []\n", r"cables: .*at least 1 item.*got \[\]"),
+    "position of two": ("attachment: [0, 0, 0]", "attachment: [0, 0]", r"cables\[1\]\.attachment\[2\]: is missing"),
+    "duplicate key": (
+        "source: a test",
+        "source: a test\nsource: b",
+        r"is not YAML \(found duplicate key \"?source.*line",
+    ),
+    "alias": ("name: crane", "name: &n crane\nsource: *n", "has a YAML alias"),
+    "not YAML": ("name: crane", "name: [crane", r"is not YAML \(.*line \d+\)"),
+    "a tag": ("name: crane", "name: !!python/object:os.system crane", "is not YAML"),
+}
+
+
+def test_the_base_of_the_wrong_ones_is_right():
+    robot = parse_yaml(GOOD, Robot, "good")
+    assert robot.m == 2
+    assert robot.cables[1].stiffness == 10_000
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_file_gives_one_line_with_file_field_and_value(case, tmp_path):
+    old, new, message = WRONG[case]
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    if case == "zero length":
+        text = text.replace("platform: {", "platform: {home: [0, 0, 0.75, 0, 0, 0], ")
+    file = tmp_path / "my.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        load(file)
+    line = str(caught.value)
+    assert line.startswith(f"{file}: ")
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "holds None"),
+        (b"just words", "holds 'just words'; accepted: a mapping with name, source"),
+        (b"- 1\n- 2\n", r"holds \[1, 2\]"),
+        (b"\xff\xfe\x00", "is not text"),
+        (b"a: \x00", "is not YAML"),
+        (b"x" * 50_000_000, r"has 50\.0 MB; accepted: a YAML file of at most 1 MB"),
+        (b"[" * 5000, "is not YAML"),
+    ],
+    ids=["empty", "words", "list", "bytes", "nul", "50 MB", "deep"],
+)
+def test_files_that_are_no_mapping(content, message, tmp_path):
+    file = tmp_path / "my.yaml"
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        load(file)
+
+
+def test_missing_file_and_unknown_name(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        load(tmp_path / "none.yaml")
+    with pytest.raises(InputError, match="did you mean 'wang-flying'"):
+        load("wang-flyng")
+    with pytest.raises(InputError, match="cannot be read"):
+        load(tmp_path)
+
+
+@pytest.mark.parametrize("name", available())
+def test_library_robots_survive_writing_and_reading(name):
+    robot = load(name)
+    assert robot.name == name
+    assert parse_yaml(to_yaml(robot), Robot, name) == robot
+    with pytest.raises(Exception, match="frozen"):
+        robot.name = "other"
+
+
+def test_published_schema_is_the_models():
+    published = json.loads((LIBRARY / "robot.schema.json").read_text())
+    assert published == Robot.model_json_schema()
+    for name in available():
+        assert "$schema=robot.schema.json" in (LIBRARY / f"{name}.yaml").read_text()
+
+
+def test_robot_without_a_home_gets_one_below_its_anchors():
+    text = re.sub(r"  home: .*\n", "", (LIBRARY / "wang-flying.yaml").read_text())
+    robot = parse_yaml(text, Robot, "no home")
+    np.testing.assert_allclose(robot.home, [0, 0, -0.07 - 0.52, 0, 0, 0], atol=1e-9)
+
+
+def test_write_text_leaves_nothing_half_done(tmp_path, monkeypatch):
+    file = tmp_path / "robot.yaml"
+    write_text(file, "before")
+
+    def broken(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("os.replace", broken)
+    with pytest.raises(OSError, match="disk full"):
+        write_text(file, "after")
+    assert file.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [file]
+    monkeypatch.undo()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_text(Path("/proc/nowhere/robot.yaml"), "text")
+
+
+def test_diagnosis_of_the_printed_pairing():
+    diagnosis = diagnose(load("wang-flying-printed"))
+    assert (diagnosis.rank, diagnosis.rank_level) == (3, 3)
+    # The lines A_i B_i run from radius 0.52 at z = -0.07 to 0.25 at z = -0.97: they meet where the radius is zero.
+    meeting = -0.97 - 0.9 * 0.25 / (0.52 - 0.25)
+    assert f"meet in one point, (0, 0, {meeting:.4g}) m" in diagnosis.reason
+    assert any("gyration radius" in warning for warning in diagnosis.warnings)
+
+
+def test_diagnosis_of_other_robots():
+    assert diagnose(load("wang-flying")).rank == 6
+    assert diagnose(load("wang-ctmrts")).reason == "3 cables span at most 3 of 6 directions"
+    assert diagnose(load("nist-robocrane")).warnings == []
+
+
+def test_diagnosis_names_the_free_motion():
+    """Six cables that all meet the vertical axis through the CoM: nothing resists a rotation about it."""
+    robot = load("nist-robocrane")
+    angles = np.deg2rad([0, 60, 120, 180, 240, 300])
+    heights = [3, 2.5, 3.2, 2.7, 3.4, 2.9]
+    cables = [
+        cable.model_copy(
+            update={
+                "anchor": (3 * np.cos(a), 3 * np.sin(a), h),
+                "attachment": (0.5 * np.cos(a), 0.5 * np.sin(a), 0.1 * k),
+            }
+        )
+        for k, (cable, a, h) in enumerate(zip(robot.cables, angles, heights, strict=True))
+    ]
+    diagnosis = diagnose(robot.model_copy(update={"cables": tuple(cables)}))
+    assert diagnosis.rank == 5
+    assert re.search(r"a rotation about \(-?0, -?0, -?1\) through the CoM", diagnosis.reason)
+
+
+def test_diagnosis_of_impossible_inertia():
+    robot = load("nist-robocrane")
+    platform = robot.platform.model_copy(update={"inertia": (1.0, 1.0, 3.0, 0.0, 0.0, 0.0)})
+    warnings = diagnose(robot.model_copy(update={"platform": platform})).warnings
+    assert any("exceeds the sum of the others" in warning for warning in warnings)
