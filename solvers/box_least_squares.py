@@ -1,0 +1,89 @@
+"""Least squares in a box, the projection kernel: min |M x - b| subject to lower <= x <= upper.
+
+Bounded-variable least squares (Stark and Parker 1995), as Lawson and Hanson arrange it: every variable starts at the
+value inside its limits nearest to zero and is freed one at a time. A variable is freed only if its column is not in the
+span of the free ones (it has a part along the residual, which is orthogonal to that span), so rank-deficient matrices
+and duplicate columns need no special care, infinite limits neither.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["box_least_squares"]
+
+Array = NDArray[np.float64]
+
+# Rounding of a gradient entry, relative to the sum of the absolute terms in it.
+_NOISE = 4e-15
+
+
+def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Minimise |M x - b| over a box.
+
+    Parameters
+    ----------
+    M :
+        Matrix, shape (k, m), any rank.
+    b :
+        Right-hand side, shape (k,).
+    lower, upper :
+        Limits, shape (m,), may be infinite or equal.
+
+    Returns
+    -------
+    x :
+        A minimiser, shape (m,), exactly inside the limits. Where it is not unique, the one found first.
+    free :
+        Mask, shape (m,), of the variables that the minimisation determined; their columns are linearly independent.
+    """
+    m = M.shape[1]
+    norms = np.sqrt(np.einsum("ij,ij->j", M, M))
+    per_unit = 1.0 / np.where(norms > 0, norms, 1.0)
+    x = np.minimum(np.maximum(lower, 0.0), upper)
+    free = np.zeros(m, dtype=bool)
+    banned = np.zeros(m, dtype=bool)
+    # Each pass lowers the residual, so no set of free variables comes back; the cap is for rounding gone wrong.
+    for _ in range(20 * m + 20):
+        residual = b - M @ x
+        gradient = M.T @ residual
+        noise = _NOISE * norms * (np.sqrt(b @ b) + norms @ np.abs(x))
+        wants_up = (gradient > noise) & (x < upper)
+        wants_down = (gradient < -noise) & (x > lower)
+        gain = np.where((wants_up | wants_down) & ~free & ~banned, np.abs(gradient) * per_unit, 0.0)
+        entering = int(np.argmax(gain))
+        if gain[entering] == 0.0:
+            break
+        x_before, free_before = x.copy(), free.copy()
+        free[entering] = True
+        _settle(M, b, lower, upper, x, free)
+        change = M @ (x - x_before)
+        # |residual before|^2 - |residual after|^2, in a form that keeps its digits when they are nearly equal.
+        if (x[entering] - x_before[entering]) * gradient[entering] > 0.0 and change @ (2 * residual - change) > 0.0:
+            banned[:] = False
+        else:
+            # Rounding decided that this one should enter. Undo, and leave it out until something else has moved.
+            x, free = x_before, free_before
+            banned[entering] = True
+    return x, free
+
+
+def _settle(M: Array, b: Array, lower: Array, upper: Array, x: Array, free: NDArray[np.bool_]) -> None:
+    """Minimise over the free variables, in place; those that meet a limit on the way stop there and leave `free`."""
+    while free.any():
+        index = np.flatnonzero(free)
+        held = np.where(free, 0.0, x)
+        target = np.linalg.lstsq(M[:, index], b - M @ held, rcond=None)[0]
+        start, low, high = x[index], lower[index], upper[index]
+        beyond = (target < low) | (target > high)
+        if not beyond.any():
+            x[index] = target
+            return
+        step = target - start
+        limit = np.where(step > 0, high, low)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fraction = np.where(beyond, (limit - start) / step, np.inf)
+        shortest = max(float(fraction.min()), 0.0)
+        x[index] = np.minimum(np.maximum(start + shortest * step, low), high)
+        stopped = fraction <= shortest
+        x[index[stopped]] = limit[stopped]
+        free[index[stopped]] = False

@@ -1,0 +1,180 @@
+"""Proof that no tensions inside their limits give a wrench: `Certificate`, and `certify`, which finds the sharpest one.
+
+The wrenches that a robot can give, {A t : t_min <= t <= t_max}, are a convex set, the available wrench set. Along any
+direction d it reaches no farther than its support value
+
+    h(d) = max { d . A t : t_min <= t <= t_max } = sum_i max(d . a_i t_min_i, d . a_i t_max_i)
+
+so d . w > h(d) proves that w is not in it (Farkas), and needs no solver to check. The direction from the nearest
+available wrench to w makes the gap d . w - h(d) as large as it can be: then it is the distance between them.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .problem import TensionProblem
+from .projection import project
+from .tolerances import NEGLIGIBLE, RANK
+
+__all__ = ["Certificate", "certify"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """A wrench direction along which the required wrench lies beyond everything the cables can give.
+
+    Attributes
+    ----------
+    direction :
+        d, shape (n,), in terms of the wrench rows of A as they are: d . w and d . A t are in newtons. With six rows its
+        force entries are numbers, its moment entries are in 1/m, and |(d_force, length * d_moment)| = 1. With
+        any other number of rows |d| = 1.
+    support :
+        h(d) [N]: the most that tensions inside the limits can give along d.
+    demand :
+        d . w [N]: what is required along d.
+    shortfall :
+        demand - support [N], positive. If `binding` is not empty it is the distance from w to the available wrench set
+        in the norm |(force, moment / length)|; if it is empty (singular), the distance from w to the range of A.
+    at_max, at_min :
+        Indices of the cables that could give more along d only by exceeding t_max, or by going below t_min.
+    closest :
+        Tensions inside the limits whose wrench is nearest to w [N], shape (m,).
+    length :
+        The characteristic length [m] of the problem.
+    """
+
+    direction: Array  # (n,)
+    support: float
+    demand: float
+    shortfall: float
+    at_max: Indices
+    at_min: Indices
+    closest: Array  # (m,)
+    length: float
+
+    @property
+    def binding(self) -> Indices:
+        """Indices of the cables whose limits determine the support value, ascending."""
+        return np.sort(np.concatenate([self.at_max, self.at_min]))
+
+    @property
+    def singular(self) -> bool:
+        """True if no cable pulls along the direction: no tensions of either sign, however large, give w."""
+        return self.binding.size == 0
+
+    def verify(self, problem: TensionProblem) -> bool:
+        """Check from the problem's data alone that this certificate proves it infeasible.
+
+        Nothing is believed but the direction: support, demand and binding cables are computed again and compared.
+        False means that it proves nothing, not that the problem is feasible.
+        """
+        if self.direction.shape != (problem.n,) or self.closest.shape != (problem.m,):
+            return False
+        unit = self.direction / problem.row_scale
+        if not abs(float(unit @ unit) - 1.0) < 1e-9:
+            return False
+        support, at_max, at_min = _support(problem, self.direction)
+        demand = float(self.direction @ problem.w)
+        tolerance = problem.tolerance(self.closest)
+        return bool(
+            demand - support > tolerance
+            and abs(demand - support - self.shortfall) <= tolerance
+            and np.array_equal(at_max, self.at_max)
+            and np.array_equal(at_min, self.at_min)
+        )
+
+    def in_words(self) -> str:
+        """Tell direction, demand, support and the cables at their limits (from 1), in two lines."""
+        limits = {"t_max": self.at_max, "t_min": self.at_min}
+        told = [f"{name} in {_numbers(indices + 1, 0)}" for name, indices in limits.items() if indices.size]
+        cables = f"cables at their limit: {'; '.join(told)}" if told else "no cable pulls along it at all"
+        direction = f"({_numbers(self.direction, 3)})"
+        if self.direction.size == 6:
+            direction = f"force ({_numbers(self.direction[:3], 3)}), moment ({_numbers(self.direction[3:], 3)})/m"
+        return (
+            f"along the wrench direction {direction}:\n"
+            f"{self.demand:.4g} N are needed and at most {self.support:.4g} N available, "
+            f"short by {self.shortfall:.4g} N; {cables}"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain lists and numbers, ready for JSON."""
+        return {
+            "direction": self.direction.tolist(),
+            "shortfall": self.shortfall,
+            "binding": self.binding.tolist(),
+            "at_max": self.at_max.tolist(),
+            "at_min": self.at_min.tolist(),
+            "support": self.support,
+            "demand": self.demand,
+            "closest": self.closest.tolist(),
+            "length": self.length,
+        }
+
+
+def certify(problem: TensionProblem) -> Certificate | None:
+    """Find the certificate with the largest shortfall, or None if w is available.
+
+    If w has a part outside the range of A, that part is the direction. Otherwise w is projected on the available wrench
+    set, in newtons (moments divided by the problem's length), and the direction is the one from the projection to w.
+    Support and shortfall are computed from the direction, and only a certificate that `Certificate.verify` accepts is
+    returned: its shortfall exceeds `TensionProblem.tolerance`.
+
+    Parameters
+    ----------
+    problem :
+        The problem; its t_ref and weights play no part.
+
+    Returns
+    -------
+    :
+        A verified certificate. None means that w is available within the tolerance.
+    """
+    closest, residual = project(problem)
+    outside = _outside_range(problem)
+    if outside is not None:
+        certificate = _certificate(problem, outside, closest)
+        if certificate is not None and certificate.singular:
+            return certificate
+    return _certificate(problem, residual, closest)
+
+
+def _numbers(values: NDArray[Any], decimals: int) -> str:
+    return ", ".join(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)
+
+
+def _outside_range(problem: TensionProblem) -> Array | None:
+    """Return the part of S w outside the range of S A, or None if A has full row rank."""
+    U, sigma, _ = np.linalg.svd(problem.scaled_A)
+    null = U[:, int(np.count_nonzero(sigma > RANK * sigma[0])) :]
+    return null @ (null.T @ problem.scaled_w) if null.shape[1] else None
+
+
+def _certificate(problem: TensionProblem, vector: Array, closest: Array) -> Certificate | None:
+    """Make the certificate along a scaled wrench `vector` [N], or None if it proves nothing."""
+    size = np.sqrt(vector @ vector)
+    if size <= problem.tolerance(closest):
+        return None
+    direction = problem.row_scale * (vector / size)
+    support, at_max, at_min = _support(problem, direction)
+    demand = float(direction @ problem.w)
+    certificate = Certificate(
+        direction, support, demand, demand - support, at_max, at_min, closest, length=problem.length
+    )
+    return certificate if certificate.verify(problem) else None
+
+
+def _support(problem: TensionProblem, direction: Array) -> tuple[float, Indices, Indices]:
+    """Return the support value [N] of the available wrench set along `direction`, and who is at which limit for it."""
+    pull = direction @ problem.A
+    small = NEGLIGIBLE * problem.column_norms.max()
+    at_max, at_min = np.flatnonzero(pull > small), np.flatnonzero(pull < -small)
+    support = pull[at_max] @ problem.t_max[at_max] + pull[at_min] @ problem.t_min[at_min]
+    return float(support), at_max, at_min

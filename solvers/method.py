@@ -1,0 +1,57 @@
+"""What a tension-distribution method is: a class with three sentences about itself and one function."""
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .standard_form import StandardForm
+
+__all__ = ["Method", "Proposal"]
+
+
+class Proposal(NamedTuple):
+    """What a method proposes; `towline.solvers.solve` judges it.
+
+    Attributes
+    ----------
+    s :
+        The point in standard form, shape (k,), or None if the method found none.
+    iterations :
+        How many it took, None if not counted.
+    detail :
+        The reason in words when `s` is None.
+    """
+
+    s: NDArray[np.float64] | None
+    iterations: int | None = None
+    detail: str = ""
+
+
+class Method(ABC):
+    """A way to choose tensions. Subclass it, fill the class variables, write `propose`, and list it in the registry."""
+
+    name: ClassVar[str]
+    """The name that `solve` takes."""
+
+    guarantee: ClassVar[str]
+    """One line: what the tensions are, and what happens if there are none."""
+
+    source: ClassVar[str]
+    """Where the method is published."""
+
+    exact: ClassVar[bool]
+    """True if the method ends at the optimum itself. Where rounding alone makes such a method lose a point on the very
+    boundary of the available wrench set, `solve` finds it in `boundary.py`."""
+
+    options: ClassVar[dict[str, str] | None] = {}
+    """Keyword arguments of `propose` and what they mean; None = whatever the back end takes."""
+
+    def backends(self) -> list[str]:
+        """Names of the installed back ends, the default first; empty for methods that have none."""
+        return []
+
+    @abstractmethod
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Choose s with Q s = b and lower <= s <= upper."""

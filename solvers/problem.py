@@ -1,0 +1,218 @@
+"""The tension-distribution problem: `TensionProblem`, checked on construction."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .tolerances import FEASIBILITY, ROUNDING
+
+__all__ = ["TensionProblem"]
+
+Array = NDArray[np.float64]
+
+# Inside this range no square, and no quotient of two inputs, leaves the range of float64.
+_LARGEST, _SMALLEST = 1e50, 1e-50
+_HEAVIEST, _LIGHTEST = 1e20, 1e-20
+
+
+@dataclass(frozen=True, eq=False)
+class TensionProblem:
+    r"""Tensions nearest to a wish that give a wrench inside the tension limits.
+
+    .. math::
+
+        \min_t \; \sum_i \omega_i (t_i - t_{ref,i})^2
+        \quad \text{s.t.} \quad A t = w, \; t_{min} \le t \le t_{max}
+
+    The arrays are copied, converted to float64 and set read-only. Entries smaller than 1e-50 count as 0, limits beyond
+    1e50 as infinite.
+
+    Parameters
+    ----------
+    A :
+        Wrench matrix, shape (n, m), any n and m from 1 up. Usually n = 6: rows 0 to 2 are forces [N per N of tension],
+        rows 3 to 5 moments [N m per N].
+    w :
+        Required wrench, shape (n,), [N] and [N m]; like A, of entries below 1e50.
+    t_min, t_max :
+        Tension limits [N], shape (m,) or one number for all cables. Equal limits fix a tension; t_min may be -inf and
+        t_max +inf.
+    t_ref :
+        Tensions to stay near [N], shape (m,) or one number; they need not lie inside the limits. None = 0, which asks
+        for the least norm.
+    weights :
+        Weights omega of the cables in the cost, from 1e-20 to 1e20, shape (m,) or one number. None = 1.
+    length :
+        Characteristic length [m], from 1e-20 to 1e20, by which moment rows (3 to 5, when n = 6) are divided wherever
+        newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes which
+        tensions are optimal. None = 1 m.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value. The message is one line.
+    """
+
+    A: Array  # (n, m)
+    w: Array  # (n,)
+    t_min: Array  # (m,)
+    t_max: Array  # (m,)
+    t_ref: Array  # (m,)
+    weights: Array  # (m,)
+    length: float
+
+    def __init__(
+        self,
+        A: ArrayLike,
+        w: ArrayLike,
+        t_min: ArrayLike,
+        t_max: ArrayLike,
+        t_ref: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+        length: float | None = None,
+    ) -> None:
+        matrix = _real_array("A", A)
+        if matrix.ndim != 2 or 0 in matrix.shape:
+            raise InputError(f"A: has shape {matrix.shape}; accepted: (n, m) with n >= 1 wrench rows and m >= 1 cables")
+        n, m = matrix.shape
+        wrench = _real_array("w", w)
+        if wrench.shape != (n,):
+            raise InputError(f"w: has shape {wrench.shape}; accepted: ({n},), one entry per row of A")
+        _require_finite("A", matrix)
+        _require_finite("w", wrench)
+
+        lower = _per_cable("t_min", t_min, m)
+        upper = _per_cable("t_max", t_max, m)
+        _reject_at("t_min", lower, lower > _LARGEST, f"a number up to {_LARGEST:g}, or -inf")
+        _reject_at("t_max", upper, upper < -_LARGEST, f"a number from {-_LARGEST:g}, or inf")
+        lower[lower < -_LARGEST], upper[upper > _LARGEST] = -np.inf, np.inf
+        crossed = lower > upper
+        if crossed.any():
+            i = int(np.argmax(crossed))
+            raise InputError(
+                f"t_min: is {lower[i]:g} at cable {i}, above t_max = {upper[i]:g}; accepted: t_min <= t_max"
+            )
+
+        wish = np.zeros(m) if t_ref is None else _per_cable("t_ref", t_ref, m)
+        _require_finite("t_ref", wish)
+        omega = np.ones(m) if weights is None else _per_cable("weights", weights, m)
+        out_of_range = (omega < _LIGHTEST) | (omega > _HEAVIEST)
+        _reject_at("weights", omega, out_of_range, f"numbers > 0, from {_LIGHTEST:g} to {_HEAVIEST:g}")
+
+        for name, value in (
+            ("A", matrix),
+            ("w", wrench),
+            ("t_min", lower),
+            ("t_max", upper),
+            ("t_ref", wish),
+            ("weights", omega),
+        ):
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "length", _positive_length(length))
+
+    @property
+    def n(self) -> int:
+        """Number of wrench rows."""
+        return self.A.shape[0]
+
+    @property
+    def m(self) -> int:
+        """Number of cables."""
+        return self.A.shape[1]
+
+    @cached_property
+    def row_scale(self) -> Array:
+        """Diagonal of S, shape (n,): 1 for force rows, 1 / length for moment rows, so that S w is in newtons."""
+        scale = np.ones(self.n)
+        if self.n == 6:
+            scale[3:] = 1.0 / self.length
+        return scale
+
+    @cached_property
+    def scaled_A(self) -> Array:
+        """S A, shape (n, m) [N per N]."""
+        return self.A if self.length == 1.0 else self.row_scale[:, None] * self.A
+
+    @cached_property
+    def scaled_w(self) -> Array:
+        """S w, shape (n,) [N]."""
+        return self.w if self.length == 1.0 else self.row_scale * self.w
+
+    @cached_property
+    def column_norms(self) -> Array:
+        """Norm of each column of S A, shape (m,): the wrench that 1 N in a cable makes [N per N]."""
+        return np.sqrt(np.einsum("ij,ij->j", self.scaled_A, self.scaled_A))
+
+    def tolerance(self, tensions: Array) -> float:
+        r"""Largest wrench error [N] at which `tensions` still count as giving w.
+
+        .. math::
+
+            10^{-9} \Big( |S w| + \sum_i |S a_i| \, |\hat t_i| \Big)
+            + 10^{-13} \sum_i |S a_i| \, (|t_i| + |t_{ref,i}|)
+
+        with :math:`\hat t_i` the tension inside the limits that is nearest to 0: the first part is relative to what the
+        problem asks, never to a limit that happens to be huge; the second is the rounding of A t itself.
+
+        Parameters
+        ----------
+        tensions :
+            The tensions to judge [N], shape (m,).
+        """
+        nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
+        asked = np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero)
+        return float(FEASIBILITY * asked + ROUNDING * (self.column_norms @ (np.abs(tensions) + np.abs(self.t_ref))))
+
+
+def _real_array(name: str, value: ArrayLike) -> Array:
+    """Return a float64 copy of `value`, or raise InputError if it is not an array of real numbers."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):
+        raise InputError(f"{name}: is no array (rows of unequal length?); accepted: an array of real numbers") from None
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{name}: has entries of type {array.dtype.name}; accepted: an array of real numbers")
+    array = np.array(array, dtype=np.float64, order="C")
+    array[np.abs(array) < _SMALLEST] = 0.0
+    return array
+
+
+def _per_cable(name: str, value: ArrayLike, m: int) -> Array:
+    """Return `value` as a new (m,) array without NaN, repeating a single number."""
+    array = _real_array(name, value)
+    if array.ndim == 0:
+        array = np.full(m, array)
+    elif array.shape != (m,):
+        raise InputError(f"{name}: has shape {array.shape}; accepted: ({m},), one entry per cable, or a single number")
+    _reject_at(name, array, np.isnan(array), "a number")
+    return array
+
+
+def _require_finite(name: str, array: Array) -> None:
+    fits = np.abs(array) < _LARGEST
+    if not fits.all():
+        _reject_at(name, array, ~fits, f"finite numbers below {_LARGEST:g}")
+
+
+def _reject_at(name: str, array: Array, bad: NDArray[np.bool_], accepted: str) -> None:
+    """Raise InputError for the first entry that `bad` marks."""
+    if bad.any():
+        index = np.unravel_index(int(np.argmax(bad)), array.shape)
+        where = ", ".join(str(int(i)) for i in index)
+        raise InputError(f"{name}: is {array[index]:g} at index {where}; accepted: {accepted}")
+
+
+def _positive_length(length: float | None) -> float:
+    if length is None:
+        return 1.0
+    value = _real_array("length", length)
+    if value.ndim != 0 or not _LIGHTEST <= value <= _HEAVIEST:
+        shown = f"has shape {value.shape}" if value.ndim else f"is {value:g}"
+        raise InputError(
+            f"length: {shown}; accepted: one number > 0 [m], from {_LIGHTEST:g} to {_HEAVIEST:g}, or None for 1 m"
+        )
+    return float(value)

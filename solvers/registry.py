@@ -1,0 +1,119 @@
+"""One call for every method: `methods` lists them, `solve` runs one and judges what it proposes."""
+
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .active_set import ActiveSet
+from .boundary import boundary_candidates
+from .certificate import Certificate, certify
+from .method import Method, Proposal
+from .min_norm import MinNorm
+from .problem import TensionProblem
+from .qp import QuadraticProgram
+from .solution import Status, TensionSolution
+from .standard_form import StandardForm, standard_form
+
+__all__ = ["methods", "solve"]
+
+_METHODS: dict[str, Method] = {method.name: method for method in (ActiveSet(), QuadraticProgram(), MinNorm())}
+
+
+def methods() -> dict[str, Method]:
+    """Return every method by name; each has `guarantee`, `source`, `options` and `backends()`."""
+    return dict(_METHODS)
+
+
+def solve(
+    problem: TensionProblem, method: str = "active-set", backend: str | None = None, **options: Any
+) -> TensionSolution:
+    """Distribute the tensions of one problem.
+
+    An infeasible problem is an answer, not an exception: the status says so and a certificate proves it. "infeasible"
+    and "singular" never rest on a solver's word, only on a certificate that was verified.
+
+    Parameters
+    ----------
+    problem :
+        The problem.
+    method :
+        One of `methods()`.
+    backend :
+        For "qp", the name of an installed QP solver; None = "clarabel".
+    **options :
+        Options of the method, see `methods()[name].options`.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, back end or option; the message lists those that there are.
+    """
+    start = time.perf_counter()
+    chosen, used_backend = _lookup(method, backend, options)
+    if not isinstance(problem, TensionProblem):
+        raise InputError(f"problem: is a {type(problem).__name__}; accepted: a TensionProblem")
+    form = standard_form(problem)
+    nothing_to_find = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
+    at_origin = Proposal(np.zeros(form.moving.size))
+    proposal = at_origin if nothing_to_find else chosen.propose(form, used_backend, **options)
+    verdict = _judge(problem, form, chosen, proposal)
+    return TensionSolution(
+        problem,
+        verdict.tensions,
+        verdict.status,
+        method,
+        used_backend,
+        time.perf_counter() - start,
+        verdict.certificate,
+        proposal.iterations,
+        verdict.detail,
+    )
+
+
+class _Verdict(NamedTuple):
+    status: Status
+    tensions: NDArray[np.float64] | None = None
+    certificate: Certificate | None = None
+    detail: str = ""
+
+
+def _judge(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict:
+    """Decide what a proposal is worth: tensions that give w, else a verified certificate, else what is left."""
+    tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
+    if tensions is not None and _gives_wrench(problem, tensions):
+        return _Verdict(Status.OPTIMAL, tensions)
+    certificate = certify(problem)
+    if certificate is not None:
+        return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
+    for s in boundary_candidates(problem, form) if method.exact else ():
+        tensions = form.tensions(problem, s)
+        if _gives_wrench(problem, tensions):
+            return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
+    return _Verdict(Status.FAILED if tensions is None else Status.INACCURATE, tensions, detail=proposal.detail)
+
+
+def _gives_wrench(problem: TensionProblem, tensions: NDArray[np.float64]) -> bool:
+    error = problem.scaled_A @ tensions - problem.scaled_w
+    return bool(np.sqrt(error @ error) <= problem.tolerance(tensions))
+
+
+def _lookup(name: str, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
+    """Return the method and the back end it will use, or raise InputError listing what there is."""
+    if not isinstance(name, str) or name not in _METHODS:
+        raise InputError(f"method: {name!r} is unknown; accepted: {', '.join(_METHODS)}")
+    method = _METHODS[name]
+    available = method.backends()
+    if backend is None:
+        backend = next(iter(available), None)
+    elif backend not in available:
+        accepted = ", ".join(available) or f"None, since method {name} has no back ends"
+        raise InputError(f"backend: {backend!r} is not installed; accepted: {accepted}")
+    if method.options is not None:
+        unknown = [key for key in options if key not in method.options]
+        if unknown:
+            accepted = ", ".join(method.options) or f"none, method {name} has no options"
+            raise InputError(f"options: {unknown[0]!r} is unknown; accepted: {accepted}")
+    return method, backend

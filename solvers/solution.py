@@ -1,0 +1,118 @@
+"""The answer: `TensionSolution`, which judges its own tensions, and its `Status`."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .certificate import Certificate
+from .problem import TensionProblem
+
+__all__ = ["Status", "TensionSolution"]
+
+
+class Status(StrEnum):
+    """What a solution is. Its values are plain strings, fit for JSON."""
+
+    OPTIMAL = "optimal"
+    """The tensions give w inside the limits, within `TensionProblem.tolerance`, and are the method's answer."""
+
+    INFEASIBLE = "infeasible"
+    """The limits forbid w; a verified certificate says along which direction and by how much."""
+
+    SINGULAR = "singular"
+    """w has a part outside the range of A: no tensions of either sign give it, whatever the limits. The certificate's
+    direction is in the left null space of A and no cable binds. A rank-deficient A alone is not singular in this sense:
+    if w is in its range the problem may well be optimal."""
+
+    INACCURATE = "inaccurate"
+    """The tensions miss w by more than the tolerance, yet no certificate says that w is out of reach: read `residual`
+    before using them."""
+
+    FAILED = "failed"
+    """A back end gave up, or called the problem infeasible and could not be believed; `detail` says what it said."""
+
+
+@dataclass(frozen=True, eq=False)
+class TensionSolution:
+    """Tensions, or the proof that there are none.
+
+    Attributes
+    ----------
+    problem :
+        The problem as it was stated.
+    tensions :
+        Tensions [N], shape (m,), always inside the limits to the last bit; None unless `status` is optimal or
+        inaccurate.
+    status :
+        See `Status`.
+    method, backend :
+        Who solved it; `backend` is None for methods that have none.
+    time :
+        Wall time of the call [s].
+    certificate :
+        Why there are no tensions, exactly if `status` is infeasible or singular. Its `closest` holds the tensions
+        whose wrench is nearest.
+    iterations :
+        Iterations of the method, None if it does not count any.
+    detail :
+        What there is to say beyond the status, else empty.
+    """
+
+    problem: TensionProblem
+    tensions: NDArray[np.float64] | None  # (m,)
+    status: Status
+    method: str
+    backend: str | None = None
+    time: float = 0.0
+    certificate: Certificate | None = None
+    iterations: int | None = None
+    detail: str = ""
+
+    @property
+    def feasible(self) -> bool:
+        """True if the tensions can be used as they are."""
+        return self.status is Status.OPTIMAL
+
+    @cached_property
+    def residual(self) -> float:
+        """Wrench error |S (A t - w)| [N], S dividing moments by the problem's length; nan without tensions."""
+        if self.tensions is None:
+            return float("nan")
+        error = self.problem.scaled_A @ self.tensions - self.problem.scaled_w
+        return float(np.sqrt(error @ error))
+
+    @property
+    def bound_violation(self) -> float:
+        """Largest distance of a tension beyond its limits [N]; nan without tensions."""
+        if self.tensions is None:
+            return float("nan")
+        below, above = self.problem.t_min - self.tensions, self.tensions - self.problem.t_max
+        return max(0.0, float(below.max()), float(above.max()))
+
+    @property
+    def cost(self) -> float:
+        """Value of the cost, sum of weights_i (t_i - t_ref_i)^2 [N^2]; nan without tensions."""
+        if self.tensions is None:
+            return float("nan")
+        return float(self.problem.weights @ (self.tensions - self.problem.t_ref) ** 2)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain lists, numbers and strings, ready for JSON; what does not exist is None."""
+        given = self.tensions is not None
+        return {
+            "status": self.status.value,
+            "feasible": self.feasible,
+            "tensions": self.tensions.tolist() if self.tensions is not None else None,
+            "residual": self.residual if given else None,
+            "cost": self.cost if given else None,
+            "certificate": self.certificate.as_dict() if self.certificate is not None else None,
+            "method": self.method,
+            "backend": self.backend,
+            "time": self.time,
+            "iterations": self.iterations,
+            "detail": self.detail,
+        }

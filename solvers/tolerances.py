@@ -1,0 +1,18 @@
+"""The numbers by which this room judges, in one place. All are relative and have no unit."""
+
+__all__ = ["FEASIBILITY", "NEGLIGIBLE", "RANK", "ROUNDING"]
+
+# Wrench error that still counts as none, relative to what the problem asks (see `TensionProblem.tolerance`). Tensions
+# are called optimal only below it and a certificate is believed only above it, so the two answers cannot both be given.
+FEASIBILITY = 1e-9
+
+# Rounding of a matrix-vector product, relative to the sum of the absolute terms: 450 machine epsilons.
+ROUNDING = 1e-13
+
+# Singular values below this part of the largest count as zero.
+RANK = 1e-12
+
+# A cable pulls along a direction d only if |d . a_i| exceeds this part of the largest column norm. Smaller products are
+# rounding: times an infinite tension limit they would void every certificate. It is larger than RANK, so that a
+# direction which the rank cut calls unreachable is not reached by the certificate's own count either.
+NEGLIGIBLE = 1e-11

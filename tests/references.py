@@ -1,0 +1,84 @@
+"""What the solvers are held against: written from the definitions alone, sharing no code with the package."""
+
+from itertools import product
+
+import clarabel
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import csc_matrix
+
+
+def row_scale(n, length):
+    """Diagonal of S as a list: what makes newton metres newtons."""
+    return [1.0 / length if n == 6 and row >= 3 else 1.0 for row in range(n)]
+
+
+def support_value(A, direction, t_min, t_max, negligible=1e-10):
+    """Return the most that tensions inside the limits can give along a direction, cable by cable."""
+    largest = max(np.linalg.norm(A[:, i]) for i in range(A.shape[1]))
+    total = 0.0
+    for i in range(A.shape[1]):
+        pull = sum(direction[row] * A[row, i] for row in range(A.shape[0]))
+        if abs(pull) > negligible * largest * np.linalg.norm(direction):
+            total += max(pull * t_min[i], pull * t_max[i])
+    return total
+
+
+def linear_program_status(A, w, t_min, t_max):
+    """Return "optimal" if HiGHS finds a t inside the limits, "infeasible" if only without them, else "singular"."""
+    size = max(np.linalg.norm(w), 1e-300)
+
+    def available(bounds):
+        return linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=w / size, bounds=bounds, method="highs").status == 0
+
+    if available([(low / size, high / size) for low, high in zip(t_min, t_max, strict=True)]):
+        return "optimal"
+    return "infeasible" if available((None, None)) else "singular"
+
+
+def distance_to_available(A, w, t_min, t_max, length=1.0):
+    """Return the distance [N] from w to the available wrench set: min tau with |S (w - A t)| <= tau, by clarabel.
+
+    It is exact to about 1e-9 of the second number returned, the size [N] of the wrenches involved.
+    """
+    n, m = A.shape
+    S = np.diag(row_scale(n, length))
+    size = max(np.linalg.norm(S @ w), np.linalg.norm(S @ A @ np.clip(0.0, t_min, t_max)))
+    t_rows = np.hstack([np.eye(m), np.zeros((m, 1))])
+    tau_row = np.r_[np.zeros(m), -1.0]
+    wrench_rows = np.hstack([S @ A, np.zeros((n, 1))])
+    high, low = t_max < 1e9 * size, t_min > -1e9 * size  # an interior-point method cannot see both 1 and 1e12
+    rows = np.vstack([t_rows[high], -t_rows[low], tau_row, wrench_rows])
+    right = np.concatenate([t_max[high], -t_min[low], [0.0], S @ w]) / size
+    cones = [clarabel.NonnegativeConeT(int(high.sum() + low.sum())), clarabel.SecondOrderConeT(n + 1)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-12
+    no_curvature = csc_matrix((m + 1, m + 1))
+    answer = clarabel.DefaultSolver(no_curvature, -tau_row, csc_matrix(rows), right, cones, settings).solve()
+    return answer.x[m] * size, size
+
+
+def optimum_by_enumeration(A, w, t_min, t_max, t_ref=None, weights=None):
+    """Return the best tensions or None, trying each cable at t_min, at t_max and free: 3^m least-squares problems."""
+    m = A.shape[1]
+    t_ref = np.zeros(m) if t_ref is None else t_ref
+    weights = np.ones(m) if weights is None else weights
+    size = max(np.linalg.norm(w), *(np.linalg.norm(A @ t) for t in (np.clip(0.0, t_min, t_max), t_ref)), 1e-300)
+    best, best_cost = None, np.inf
+    for pattern in product(("low", "high", "free"), repeat=m):
+        held = {"low": t_min, "high": t_max}
+        t = np.array([t_ref[i] if kind == "free" else held[kind][i] for i, kind in enumerate(pattern)])
+        if not np.isfinite(t).all():
+            continue
+        free = [i for i, kind in enumerate(pattern) if kind == "free"]
+        if free:
+            root = 1.0 / np.sqrt(weights[free])
+            t[free] += root * np.linalg.lstsq(A[:, free] * root, w - A @ t, rcond=1e-11)[0]
+        slack = 1e-9 * np.abs(t).max()
+        if np.linalg.norm(A @ t - w) > 1e-9 * size or (t < t_min - slack).any() or (t > t_max + slack).any():
+            continue
+        cost = weights @ (t - t_ref) ** 2
+        if cost < best_cost:
+            best, best_cost = t, cost
+    return best
