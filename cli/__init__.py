@@ -1,1 +1,1 @@
-"""."""
+"""The command line: it parses, calls and prints; there is no mathematics here."""

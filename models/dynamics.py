@@ -105,7 +105,7 @@ class Dynamics:
         return call(self._in_wind, arguments | {"wind": wind})["w"]
 
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
-        """W_e: force [N] and moment about the CoM [N m] of the air on the platform, (..., 6), in {G}; see `models.wind`."""
+        """W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`."""
         arguments = {"pose": pose, "velocity": velocity, "wind": wind}
         return call(self._aerodynamic, arguments)["W_e"]
 

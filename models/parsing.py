@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import difflib
 import io
-import os
-import tempfile
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -99,28 +97,6 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
             message += f", got {_brief(first['input'])}"
     more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
     return ": ".join(part for part in (where, field, message) if part).replace("\n", " ") + more
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all: to a temporary file beside it, then renamed.
-
-    Raises
-    ------
-    InputError
-        If the place cannot be written to.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); accepted: a writable place") from None
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def _reader() -> YAML:

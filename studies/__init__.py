@@ -1,1 +1,1 @@
-"""."""
+"""Studies of the two papers."""

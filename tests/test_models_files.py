@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from towline.errors import InputError
 from towline.models import Robot, available, load
 from towline.models.diagnosis import diagnose
 from towline.models.files import LIBRARY
-from towline.models.parsing import parse_yaml, to_yaml, write_text
+from towline.models.parsing import parse_yaml, to_yaml
 
 GOOD = """\
 name: crane
@@ -148,23 +147,6 @@ def test_robot_without_a_home_gets_one_below_its_anchors():
     text = re.sub(r"  home: .*\n", "", (LIBRARY / "wang-flying.yaml").read_text())
     robot = parse_yaml(text, Robot, "no home")
     np.testing.assert_allclose(robot.home, [0, 0, -0.07 - 0.52, 0, 0, 0], atol=1e-9)
-
-
-def test_write_text_leaves_nothing_half_done(tmp_path, monkeypatch):
-    file = tmp_path / "robot.yaml"
-    write_text(file, "before")
-
-    def broken(*_):
-        raise OSError("disk full")
-
-    monkeypatch.setattr("os.replace", broken)
-    with pytest.raises(OSError, match="disk full"):
-        write_text(file, "after")
-    assert file.read_text() == "before"
-    assert list(tmp_path.iterdir()) == [file]
-    monkeypatch.undo()
-    with pytest.raises(InputError, match="cannot be written"):
-        write_text(Path("/proc/nowhere/robot.yaml"), "text")
 
 
 def test_diagnosis_of_the_printed_pairing():

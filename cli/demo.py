@@ -1,0 +1,35 @@
+"""`towline demo`: the flagship study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import JsonOption, print_json, watching
+
+
+def demo(
+    folder: Annotated[Path, typer.Option("--out", help="Where pictures and files go.")] = Path("towline-demo"),
+    as_json: JsonOption = False,
+) -> None:
+    """Fly paper F's circle: impossible while the quadrotor hovers, possible when it moves."""
+    from ..studies import flying_circle
+
+    with watching("planning the circle with the base free") as progress:
+        result = flying_circle.run(folder, progress)
+    written = [str(path) for path in (*result.pictures, *result.files)]
+    if as_json:
+        halves = {"hovering": result.hovering.summary(), "free": result.free.summary()}
+        print_json({"as_expected": result.as_expected, **halves, "files": written})
+    else:
+        typer.echo("Paper F's circle, r = 1 m at 99 m, under a quadrotor hovering at 100 m:\n")
+        typer.echo(result.hovering.report())
+        typer.echo("\nThe same circle with the quadrotor free to move, acceleration up to 3 m/s^2:\n")
+        typer.echo(result.free.report())
+        typer.echo("\nWritten:")
+        for name in written:
+            typer.echo(f"  {name}")
+    if not result.as_expected:
+        raise typer.Exit(1)

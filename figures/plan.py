@@ -1,0 +1,136 @@
+"""Figures of a planned motion: its path in space, its tensions against their limits, its carriers beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+
+def draw(trajectory: xr.Dataset, folder: Path, prefix: str = "") -> list[Path]:
+    """Draw all figures of a plan's dataset into `folder`, and return their paths."""
+    pictures = {"path": path(trajectory), "tensions": tensions(trajectory), "base": base_offset(trajectory)}
+    return [style.save(picture, folder / f"{prefix}{name}.png") for name, picture in pictures.items()]
+
+
+def path(trajectory: xr.Dataset) -> Figure:
+    """Platform and carriers in {G}, with the lines between them at a few instants."""
+    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
+
+    canvas = style.figure(5.0, 4.4)
+    ax = canvas.add_subplot(projection=Axes3D.name)
+    position = trajectory["pose"].values[:, :3]
+    carriers = trajectory["carrier_pose"].values[:, :, :3]
+    ax.plot(*position.T, color=style.colour(0), label="platform")
+    for index, name in enumerate(trajectory["carrier"].values):
+        label, drawn = str(name), style.colour(index + 1)
+        if np.ptp(carriers[:, index], axis=0).max() < 1e-9:
+            ax.plot(*carriers[0, index], "s", color=drawn, label=f"{label} (at rest)")
+        else:
+            ax.plot(*carriers[:, index].T, color=drawn, label=label)
+        for row in np.linspace(0, len(position) - 1, 9).astype(int):
+            ax.plot(*np.stack([position[row], carriers[row, index]]).T, color="#bbbbbb", linewidth=0.6)
+    ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
+    for axis in "xyz":
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
+        getattr(ax, f"{axis}axis").set_major_locator(_few_ticks())
+    _equal_scales(ax, np.concatenate([position, carriers.reshape(-1, 3)]))
+    ax.legend(fontsize="small", loc="upper left")
+    return canvas
+
+
+def tensions(trajectory: xr.Dataset) -> Figure:
+    """Every cable's tension over time, with its limits; see `tensions_side_by_side`."""
+    return tensions_side_by_side({"": trajectory})
+
+
+def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
+    """Tensions against their limits of several plans of one robot, a panel each under its title.
+
+    Where no tensions exist, thin lines show what the motion would ask for without limits, pushing included.
+    """
+    canvas = style.figure(1.0 + 4.0 * len(trajectories), 3.6)
+    panels = [
+        style.axes(canvas, "time [s]", "tension [N]", (1, len(trajectories), i + 1)) for i in range(len(trajectories))
+    ]
+    for ax, (title, trajectory) in zip(panels, trajectories.items(), strict=True):
+        notes = _draw_tensions(ax, trajectory)
+        ax.set_title("\n".join([*([title] if title else []), "; ".join(notes)]), fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    canvas.legend(handles, labels, fontsize="small", ncols=6, loc="outside lower center", frameon=False)
+    return canvas
+
+
+def base_offset(trajectory: xr.Dataset) -> Figure:
+    """Where each carrier is beside the platform: its horizontal distance and its height above it."""
+    canvas = style.figure()
+    ax = style.axes(canvas, "time [s]", "carrier from platform [m]")
+    time = trajectory["time"].values
+    apart = trajectory["carrier_pose"].values[:, :, :3] - trajectory["pose"].values[:, None, :3]
+    for index, name in enumerate(trajectory["carrier"].values):
+        horizontal = np.linalg.norm(apart[:, index, :2], axis=1)
+        ax.plot(time, horizontal, color=style.colour(index), label=f"{name}: horizontal")
+        ax.plot(time, apart[:, index, 2], "--", color=style.colour(index), label=f"{name}: height")
+    ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())))
+    ax.legend(fontsize="small")
+    return canvas
+
+
+def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
+    """Draw one panel; what has to be told beside it."""
+    time = trajectory["time"].values
+    values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
+    missing = ~np.isfinite(values).all(axis=1)
+    notes = []
+    for index, cable in enumerate(trajectory["cable"].values):
+        look: dict[str, Any] = {"linestyle": style.line_style(index), "color": style.colour(index)}
+        ax.plot(time, values[:, index], **look, label=f"cable {cable}")
+        ax.plot(time, np.where(missing, unlimited[:, index], np.nan), **look, linewidth=0.8)
+    if missing.any():
+        ax.fill_between(time, 0, 1, where=missing, color="#eeeeee", transform=ax.get_xaxis_transform(), step="mid")
+        shortfall = float(np.nanmax(trajectory["violation"].values))
+        notes.append(f"grey: none inside the limits, short by up to {shortfall:.2f} N")
+    return notes + _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
+
+
+def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> list[str]:
+    """Draw the limits, an upper one only if it is near: far ones would press the curves flat, so they are told."""
+    for low in np.unique(trajectory["t_min"].values):
+        _draw_limit(ax, low, f"t_min = {low:g} N", above=True)
+    far = []
+    for high in np.unique(trajectory["t_max"].values):
+        if high < 2 * np.abs(shown).max():
+            _draw_limit(ax, high, f"t_max = {high:g} N", above=False)
+        else:
+            far.append(f"{high:g}")
+    return [f"t_max = {', '.join(far)} N"] if far else []
+
+
+def _draw_limit(ax: Axes, value: float, text: str, above: bool) -> None:
+    ax.axhline(value, **style.LIMIT)
+    place, side = ("axes fraction", "data"), "bottom" if above else "top"
+    ax.annotate(text, (1, value), xycoords=place, ha="right", va=side, fontsize=8)
+
+
+def _equal_scales(ax: Any, points: np.ndarray) -> None:
+    """The same scale on all three axes, so that a circle is a circle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
+    for axis, centre in zip("xyz", (low + high) / 2, strict=True):
+        getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
+    ax.set_box_aspect((1, 1, 1))
+
+
+def _few_ticks() -> MaxNLocator:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(4, prune="both")

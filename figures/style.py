@@ -1,0 +1,51 @@
+"""One look for every figure: colour-blind safe, units on the axes, readable at 8 cm width."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..writing import whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito (2008), told apart with any kind of colour vision; black and yellow last.
+COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442"]
+LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 1.0}
+DPI = 160
+
+
+def colour(index: int) -> str:
+    """The colour of the index-th series."""
+    return COLOURS[index % len(COLOURS)]
+
+
+def line_style(index: int) -> str:
+    """Solid for the first round of colours, then dashed, so that more than eight series stay apart."""
+    return ["-", "--", ":", "-."][(index // len(COLOURS)) % 4]
+
+
+def figure(width: float = 5.0, height: float = 3.6) -> Figure:
+    """An empty figure, size in inches, that belongs to no window."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
+    """Axes with labels, a light grid and no box, at `place` (rows, columns, which)."""
+    ax = canvas.add_subplot(*place)
+    ax.set_xlabel(xlabel)
+    ax.set_ylabel(ylabel)
+    ax.grid(True, color="#dddddd", linewidth=0.6)
+    ax.spines[["top", "right"]].set_visible(False)
+    return ax
+
+
+def save(canvas: Figure, path: Path) -> Path:
+    """Save as PNG, whole or not at all."""
+    with whole_file(path) as temporary:
+        canvas.savefig(temporary, dpi=DPI, format="png")
+    return path

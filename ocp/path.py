@@ -1,0 +1,192 @@
+"""Paths as data: a pose and its first two time derivatives at every time, from a few numbers of a task file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Annotated, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+from typing_extensions import override
+
+from ..models.robot import Finite, NonNegative, Part, Pose, Vector3
+
+
+class Motion(NamedTuple):
+    """Poses over time and their derivatives; times come first, coordinates (x, y, z, roll, pitch, yaw) last."""
+
+    pose: np.ndarray  # (n, 6) [m, rad]
+    velocity: np.ndarray  # (n, 6) [m/s, rad/s]
+    acceleration: np.ndarray  # (n, 6) [m/s^2, rad/s^2]
+
+    def plus(self, deviation: Iterable[np.ndarray]) -> Motion:
+        """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""
+        return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))
+
+
+def _with_level_attitude(value: object) -> object:
+    """Let (x, y, z) stand for a level pose."""
+    return (*value, 0.0, 0.0, 0.0) if isinstance(value, list | tuple) and len(value) == 3 else value
+
+
+PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]
+
+
+class PathBase(Part):
+    """What all paths share."""
+
+    frame: str = Field(default="world", description="what the path is given in: world, or the name of the only carrier")
+
+    @property
+    def natural_duration(self) -> float | None:
+        """How long the path takes by its own numbers [s]; None: as long as the task says."""
+        return None
+
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        """Pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
+        raise TypeError(f"{type(self).__name__} is no path")
+
+
+class RestPath(PathBase):
+    """Stays where it is."""
+
+    kind: Literal["rest"]
+    pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        pose = np.tile(np.array(self.pose), (len(times), 1))
+        return Motion(pose, np.zeros_like(pose), np.zeros_like(pose))
+
+
+class LinePath(PathBase):
+    """A straight line from one pose to another, over the task's duration."""
+
+    kind: Literal["line"]
+    start: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+    end: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+    timing: Literal["smooth", "uniform"] = Field(
+        default="smooth",
+        description="smooth: from rest to rest, acceleration and jerk zero there; uniform: constant speed",
+    )
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        start, way = np.array(self.start), np.array(self.end) - np.array(self.start)
+        s = (times / duration)[:, None]
+        if self.timing == "uniform":
+            return Motion(start + s * way, np.ones_like(s) * way / duration, np.zeros_like(s) * way)
+        # Acceleration and jerk are zero at both ends: carriers take places that follow the platform's acceleration, so
+        # only then can they start and end at rest too.
+        done = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
+        rate = 140 * s**3 * (1 - s) ** 3 / duration
+        rate_rate = 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s) / duration**2
+        return Motion(start + done * way, rate * way, rate_rate * way)
+
+
+class CirclePath(PathBase):
+    """A circle about the vertical at constant speed, with an optional drift of its centre: a helix."""
+
+    kind: Literal["circle"]
+    centre: Vector3 = Field(description="[m]")
+    radius: NonNegative = Field(description="[m]")
+    rate: Finite = Field(description="[rad/s], positive: counter-clockwise seen from above")
+    phase: Finite = Field(default=0.0, description="angle at the start, from the x axis [rad]")
+    drift: Vector3 = Field(default=(0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
+    attitude: Vector3 = Field(default=(0.0, 0.0, 0.0), description="constant (roll, pitch, yaw) [rad]")
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return 2 * np.pi / abs(self.rate) if self.rate else None
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        angle = self.phase + self.rate * times
+        zero = np.zeros_like(times)
+        arm = self.radius * np.stack([np.cos(angle), np.sin(angle), zero], axis=-1)
+        turned = self.radius * np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
+        drift = np.array(self.drift)
+        still = np.zeros((len(times), 3))
+        attitude = np.tile(np.array(self.attitude), (len(times), 1))
+        return Motion(
+            np.hstack([np.array(self.centre) + arm + times[:, None] * drift, attitude]),
+            np.hstack([self.rate * turned + drift, still]),
+            np.hstack([-(self.rate**2) * arm, still]),
+        )
+
+
+class WaypointPath(PathBase):
+    """A spline of degree 7 through given poses, from rest to rest, acceleration and jerk zero there too."""
+
+    kind: Literal["waypoints"]
+    points: tuple[PoseOrPosition, ...] = Field(min_length=2, description="two poses or positions or more [m, rad]")
+    times: tuple[Finite, ...] | None = Field(
+        default=None, description="when to be there, from 0 on, rising [s]; none: by distance over the duration"
+    )
+
+    @model_validator(mode="after")
+    def _times_fit(self) -> Self:
+        if self.times is not None:
+            _check_times(self.times, len(self.points))
+        return self
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return None if self.times is None else self.times[-1]
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        from scipy.interpolate import make_interp_spline
+
+        points = np.array(self.points)
+        if self.times is None:
+            steps = np.maximum(np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1), 1e-6)
+            knots = np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
+        else:
+            knots = np.array(self.times)
+        at_rest = [(derivative, np.zeros(6)) for derivative in (1, 2, 3)]
+        spline = make_interp_spline(knots, points, k=7, bc_type=(at_rest, at_rest))
+        return Motion(spline(times), spline(times, 1), spline(times, 2))
+
+
+class SamplePath(PathBase):
+    """A quintic spline through samples, with whatever speed they have at their ends."""
+
+    kind: Literal["samples"]
+    times: tuple[Finite, ...] = Field(min_length=6, description="from 0 on, rising [s]")
+    poses: tuple[PoseOrPosition, ...] = Field(min_length=6, description="a pose or position at each time [m, rad]")
+
+    @model_validator(mode="after")
+    def _times_fit(self) -> Self:
+        _check_times(self.times, len(self.poses))
+        return self
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return self.times[-1]
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        from scipy.interpolate import make_interp_spline
+
+        poses = np.array(self.poses)
+        poses[:, 3:] = np.unwrap(poses[:, 3:], axis=0)
+        spline = make_interp_spline(np.array(self.times), poses, k=5)
+        return Motion(spline(times), spline(times, 1), spline(times, 2))
+
+
+AnyPath = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
+
+
+def _check_times(times: tuple[float, ...], count: int) -> None:
+    if len(times) != count:
+        raise ValueError(f"times must be one for each point, but there are {len(times)} times and {count} points")
+    if times[0] != 0:
+        raise ValueError(f"times must start at 0 s, but the first is {times[0]:g} s")
+    for index, (before, after) in enumerate(pairwise(times)):
+        if after <= before:
+            raise ValueError(f"times must rise, but times[{index + 1}] = {after:g} s follows {before:g} s")

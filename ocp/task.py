@@ -1,0 +1,119 @@
+"""What a planner is asked: a path for the platform, what the carriers may do, a margin, and what is cheap."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from ..errors import InputError
+from ..models.parsing import read_yaml, validate
+from ..models.robot import Name, NonNegative, Part, Pose, Positive
+from .path import AnyPath
+
+
+class Tube(Part):
+    """How far the platform may leave its path, and whether it may at the ends."""
+
+    position: NonNegative = Field(default=0.0, description="radius about the path [m]; 0: follow it exactly")
+    attitude: NonNegative = Field(default=0.0, description="each of roll, pitch, yaw [rad]; 0: follow them exactly")
+    ends: Literal["free", "exact"] = Field(
+        default="free", description="exact: no deviation and no deviating speed at start and end"
+    )
+
+
+class HoldBase(Part):
+    """Carriers stay where they are."""
+
+    kind: Literal["hold"]
+    poses: dict[Name, Pose] = Field(default={}, description="where, by carrier, in {G} [m, rad]; others at home")
+
+
+class GivenBase(Part):
+    """Carriers move as given: their motion is a disturbance."""
+
+    kind: Literal["given"]
+    paths: dict[Name, AnyPath] = Field(min_length=1, description="by carrier, in {G}; others stay at home")
+
+
+class FreeBase(Part):
+    """Carriers move as the planner likes, inside these limits and those of the robot's file."""
+
+    kind: Literal["free"]
+    around: dict[Name, AnyPath] = Field(
+        default={}, description="a motion that costs no offset, by carrier, in {G}; others: resting at home"
+    )
+    acceleration_max: Positive | None = Field(default=None, description="[m/s^2]")
+    speed_max: Positive | None = Field(default=None, description="[m/s]")
+    tilt_max: NonNegative = Field(
+        default=0.0, description="largest angle to the vertical [rad] of carriers that can tilt; 0: keep the attitude"
+    )
+    turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
+    ends: Literal["free", "rest", "periodic", "exact"] = Field(
+        default="free",
+        description="free: start and end wherever it suits; rest: at zero speed; periodic: end as it started; "
+        "exact: as `around` says",
+    )
+
+
+AnyBase = Annotated[HoldBase | GivenBase | FreeBase, Field(discriminator="kind")]
+
+
+class Objective(Part):
+    """What costs: each number is the amount that costs as much as one of the others does (Bryson's rule); null: free.
+
+    The cost is the mean over time of sum |quantity / number|^2. A term has a part only where its quantity is free to
+    choose.
+    """
+
+    tension: Positive | None = Field(default=None, description="tension of each cable [N]; null: the platform's weight")
+    deviation: Positive = Field(default=0.01, description="platform off its path [m], angles times `Robot.length`")
+    carrier_acceleration: Positive = Field(default=1.0, description="[m/s^2, rad/s^2]")
+    carrier_offset: Positive = Field(default=10.0, description="carrier away from `around` or home [m, rad]")
+    jerk: Positive = Field(default=10.0, description="of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth")
+
+
+class Task(Part):
+    """A planning task. In a file: YAML with these keys."""
+
+    name: Name = "task"
+    path: AnyPath = Field(description="what the platform follows")
+    duration: Positive | None = Field(default=None, description="[s]; none: the path's own")
+    base: AnyBase = Field(default=HoldBase(kind="hold"), description="what the carriers do: hold, given or free")
+    tube: Tube = Tube()
+    margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
+    wind: tuple[float, float, float] | None = Field(default=None, description="constant, in {G} [m/s]; none: no air")
+    steps: int = Field(default=100, ge=4, le=20_000, description="intervals of the transcription")
+    objective: Objective = Objective()
+    output_rate: Positive = Field(default=100.0, description="samples of the saved trajectory [1/s]")
+
+    @property
+    def seconds(self) -> float:
+        """How long the motion lasts [s].
+
+        Raises
+        ------
+        InputError
+            If neither the task nor its path says so.
+        """
+        seconds = self.duration if self.duration is not None else self.path.natural_duration
+        if seconds is None:
+            raise InputError(f"task {self.name!r}: duration: is missing; accepted: a number > 0 [s]")
+        return seconds
+
+
+def read_task(task: Task | dict[str, Any] | str | os.PathLike[str]) -> Task:
+    """A `Task` from itself, from a mapping or from a YAML file.
+
+    Raises
+    ------
+    InputError
+        In one line that names the field and the value.
+    """
+    if isinstance(task, Task):
+        return task
+    if isinstance(task, dict):
+        return validate(task, Task, "task")
+    return read_yaml(Path(task), Task)

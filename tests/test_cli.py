@@ -1,0 +1,205 @@
+"""The command line through its real entry point: what it prints, what it writes, its exit codes, and no traceback."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from towline.models import available, load
+from towline.models.files import LIBRARY
+
+TOWLINE = Path(sys.executable).with_name("towline")
+
+
+def run(*arguments, cwd=None):
+    """Run towline; nothing that it does may show a traceback."""
+    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
+    command = [str(TOWLINE), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=120, check=False)
+    assert "Traceback" not in done.stderr + done.stdout
+    return done
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo")
+    return folder, run("demo", cwd=folder)
+
+
+def test_demo_shows_both_halves(demo):
+    folder, done = demo
+    assert done.returncode == 0, done.stderr
+    hovering, free = done.stdout.split("The same circle with the quadrotor free")
+    assert "INFEASIBLE" in hovering
+    assert "short by 7.6" in hovering
+    assert "at t = " in hovering
+    assert "t_min in " in hovering
+    assert "FEASIBLE" in free
+    assert "INFEASIBLE" not in free
+    names = sorted(path.name for path in (folder / "towline-demo").iterdir())
+    assert names == ["base.png", "circle-free.nc", "circle-hovering.nc", "path.png", "tensions.png"]
+    for name in names:
+        if name.endswith(".png"):
+            assert (folder / "towline-demo" / name).read_bytes().startswith(b"\x89PNG")
+    free_plan = xr.load_dataset(folder / "towline-demo" / "circle-free.nc")
+    assert free_plan["tensions"].min() > 0.5
+    assert xr.load_dataset(folder / "towline-demo" / "circle-hovering.nc").attrs["status"] == "infeasible"
+
+
+def test_robots_lists_and_diagnoses():
+    listed = run("robots")
+    assert listed.returncode == 0
+    for name in available():
+        assert name in listed.stdout
+    printed = run("robots", "wang-flying-printed")
+    assert printed.returncode == 0
+    assert "rank 3 of 6 at home, 3 when level" in printed.stdout
+    assert "all cable lines meet in one point" in printed.stdout
+    found = json.loads(run("robots", "wang-flying-printed", "--json").stdout)
+    assert (found["rank"], found["rank_level"]) == (3, 3)
+    assert json.loads(run("robots", "--schema").stdout)["title"] == "Robot"
+
+
+def test_tension_prints_the_promised_keys():
+    done = run("tension", "wang-flying", "--pose", "0 0 -1 0 0 0", "--json")
+    assert done.returncode == 0
+    answer = json.loads(done.stdout)
+    # Six equal cables carry the weight: each m g l / (6 (z_A - z_B)).
+    robot = load("wang-flying")
+    height = -0.07 + 1 - 0.03
+    length = np.linalg.norm(robot.anchors[0] - robot.attachments[0] - np.array([0, 0, -1]))
+    np.testing.assert_allclose(answer["tensions"], robot.weight * length / height / 6, rtol=1e-9)
+    assert (answer["status"], answer["feasible"], answer["certificate"]) == ("optimal", True, None)
+    assert answer["residual"] < 1e-9
+    assert set(answer["methods"]) >= {"active-set", "qp", "min-norm"}
+    table = run("tension", "wang-flying").stdout
+    assert "active-set" in table
+    assert "min-norm" in table
+
+
+@pytest.mark.parametrize(
+    ("robot", "pose", "status"),
+    [
+        ("wang-flying", "0.6,0,-1,0,0,0", "infeasible"),
+        ("wang-flying-printed", "0.3,0,-1,0,0,0", "singular"),
+        ("wang-ctmrts", "1.261 0.961 0.4 0 0 0", "singular"),
+    ],
+)
+def test_tension_without_an_answer_exits_1_with_the_certificate(robot, pose, status):
+    done = run("tension", robot, "--pose", pose, "--json")
+    assert done.returncode == 1
+    answer = json.loads(done.stdout)
+    assert (answer["status"], answer["tensions"]) == (status, None)
+    certificate = answer["certificate"]
+    assert certificate["shortfall"] > 0
+    assert len(certificate["direction"]) == 6
+    assert isinstance(certificate["binding"], list)
+    told = run("tension", robot, "--pose", pose)
+    assert told.returncode == 1
+    assert "short by" in told.stdout
+
+
+def test_tension_takes_a_motion():
+    still = json.loads(run("tension", "wang-flying", "--json").stdout)
+    up = json.loads(run("tension", "wang-flying", "--acceleration", "0 0 9.81 0 0 0", "--json").stdout)
+    np.testing.assert_allclose(up["tensions"], 2 * np.array(still["tensions"]), rtol=1e-9)
+    higher = run("tension", "wang-flying", "--pose", "0 0 9 0 0 0", "--carrier-pose", "0 0 10 0 0 0", "--json")
+    np.testing.assert_allclose(json.loads(higher.stdout)["tensions"], still["tensions"], rtol=1e-9)
+    windy = json.loads(run("tension", "wang-flying", "--wind", "1,0,0", "--json").stdout)
+    assert windy["wrench"][0] == pytest.approx(-0.5 * 1.29 * 0.45 * 0.16)
+
+
+TASK = """\
+name: line
+duration: 2
+path: {kind: line, start: [0, 0, -1], end: [0.05, 0, -1.2]}
+steps: 20
+"""
+
+
+def test_plan_writes_a_file_and_figures(tmp_path):
+    (tmp_path / "line.yaml").write_text(TASK)
+    done = run("plan", "wang-flying", "line.yaml", "--figures", "pictures", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    keys = {"feasible", "tension_min", "tension_max", "margin", "tracking_error_max", "build_s", "solve_s"}
+    assert keys | {"audit", "certificate", "file"} <= set(report)
+    assert {"rate_hz", "worst_violation", "at_s"} <= set(report["audit"])
+    assert report["audit"]["rate_hz"] == 1000
+    assert report["audit"]["worst_violation"] < 1e-6
+    saved = xr.load_dataset(tmp_path / report["file"])
+    assert saved["tensions"].shape[1] == 6
+    assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == ["base.png", "path.png", "tensions.png"]
+
+
+def test_plan_that_is_infeasible_exits_1(tmp_path):
+    (tmp_path / "far.yaml").write_text(TASK.replace("0.05", "0.8"))
+    done = run("plan", "wang-flying", "far.yaml", "--out", "far.nc", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    report = json.loads(done.stdout)
+    assert report["certificate"]["shortfall"] > 0
+    assert 0 <= report["certificate"]["time"] <= 2
+    assert (tmp_path / "far.nc").exists()
+
+
+WRONG_FILES = {
+    "missing mass": (lambda text: text.replace("  mass: 1.2\n", "", 1), "platform.mass"),
+    "negative inertia": (lambda text: text.replace("0.81, 0.81", "-0.81, 0.81"), "platform.inertia"),
+    "limits crossed": (lambda text: text.replace("t_min: 0.5", "t_min: 70", 1), "cables[0]"),
+    "unknown carrier": (lambda text: text.replace("carrier: quad", "carrier: drone", 1), "cables[0].carrier: 'drone'"),
+    "NaN": (lambda text: text.replace("[0.52, 0,", "[.nan, 0,"), "cables[0].anchor[0]"),
+    "zero length": (
+        lambda text: text.replace("anchor: [0.52, 0, -0.07]", "anchor: [0.125, 0.216506350946, -0.97]"),
+        "cables[0]",
+    ),
+    "not YAML": (lambda text: text.replace("name:", "name: [", 1), "is not YAML"),
+    "50 MB": (lambda text: text + "#" * 50_000_000, "50.0 MB"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_FILES)
+def test_wrong_robot_file_is_one_line_and_exit_code_2(case, tmp_path):
+    change, named = WRONG_FILES[case]
+    text = (LIBRARY / "wang-flying.yaml").read_text()
+    file = tmp_path / "mine.yaml"
+    changed = change(text)
+    assert changed != text
+    file.write_text(changed)
+    done = run("robots", file)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert str(file) in done.stderr
+    assert named in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["tension", "wang-flyng"], "did you mean 'wang-flying'"),
+        (["tension", "wang-flying", "--pose", "1 2 3"], "--pose: '1 2 3'; accepted: 6 finite numbers"),
+        (["tension", "wang-flying", "--pose", "a b c d e f"], "--pose: 'a b c d e f' is not a list of numbers"),
+        (["tension", "wang-flying", "--pose", "0 0 nan 0 0 0"], "accepted: 6 finite numbers"),
+        (["tension", "wang-ctmrts", "--carrier-pose", "0 0 1 0 0 0"], "for each of 3 carriers"),
+        (["tension", "wang-flying", "--method", "magic"], "active-set"),
+        (["tension", "ipanema-1", "--wind", "1 0 0"], "has no platform.aero"),
+        (["plan", "wang-flying", "none.yaml"], "none.yaml: cannot be read"),
+        (["demo", "--out", "/proc/nowhere"], "cannot be written"),
+    ],
+)
+def test_wrong_arguments_are_one_line_and_exit_code_2(arguments, message):
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert message in done.stderr
+
+
+def test_version_and_help():
+    assert run("--version").stdout.strip() == "towline 0.1.0"
+    for command in ("demo", "robots", "tension", "plan"):
+        assert run(command, "--help").returncode == 0

@@ -1,0 +1,82 @@
+"""The house keeps its shape: imports point down, packages are listed, importing is cheap."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+
+# From the ground up: a room may import the rooms below its floor, and itself. Rooms of one floor stand apart.
+FLOORS = [{"models", "solvers", "figures"}, {"ocp"}, {"studies"}, {"cli"}]
+COMMON = {"errors", "writing"}
+CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+
+def rooms():
+    """Folders at the top that are packages."""
+    return {path.parent.name for path in ROOT.glob("*/__init__.py")}
+
+
+def imported_rooms(file):
+    """Top-level parts of towline that a file imports, relative or absolute."""
+    depth = len(file.relative_to(ROOT).parts) - 1
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level == depth + 1:
+            found |= {node.module.split(".")[0]} if node.module else {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").startswith("towline."):
+            found.add(node.module.split(".")[1])
+        elif isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("towline.")}
+    return found - COMMON - {"__version__"}
+
+
+def test_imports_only_point_down():
+    floor_of = {room: level for level, floor in enumerate(FLOORS) for room in floor}
+    assert rooms() == set(floor_of), "a new room needs its floor in this test"
+    for file in [path for room in rooms() for path in (ROOT / room).rglob("*.py")]:
+        room = file.relative_to(ROOT).parts[0]
+        for other in imported_rooms(file) - {room}:
+            assert floor_of[other] < floor_of[room], f"{file.relative_to(ROOT)} imports {other}"
+
+
+def test_the_import_test_can_see():
+    """It would notice: planning does import models and solvers."""
+    seen = {other for path in (ROOT / "ocp").glob("*.py") for other in imported_rooms(path)}
+    assert {"models", "solvers"} <= seen
+
+
+def test_every_package_is_listed():
+    listed = set(CONFIGURATION["tool"]["setuptools"]["packages"])
+    found = {"towline"} | {
+        "towline." + ".".join(path.parent.relative_to(ROOT).parts)
+        for room in rooms()
+        for path in (ROOT / room).rglob("__init__.py")
+    }
+    assert listed == found
+
+
+def test_pins_are_plain():
+    """Every requirement is pinned, as name==version and nothing else."""
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
+    pinned = {line.split("==")[0].lower().replace("_", "-") for line in lines if line.count("==") == 1}
+    assert len(pinned) == len(lines)
+    project = CONFIGURATION["project"]
+    for requirements in (project["dependencies"], *project["optional-dependencies"].values()):
+        for requirement in requirements:
+            assert requirement.split(">=")[0].lower() in pinned
+
+
+def imported_by(statement):
+    code = f"import sys; {statement}; print(' '.join(sys.modules))"
+    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
+
+
+def test_importing_is_cheap():
+    """What costs 0.3 s and more alone is imported where it is used."""
+    heavy = {"xarray", "qpsolvers", "osqp", "matplotlib.pyplot", "scipy.optimize", "numba"}
+    for statement in ("import towline", "import towline.models", "import towline.solvers", "import towline.cli.main"):
+        assert not heavy & imported_by(statement), statement
+    assert "casadi" not in imported_by("import towline.cli.main")

@@ -1,0 +1,368 @@
+"""Planning: paths and integrators by differences, plans judged by code that is not the planner."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.optimize import linprog, lsq_linear
+
+from towline.errors import InputError
+from towline.models import Dynamics, Robot, load
+from towline.models.parsing import parse_yaml, to_yaml
+from towline.ocp import PlanStatus, Task, plan, read_task, spline
+from towline.ocp.audit import audit
+from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
+from towline.ocp.scenario import Deviation, lay_out
+
+HOVER = [50, 50, 100, 0, 0, 0]
+CIRCLE = {"kind": "circle", "centre": [50, 50, 99], "radius": 1, "rate": 0.2 * np.pi}
+FREE = {"kind": "free", "around": {"quad": {"kind": "rest", "pose": HOVER}}, "acceleration_max": 3, "ends": "periodic"}
+SAMPLE_TIMES = tuple(np.linspace(0, 4, 9))
+
+PATHS = {
+    "rest": RestPath(kind="rest", pose=(1, 2, 3)),
+    "smooth line": LinePath(kind="line", start=(0, 0, 1), end=(1, -2, 3, 0.1, 0.2, -0.3)),
+    "uniform line": LinePath(kind="line", start=(0, 0, 1), end=(1, -2, 3), timing="uniform"),
+    "helix": CirclePath(kind="circle", centre=(1, 2, 3), radius=0.5, rate=-0.7, phase=0.3, drift=(0.1, 0.2, 0.3)),
+    "waypoints": WaypointPath(kind="waypoints", points=((0, 0, 1), (1, 0, 2, 0, 0, 0.5), (1, 1, 1))),
+    "timed waypoints": WaypointPath(kind="waypoints", points=((0, 0, 1), (1, 0, 2), (1, 1, 1)), times=(0, 1, 4)),
+    "samples": SamplePath(
+        kind="samples", times=SAMPLE_TIMES, poses=tuple((np.sin(t), t, 1, 0, 0, 0.2 * t) for t in SAMPLE_TIMES)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_path_derivatives_by_differences(name):
+    path, step = PATHS[name], 1e-4
+    times = np.linspace(0.05, 3.95, 41)
+    before, at, after = (path.at(times + shift, 4.0) for shift in (-step, 0, step))
+    np.testing.assert_allclose(at.velocity, (after.pose - before.pose) / (2 * step), atol=1e-6)
+    np.testing.assert_allclose(at.acceleration, (after.velocity - before.velocity) / (2 * step), atol=1e-5)
+
+
+def test_paths_go_where_they_are_told():
+    ends = PATHS["waypoints"].at(np.array([0.0, 4.0]), 4.0)
+    np.testing.assert_allclose(ends.pose[:, :3], [[0, 0, 1], [1, 1, 1]], atol=1e-12)
+    np.testing.assert_allclose(ends.velocity, 0, atol=1e-12)
+    np.testing.assert_allclose(ends.acceleration, 0, atol=1e-9)
+    np.testing.assert_allclose(PATHS["timed waypoints"].at(np.array([1.0]), 4.0).pose[0, :3], [1, 0, 2], atol=1e-12)
+    line = PATHS["smooth line"].at(np.array([0.0, 4.0]), 4.0)
+    np.testing.assert_allclose(line.pose, [[0, 0, 1, 0, 0, 0], [1, -2, 3, 0.1, 0.2, -0.3]], atol=1e-12)
+    np.testing.assert_allclose(line.velocity, 0, atol=1e-12)
+    radius = np.linalg.norm((PATHS["helix"].at(np.array([1.0]), 4.0).pose[0, :3] - [1.1, 2.2, 3.3])[:2])
+    assert radius == pytest.approx(0.5)
+
+
+def test_spline_is_integrated_exactly_and_bounded_by_its_points():
+    rng = np.random.default_rng(7)
+    nodes, a = np.linspace(0, 2, 6), rng.normal(size=(6, 3))
+    q, v = np.zeros((6, 3)), np.zeros((6, 3))
+    q[0], v[0] = rng.normal(size=(2, 3))
+    h = nodes[1]
+    for k in range(5):
+        # Integrate the linear acceleration with Gauss-Legendre quadrature, which is exact for it.
+        s, weight = np.polynomial.legendre.leggauss(4)
+        s, weight = h * (s + 1) / 2, h * weight / 2
+        acceleration = a[k] + s[:, None] / h * (a[k + 1] - a[k])
+        v[k + 1] = v[k] + weight @ acceleration
+        q[k + 1] = q[k] + h * v[k] + (weight * (h - s)) @ acceleration
+        defects = spline.defects(h, (q[k], v[k], a[k]), (q[k + 1], v[k + 1], a[k + 1]))
+        np.testing.assert_allclose(np.array(defects), 0, atol=1e-14)
+    times = np.linspace(0, 2, 2001)
+    position, speed, acceleration = spline.evaluate(nodes, q, v, a, times)
+    np.testing.assert_allclose(position[::400], q, atol=1e-14)
+    np.testing.assert_allclose(np.gradient(position, times, axis=0)[1:-1], speed[1:-1], atol=1e-5)
+    np.testing.assert_allclose(np.gradient(speed, times, axis=0)[1:-1], acceleration[1:-1], atol=2e-2)
+    for k in range(5):
+        inside = (times >= nodes[k]) & (times <= nodes[k + 1])
+        points = np.array([q[k], *spline.position_points(h, q[k], v[k], q[k + 1], v[k + 1]), q[k + 1]])
+        assert (position[inside] <= points.max(axis=0) + 1e-12).all()
+        assert (position[inside] >= points.min(axis=0) - 1e-12).all()
+        speeds = np.array([v[k], spline.speed_point(h, v[k], a[k]), v[k + 1]])
+        assert (speed[inside] <= speeds.max(axis=0) + 1e-12).all()
+
+
+def judge(robot, trajectory, margin=0.0, residual=1e-6):
+    """Judge a plan's dataset with nothing of ocp/: balance, limits, and that poses, velocities, accelerations agree."""
+    dynamics = Dynamics(robot)
+    data = {name: trajectory[name].values for name in trajectory}
+    A = dynamics.wrench_matrix(data["pose"], data["carrier_pose"])
+    w = dynamics.required_wrench(data["pose"], data["velocity"], data["acceleration"])
+    error = np.einsum("nij,nj->ni", A, data["tensions"]) - w
+    error[:, 3:] /= robot.length
+    assert np.linalg.norm(error, axis=1).max() <= residual
+    assert (data["tensions"] >= robot.t_min + margin - 1e-6).all()
+    assert (data["tensions"] <= robot.t_max - margin + 1e-6).all()
+    times = trajectory["time"].values
+    for prefix in ("", "carrier_"):
+        for value, rate in (("pose", "velocity"), ("velocity", "acceleration")):
+            differences = np.gradient(data[prefix + value], times, axis=0, edge_order=2)[2:-2]
+            scale = max(np.abs(data[prefix + rate]).max(), 1e-3)
+            assert np.abs(differences - data[prefix + rate][2:-2]).max() < 0.02 * scale
+
+
+def support(A, direction, low, high):
+    """Support value of {A t} along `direction`, by linear programming."""
+    return -linprog(-(direction @ A), bounds=np.stack([low, high], axis=1)).fun
+
+
+@pytest.fixture(scope="module")
+def circle_free():
+    return plan(load("wang-flying"), {"name": "circle", "path": CIRCLE, "base": FREE})
+
+
+def test_hovering_circle_is_infeasible_with_a_certificate():
+    robot = load("wang-flying")
+    found = plan(robot, {"path": CIRCLE, "base": {"kind": "hold", "poses": {"quad": HOVER}}})
+    assert found.status is PlanStatus.INFEASIBLE
+    assert found.tension_min is None
+    certificate = found.certificate
+    angle = 0.2 * np.pi * certificate["time"]
+    pose = np.array([50 + np.cos(angle), 50 + np.sin(angle), 99, 0, 0, 0])
+    acceleration = -((0.2 * np.pi) ** 2) * np.array([np.cos(angle), np.sin(angle), 0, 0, 0, 0])
+    dynamics = Dynamics(robot)
+    A = dynamics.wrench_matrix(pose, [HOVER])
+    w = dynamics.required_wrench(pose, np.zeros(6), acceleration)
+    direction = np.array(certificate["direction"])
+    short = direction @ w - support(A, direction, robot.t_min, robot.t_max)
+    assert certificate["shortfall"] == pytest.approx(short, rel=1e-6)
+    # No other time of the circle is worse: the distance to the available wrenches, by another solver.
+    scale = np.array([1, 1, 1, robot.length, robot.length, robot.length])
+    distances = []
+    for time in np.linspace(0, 10, 301):
+        angle = 0.2 * np.pi * time
+        pose = np.array([50 + np.cos(angle), 50 + np.sin(angle), 99, 0, 0, 0])
+        acceleration = -((0.2 * np.pi) ** 2) * np.array([np.cos(angle), np.sin(angle), 0, 0, 0, 0])
+        A = dynamics.wrench_matrix(pose, [HOVER]) / scale[:, None]
+        w = dynamics.required_wrench(pose, np.zeros(6), acceleration) / scale
+        fit = lsq_linear(A, w, (robot.t_min, robot.t_max), method="bvls")
+        distances.append(np.sqrt(2 * fit.cost))
+    assert max(distances) == pytest.approx(certificate["shortfall"], rel=1e-4)
+
+
+def test_free_base_follows_the_circle(circle_free):
+    robot = load("wang-flying")
+    assert circle_free.feasible
+    assert circle_free.tracking_error_max < 0.01
+    assert circle_free.audit.summary()["worst_violation"] < 1e-6
+    trajectory = circle_free.trajectory
+    judge(robot, trajectory)
+    base = trajectory["carrier_acceleration"].values[:, 0, :3]
+    assert np.linalg.norm(base, axis=1).max() <= 3 + 1e-9
+    radius = np.linalg.norm(trajectory["pose"].values[:, :2] - 50, axis=1)
+    np.testing.assert_allclose(radius, 1, atol=1e-12)
+    np.testing.assert_allclose(trajectory["carrier_pose"][0], trajectory["carrier_pose"][-1], atol=1e-6)
+
+
+def test_saved_plan_holds_what_the_design_promises(circle_free, tmp_path):
+    file = circle_free.save(tmp_path / "plans" / "circle.nc")
+    assert [path.name for path in file.parent.iterdir()] == ["circle.nc"]
+    saved = xr.load_dataset(file)
+    assert saved["pose"].dims == ("time", "coordinate")
+    assert saved["carrier_acceleration"].dims == ("time", "carrier", "coordinate")
+    assert saved["tensions"].dims == ("time", "cable")
+    assert saved["tensions"].attrs["units"] == "N"
+    assert saved["time"].attrs["units"] == "s"
+    assert list(saved["coordinate"].values) == ["x", "y", "z", "roll", "pitch", "yaw"]
+    assert parse_yaml(saved.attrs["robot"], Robot, "saved") == load("wang-flying")
+    assert parse_yaml(saved.attrs["task"], Task, "saved") == circle_free.scenario.task
+    assert json.loads(saved.attrs["report"])["feasible"] is True
+    xr.testing.assert_equal(saved, circle_free.trajectory)
+    with pytest.raises(InputError, match="cannot be written"):
+        circle_free.save("/proc/nowhere/plan.nc")
+
+
+def test_largest_radius_under_a_hovering_base():
+    """Between 0.20 m (0.35 N) and 0.25 m (-0.17 N) the smallest tension passes zero."""
+    robot = load("wang-flying")
+    for radius, feasible in ((0.18, True), (0.25, False)):
+        found = plan(robot, {"path": {**CIRCLE, "centre": [0, 0, -1], "radius": radius}})
+        assert found.feasible is feasible
+    found = plan(robot, {"path": {**CIRCLE, "centre": [0, 0, -1], "radius": 0.1}})
+    assert found.tension_min == pytest.approx(1.32, abs=0.01)
+    judge(robot, found.trajectory)
+
+
+def test_margin_is_kept_between_nodes(circle_free):
+    robot = load("wang-flying")
+    found = plan(robot, {"path": CIRCLE, "base": FREE, "margin": 1.0})
+    assert found.feasible
+    assert found.margin >= 1.0 - 1e-6
+    judge(robot, found.trajectory, margin=1.0)
+    assert circle_free.margin < 1.0
+
+
+def test_mobile_robots_carry_the_load_inside_their_reach():
+    robot = load("wang-ctmrts")
+    path = {"kind": "line", "start": [1.2, 0.9, 0.3], "end": [1.35, 1.05, 0.6]}
+    found = plan(robot, {"path": path, "duration": 3, "base": {"kind": "free", "ends": "rest"}, "margin": 5})
+    assert found.feasible, found.report()
+    judge(robot, found.trajectory, margin=5, residual=1e-3 * robot.weight)
+    for index, carrier in enumerate(robot.carriers):
+        position = found.trajectory["carrier_pose"].values[:, index, :3]
+        assert (position >= np.array(carrier.reach.min) - 1e-6).all()
+        assert (position <= np.array(carrier.reach.max) + 1e-6).all()
+        speed = np.linalg.norm(found.trajectory["carrier_velocity"].values[:, index, :3], axis=1)
+        assert speed.max() <= carrier.speed_max + 1e-6
+        assert speed[[0, -1]] == pytest.approx(0, abs=1e-6)
+        acceleration = np.linalg.norm(found.trajectory["carrier_acceleration"].values[:, index, :3], axis=1)
+        assert acceleration.max() <= carrier.acceleration_max + 1e-6
+
+
+def test_resting_mobile_robots_cannot_hold_the_load_level():
+    """Three cables and six equations: with the robot-ends fixed the wrench is outside the range of A."""
+    robot = load("wang-ctmrts")
+    found = plan(robot, {"path": {"kind": "rest", "pose": list(robot.home)}, "duration": 1, "steps": 10})
+    assert found.status is PlanStatus.INFEASIBLE
+    assert found.certificate["binding"] == []
+
+
+def test_circle_in_the_frame_of_a_moving_and_pitching_base():
+    """Paper F's VI.C: the base flies and pitches as given; the platform circles with r = 0.15 m in {A}."""
+    robot = load("wang-flying")
+    times = np.linspace(0, 10, 41)
+    poses = [(2 * t, t, 100 + 0.5 * t, 0, 0.02 * np.sin(0.2 * np.pi * t), 0) for t in times]
+    base = {"kind": "given", "paths": {"quad": {"kind": "samples", "times": list(times), "poses": poses}}}
+    path = {**CIRCLE, "centre": [0, 0, -1], "radius": 0.15, "frame": "quad"}
+    found = plan(robot, {"path": path, "base": base})
+    assert found.feasible, found.report()
+    judge(robot, found.trajectory)
+    pitch = found.trajectory["pose"].values[:, 4]
+    np.testing.assert_allclose(pitch, found.trajectory["carrier_pose"].values[:, 0, 4], atol=1e-12)
+
+
+def test_tube_makes_a_path_possible_that_is_not():
+    robot = load("wang-flying")
+    path = {**CIRCLE, "centre": [0, 0, -1], "radius": 0.25}
+    assert not plan(robot, {"path": path}).feasible
+    found = plan(robot, {"path": path, "tube": {"position": 0.1}})
+    assert found.feasible, found.report()
+    assert 0.001 < found.tracking_error_max <= 0.1
+    judge(robot, found.trajectory)
+    off = (
+        found.trajectory["pose"].values[:, :3]
+        - Task.model_validate({"path": path}).path.at(found.trajectory["time"].values, 10.0).pose[:, :3]
+    )
+    np.testing.assert_allclose(np.linalg.norm(off, axis=1), found.trajectory["tracking_error"].values, atol=1e-9)
+
+
+def test_tilting_base_in_the_carriers_frame_stays_inside_its_tilt():
+    """A base that may tilt, and a platform path in its frame: both transcriptions meet the same audit in {G}."""
+    robot = load("wang-flying")
+    path = {"kind": "line", "start": [0, 0, -1], "end": [0.1, 0, -1.2], "frame": "quad"}
+    base = {"kind": "free", "tilt_max": 0.1, "acceleration_max": 2, "turn_acceleration_max": 2, "speed_max": 1}
+    found = plan(robot, {"path": path, "duration": 3, "steps": 40, "base": base, "tube": {"attitude": 0.05}})
+    assert found.feasible, found.report()
+    judge(robot, found.trajectory)
+    tilt = found.trajectory["carrier_pose"].values[:, 0, 3:5]
+    assert (np.cos(tilt).prod(axis=1) >= np.cos(0.1) - 1e-9).all()
+
+
+def test_no_plan_is_told_with_the_worst_time_of_the_closest_motion():
+    robot = load("wang-flying")
+    found = plan(robot, {"path": CIRCLE, "base": {**FREE, "speed_max": 0.05, "ends": "free"}, "steps": 40})
+    assert found.status is PlanStatus.NOT_FOUND
+    row = int(np.argmin(np.abs(found.trajectory["time"].values - found.certificate["time"])))
+    at = found.trajectory.isel(time=row)
+    dynamics = Dynamics(robot)
+    A = dynamics.wrench_matrix(at["pose"].values, at["carrier_pose"].values)
+    w = dynamics.required_wrench(at["pose"].values, at["velocity"].values, at["acceleration"].values)
+    direction = np.array(found.certificate["direction"])
+    short = direction @ w - support(A, direction, robot.t_min, robot.t_max)
+    assert short == pytest.approx(found.certificate["shortfall"], rel=1e-6)
+    assert short > 0
+
+
+def test_redundant_ground_robot_and_wind():
+    robot = load("ipanema-1")
+    path = {"kind": "waypoints", "points": [[0, 0, 1], [0.5, 0.3, 1.2], [-0.4, 0.2, 0.9]]}
+    found = plan(robot, {"path": path, "duration": 6, "margin": 1})
+    assert found.feasible
+    judge(robot, found.trajectory, margin=1)
+    flying = load("wang-flying")
+    still = plan(flying, {"path": {**CIRCLE, "centre": [0, 0, -1], "radius": 0.1}})
+    windy = plan(flying, {"path": {**CIRCLE, "centre": [0, 0, -1], "radius": 0.1}, "wind": [2, 0, 0]})
+    assert windy.tension_min < still.tension_min
+
+
+def test_audit_sees_between_the_nodes():
+    """A path that is inside at its five nodes and far outside between them is not called feasible."""
+    robot = load("wang-flying")
+    outside = 0.9
+    points = [[0, 0, -1]] + [[x, 0, -1] for x in (outside, 0, outside, 0, outside, 0, outside, 0)]
+    task = {"path": {"kind": "waypoints", "points": points, "times": list(range(9))}, "steps": 4}
+    assert plan(robot, task).status is PlanStatus.INFEASIBLE
+
+
+def test_audit_sees_carriers_out_of_their_limits(circle_free):
+    scenario = circle_free.scenario
+    good = circle_free.deviation
+    fast = Deviation(good.nodes, good.q, good.v, 10 * good.a, good.tensions)
+    seen = audit(scenario, fast, rate=20)
+    assert any("acceleration" in sentence for sentence in seen.carrier_excess)
+    assert not seen.passed
+
+
+WRONG = {
+    "frame": ({"path": {**CIRCLE, "frame": "drone"}}, "path.frame: 'drone' is unknown; accepted: world, quad"),
+    "carrier": (
+        {"path": CIRCLE, "base": {"kind": "hold", "poses": {"drone": HOVER}}},
+        "base.poses: carrier 'drone' is unknown; accepted: quad",
+    ),
+    "margin": ({"path": CIRCLE, "margin": 30}, "margin: 30 N leaves nothing.*accepted: at most 29.75 N"),
+    "duration": ({"path": {"kind": "rest", "pose": [0, 0, -1]}}, "duration: is missing"),
+    "too long": (
+        {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 1]}, "duration": 2},
+        "duration: 2 s is longer than path, whose times end at 1 s",
+    ),
+    "kind": ({"path": {"kind": "spiral"}}, "path.kind: 'spiral' is unknown; accepted"),
+    "times": (
+        {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 0]}},
+        r"path: times must rise, but times\[1\] = 0 s follows 0 s",
+    ),
+    "NaN": ({"path": {**CIRCLE, "radius": float("nan")}}, "path.radius: .*got nan"),
+    "key": ({"path": CIRCLE, "marign": 1}, "marign: is not a known key, did you mean 'margin'"),
+    "steps": ({"path": CIRCLE, "steps": 1}, "steps: .*greater than or equal to 4, got 1"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_tasks_are_one_line(case):
+    task, message = WRONG[case]
+    with pytest.raises(InputError, match=message) as caught:
+        plan(load("wang-flying"), task)
+    assert "\n" not in str(caught.value)
+
+
+def test_tasks_that_do_not_fit_the_robot():
+    with pytest.raises(InputError, match="has no carrier that moves"):
+        plan(load("ipanema-1"), {"path": CIRCLE, "base": {"kind": "free"}})
+    with pytest.raises(InputError, match=r"has no platform\.aero"):
+        plan(load("ipanema-1"), {"path": CIRCLE, "wind": [1, 0, 0]})
+    with pytest.raises(InputError, match="of kind ground and never moves"):
+        plan(load("ipanema-1"), {"path": CIRCLE, "base": {"kind": "given", "paths": {"frame": CIRCLE}}})
+
+
+def test_task_files(tmp_path):
+    task = Task.model_validate({"path": CIRCLE, "base": FREE})
+    file = tmp_path / "circle.yaml"
+    file.write_text(to_yaml(task))
+    assert read_task(file) == task
+    with pytest.raises(InputError, match="cannot be read"):
+        read_task(tmp_path / "none.yaml")
+
+
+def test_progress_is_told():
+    told = []
+    plan(load("wang-flying"), {"path": CIRCLE, "base": FREE, "steps": 20}, lambda *state: told.append(state))
+    iterations, objectives, infeasibilities = zip(*told, strict=True)
+    assert list(iterations) == list(range(len(told)))
+    assert infeasibilities[-1] < 1e-6
+    assert np.isfinite(objectives).all()
+
+
+def test_layout_names_owners():
+    scenario = lay_out(load("wang-flying"), read_task({"path": CIRCLE, "base": FREE, "tube": {"attitude": 0.1}}))
+    assert scenario.owners() == [(None, 3), (None, 4), (None, 5), (0, 0), (0, 1), (0, 2)]
