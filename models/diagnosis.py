@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from .dynamics import Dynamics
+from .kinematics import transform
 from .robot import Robot
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value; exact singularities come out near 1e-16
@@ -102,9 +104,7 @@ def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
 
 
 def _attachment_points(robot: Robot) -> np.ndarray:
-    from . import kinematics
-
-    return kinematics.transform(kinematics.ca.DM(robot.home), robot.attachments.T).full().T  # (m, 3)
+    return transform(ca.DM(robot.home), robot.attachments).full().T  # (m, 3)
 
 
 def _motion(twist: np.ndarray, robot: Robot) -> str:

@@ -244,9 +244,9 @@ def _world_functions(robot: Robot) -> dict[str, ca.Function]:
     count = len(robot.carriers)
     pose, velocity, acceleration = (ca.SX.sym(name, 6) for name in ("pose", "velocity", "acceleration"))
     carriers = [ca.SX.sym(f"carrier_{name}", count, 6) for name in ("pose", "velocity", "acceleration")]
-    anchors = kinematics.anchors(robot, carriers[0])
-    A = kinematics.wrench_matrix(robot, pose, anchors)
-    lengths = kinematics.norms(kinematics.cable_vectors(robot, pose, anchors))
+    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers[0])
+    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, anchors)
+    lengths = kinematics.norms(kinematics.cable_vectors(robot.attachments, pose, anchors))
     w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
     place = ["pose", "carrier_pose"]
     motion = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
@@ -263,7 +263,8 @@ def _relative_functions(robot: Robot) -> dict[str, ca.Function]:
     names = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
     motion = [ca.SX.sym(name, 6) for name in names]
     pose, velocity, acceleration, *carrier = motion
-    A = kinematics.wrench_matrix(robot, pose, ca.SX(robot.anchors.T))
+    anchors = ca.SX(robot.anchors.T)
+    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, anchors)
     D_B = relative.base_disturbance(robot, pose, velocity, *carrier)
     w = relative.relative_inertial_wrench(robot, pose, velocity, acceleration) + D_B
     in_world = relative.motion_in_world(*motion)

@@ -166,7 +166,8 @@ class Robot(Part):
                 raise ValueError(f"cables[{index}].carrier: {cable.carrier!r} is unknown, accepted: {', '.join(names)}")
         from . import kinematics  # CasADi is needed only once a whole robot stands
 
-        lengths = kinematics.home_lengths(self)
+        attachments = kinematics.transform(kinematics.ca.DM(self.home), self.attachments).full().T
+        lengths = np.linalg.norm(self.home_anchors - attachments, axis=1)
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(
@@ -217,7 +218,15 @@ class Robot(Part):
             return np.array(self.platform.home)  # (6,)
         from . import kinematics
 
-        return kinematics.default_home(self)
+        return kinematics.default_home(self.home_anchors, self.attachments)
+
+    @property
+    def home_anchors(self) -> np.ndarray:
+        """Anchors in {G} with the carriers at home [m]."""
+        from . import kinematics
+
+        at_home = kinematics.ca.DM(self.carrier_home)
+        return kinematics.anchors(self.anchors, self.carrier_of_cable, at_home).full().T  # (m, 3)
 
     @property
     def inertia(self) -> np.ndarray:
