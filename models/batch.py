@@ -1,13 +1,29 @@
-"""Call a CasADi Function with NumPy arrays that have leading batch dimensions, or with symbols."""
+"""Call a CasADi Function with NumPy arrays that have leading batch dimensions, or with symbols.
+
+One row goes through CasADi's buffers, a few rows through `Function.map`, many through a kernel of the same instructions
+(`tape`, `kernel`), about ten times as fast as the map. Compiling costs what some 10^6 rows of the map cost, and a load
+from the disk a third of that, so a Function gets its kernel once its calls have had `ROWS_WORTH_A_KERNEL` rows in all.
+"""
 
 from __future__ import annotations
 
+import math
+import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, SolverError
+from .kernel import Kernel, compile_kernel
+from .tape import dense, translate
+
+ROWS_WORTH_A_KERNEL = 200_000
+ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
+ROWS_OF_MAP = 64  # to make a map of n costs as much as to evaluate it, so one of this size is kept
 
 
 def is_symbolic(value: Any) -> bool:
@@ -15,55 +31,237 @@ def is_symbolic(value: Any) -> bool:
     return isinstance(value, ca.SX | ca.MX)
 
 
-def call(function: ca.Function, arguments: dict[str, Any]) -> dict[str, Any]:
+def call(
+    function: ca.Function, arguments: dict[str, Any], threads: int | None = None, matrices: tuple[str, ...] = ()
+) -> dict[str, Any]:
     """Evaluate `function` on named arguments; the outputs have the common leading dimensions of the inputs.
 
     Parameters
     ----------
     function
-        Its input names are the keys of `arguments`.
+        Its input names are the keys of `arguments`; an input that is not among them has the Function's default.
     arguments
         Arrays of shape (..., *shape of the input), where a column (n, 1) counts as (n,); they broadcast as in NumPy.
         If one is a CasADi expression all are taken as they are and the outputs are expressions too.
+    threads
+        How many threads share the rows of a kernel; None: as many as there are processors, one for each 50 000 rows at
+        most. The result does not depend on it.
+    matrices
+        Outputs that are matrices also when they happen to have one column, as the wrench matrix of one cable.
 
     Raises
     ------
     InputError
         Naming the argument whose shape or value does not fit.
+    SolverError
+        If the Function itself fails, which one of plain operations never does.
     """
     if any(is_symbolic(value) for value in arguments.values()):
-        return function(**{name: _as_symbolic(value) for name, value in arguments.items()})
-    arrays = {name: _as_array(function, name, value) for name, value in arguments.items()}
-    shapes = {name: function.size_in(name) for name in arrays}
-    leading = {name: array.shape[: array.ndim - len(_core(shapes[name]))] for name, array in arrays.items()}
-    try:
-        batch = np.broadcast_shapes(*leading.values())
-    except ValueError:
-        told = ", ".join(f"{name} {shape}" for name, shape in leading.items())
-        raise InputError(f"leading dimensions do not broadcast: {told}; accepted: equal ones, or 1") from None
-    columns = {
-        name: _to_columns(np.broadcast_to(array, batch + _core(shapes[name])), shapes[name], batch)
-        for name, array in arrays.items()
-    }
-    count = int(np.prod(batch))
-    if count == 0:
-        sizes = {name: function.size_out(name) for name in function.name_out()}
-        return {name: np.zeros(batch + _core(size)) for name, size in sizes.items()}
-    mapped = function if count == 1 else function.map(count)
-    outputs = mapped(**columns)
-    return {name: _from_columns(value, function.size_out(name), batch) for name, value in outputs.items()}
+        return function(**_as_symbols(function, arguments))
+    if threads is not None and threads < 1:
+        raise InputError(f"threads: is {threads}; accepted: 1 and more, or None")
+    outputs = _evaluator(function)(arguments, threads)
+    for name in matrices:
+        if function.size_out(name)[1] == 1:
+            outputs[name] = outputs[name][..., None]
+    return outputs
+
+
+def compiled(function: ca.Function) -> Kernel:
+    """Make the kernel of `function` now, so that `call` uses it from now on, and return it.
+
+    Returns
+    -------
+    Kernel
+        `kernel(start, stop, *inputs, *outputs)` computes the rows start to stop of outputs (N, r, c) that it is given,
+        from inputs (N, r, c), all of float64.
+
+    Raises
+    ------
+    InputError
+        If it has an operation that no kernel has; `call` uses `Function.map` then.
+    """
+    return _evaluator(function).kernel()
+
+
+class _Evaluator:
+    """What the calls of one Function with numbers share."""
+
+    def __init__(self, function: ca.Function):
+        self._function = ca.Function(dense(function))  # a handle of its own: see _evaluators
+        self.name: str = function.name()
+        self.inputs: dict[str, tuple[int, int]] = {name: function.size_in(name) for name in function.name_in()}
+        self.outputs: dict[str, tuple[int, int]] = {name: function.size_out(name) for name in function.name_out()}
+        self._cores = {name: _core(size) for name, size in self.inputs.items()}
+        self._defaults = {name: float(function.default_in(i)) for i, name in enumerate(self.inputs)}
+        self._kernel: Kernel | None = None
+        self._has_none = False
+        self._rows_so_far = 0
+        self._own = threading.local()  # a buffer serves one thread at a time
+
+    def __call__(self, arguments: dict[str, Any], threads: int | None) -> dict[str, np.ndarray]:
+        arrays = self._arrays(arguments)
+        if all(array.shape == core for array, core in zip(arrays.values(), self._cores.values(), strict=True)):
+            return self._single(arrays)
+        batch = self._batch(arrays)
+        count = math.prod(batch)
+        rows = [_rows(arrays[name], batch, size) for name, size in self.inputs.items()]
+        outputs = {name: np.empty((count, *size)) for name, size in self.outputs.items()}
+        kernel = self._kernel_if_worth(count)
+        if kernel is None:
+            self._map(count, rows, list(outputs.values()))
+        else:
+            _run(kernel, count, [*rows, *outputs.values()], threads)
+        return {name: value.reshape(batch + _core(self.outputs[name])) for name, value in outputs.items()}
+
+    def kernel(self) -> Kernel:
+        if self._kernel is None:
+            self._kernel = compile_kernel(translate(self._function), len(self.inputs), len(self.outputs))
+        return self._kernel
+
+    def _kernel_if_worth(self, count: int) -> Kernel | None:
+        self._rows_so_far += count
+        if self._kernel is None and not self._has_none and self._rows_so_far >= ROWS_WORTH_A_KERNEL:
+            try:
+                return self.kernel()
+            except InputError:
+                self._has_none = True
+        return self._kernel
+
+    def _arrays(self, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
+        """All inputs in their order, as arrays of shape (..., *core) with finite values."""
+        for name in arguments:
+            if name not in self.inputs:
+                raise InputError(f"{name}: is no input of {self.name}; accepted: {', '.join(self.inputs)}")
+        return {
+            name: _as_array(name, arguments[name], core) if name in arguments else np.full(core, self._defaults[name])
+            for name, core in self._cores.items()
+        }
+
+    def _batch(self, arrays: dict[str, np.ndarray]) -> tuple[int, ...]:
+        """The common leading dimensions."""
+        leading = {name: array.shape[: array.ndim - len(self._cores[name])] for name, array in arrays.items()}
+        try:
+            return np.broadcast_shapes(*leading.values())
+        except ValueError:
+            told = ", ".join(f"{name} {shape}" for name, shape in leading.items())
+            raise InputError(f"leading dimensions do not broadcast: {told}; accepted: equal ones, or 1") from None
+
+    def _single(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        buffers = self._buffers(1)
+        for array, place in zip(arrays.values(), buffers.inputs, strict=True):
+            place[0] = array.reshape(place.shape[1:])
+        buffers.evaluate()
+        return {
+            name: value[0, :, 0].copy() if value.shape[2] == 1 else value[0].copy()
+            for name, value in zip(self.outputs, buffers.outputs, strict=True)
+        }
+
+    def _map(self, count: int, rows: list[np.ndarray], outputs: list[np.ndarray]) -> None:
+        """Whole blocks through a map, the rest row by row."""
+        done = 0
+        while done < count:
+            step = ROWS_OF_MAP if count - done >= ROWS_OF_MAP else 1
+            buffers = self._buffers(step)
+            for array, place in zip(rows, buffers.inputs, strict=True):
+                place[:] = array[done : done + step]
+            buffers.evaluate()
+            for array, place in zip(outputs, buffers.outputs, strict=True):
+                array[done : done + step] = place
+            done += step
+
+    def _buffers(self, count: int) -> _Buffers:
+        """Those of the calling thread, for so many rows at once."""
+        name = f"of_{count}"
+        if not hasattr(self._own, name):
+            function = self._function if count == 1 else self._function.map(count)
+            inputs, outputs = list(self.inputs.values()), list(self.outputs.values())
+            setattr(self._own, name, _Buffers(function, count, inputs, outputs))
+        return getattr(self._own, name)
+
+
+class _Buffers:
+    """Arrays that CasADi reads and writes in place, `inputs` and `outputs`, (count, r, c) each."""
+
+    def __init__(self, function: ca.Function, count: int, sizes_in: list[Any], sizes_out: list[Any]):
+        self._name = function.name()
+        buffer: Any  # CasADi's type hints ask for a size beside a memoryview, CasADi itself refuses it
+        buffer, self._evaluate = function.buffer()
+        self._failed = buffer.ret
+        # One row of a map after the other, each column by column.
+        memory_in = [np.zeros((count, columns, rows)) for rows, columns in sizes_in]
+        memory_out = [np.zeros((count, columns, rows)) for rows, columns in sizes_out]
+        for i, memory in enumerate(memory_in):
+            buffer.set_arg(i, memory.data)
+        for i, memory in enumerate(memory_out):
+            buffer.set_res(i, memory.data)
+        self.inputs = [memory.transpose(0, 2, 1) for memory in memory_in]
+        self.outputs = [memory.transpose(0, 2, 1) for memory in memory_out]
+
+    def evaluate(self) -> None:
+        try:
+            self._evaluate()
+            failed = self._failed()
+        except RuntimeError:
+            failed = True
+        if failed:
+            raise SolverError(f"{self._name}: CasADi could not evaluate it")
+
+
+# An entry goes when the caller's handle of its Function goes, which it must not hold itself.
+_evaluators: WeakKeyDictionary[ca.Function, _Evaluator] = WeakKeyDictionary()
+
+
+def _evaluator(function: ca.Function) -> _Evaluator:
+    evaluator = _evaluators.get(function)
+    if evaluator is None:
+        evaluator = _evaluators[function] = _Evaluator(function)
+    return evaluator
+
+
+def _run(kernel: Kernel, count: int, arrays: list[np.ndarray], threads: int | None) -> None:
+    if threads is None:
+        threads = min(_processors(), count // ROWS_WORTH_A_THREAD)
+    threads = max(1, min(threads, count))
+    if threads == 1:
+        kernel(0, count, *arrays)
+        return
+    edges = [count * i // threads for i in range(threads + 1)]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda start, stop: kernel(start, stop, *arrays), edges[:-1], edges[1:]))
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _core(size: tuple[int, int]) -> tuple[int, ...]:
     return size[:1] if size[1] == 1 else size
 
 
-def _as_symbolic(value: Any) -> Any:
-    return value if is_symbolic(value) or isinstance(value, ca.DM) else ca.DM(np.asarray(value, dtype=float))
+def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, Any]:
+    """Arguments for a call with expressions: each of the shape that the input has, of one kind, numbers finite."""
+    kinds = {type(value).__name__ for value in arguments.values() if is_symbolic(value)}
+    if len(kinds) > 1:
+        raise InputError(f"{', '.join(arguments)}: SX and MX in one call; accepted: expressions of one kind")
+    found = {}
+    for name, value in arguments.items():
+        size = function.size_in(name)
+        if is_symbolic(value):
+            if value.shape != size:
+                raise InputError(f"{name}: is an expression of shape {value.shape}; accepted: {size}")
+            found[name] = value
+        else:
+            array = _as_array(
+                name, value.full().reshape(_core(size)) if isinstance(value, ca.DM) else value, _core(size)
+            )
+            if array.shape != _core(size):
+                raise InputError(f"{name}: has shape {array.shape} beside expressions; accepted: {_core(size)}")
+            found[name] = ca.DM(array)
+    return found
 
 
-def _as_array(function: ca.Function, name: str, value: Any) -> np.ndarray:
-    core = _core(function.size_in(name))
+def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -72,7 +270,8 @@ def _as_array(function: ca.Function, name: str, value: Any) -> np.ndarray:
         ) from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
         raise InputError(f"{name}: has shape {array.shape}; accepted: (..., {_told(core)})")
-    if not np.isfinite(array).all():
+    # The sum of squares is quick and finite, unless an element is not finite or near the largest float.
+    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name}: is {array[index]} at index {index}; accepted: finite numbers")
     return array
@@ -82,15 +281,10 @@ def _told(core: tuple[int, ...]) -> str:
     return ", ".join(str(size) for size in core)
 
 
-def _to_columns(array: np.ndarray, size: tuple[int, int], batch: tuple[int, ...]) -> np.ndarray:
-    """(..., r, c) to (r, N c): CasADi's map wants one call's argument beside the next."""
-    rows, columns = size
-    count = int(np.prod(batch))
-    return array.reshape(count, rows, columns).transpose(1, 0, 2).reshape(rows, count * columns)
-
-
-def _from_columns(value: ca.DM, size: tuple[int, int], batch: tuple[int, ...]) -> np.ndarray:
-    rows, columns = size
-    count = int(np.prod(batch))
-    stacked = value.full().reshape(rows, count, columns).transpose(1, 0, 2)
-    return np.ascontiguousarray(stacked).reshape(batch + _core(size))
+def _rows(array: np.ndarray, batch: tuple[int, ...], size: tuple[int, int]) -> np.ndarray:
+    """(..., *core) to (N, r, c), in place if it can be: one row for all of a batch is not repeated."""
+    count = math.prod(batch)
+    array = np.require(array, requirements="A")
+    if array.size == math.prod(size):
+        return np.broadcast_to(array.reshape(1, *size), (count, *size))
+    return np.broadcast_to(array, batch + _core(size)).reshape(count, *size)

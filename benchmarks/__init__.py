@@ -1,0 +1,1 @@
+"""Timings on this machine, each a module to run: `python -m towline.benchmarks.batch`."""

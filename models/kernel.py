@@ -1,0 +1,112 @@
+"""Kernels: loops in Python source, compiled by Numba once for this process and once for this machine.
+
+What Numba compiled is kept in the user's cache, so that the next process loads it in a fraction of the time: under
+`$TOWLINE_CACHE`, else `$XDG_CACHE_HOME/towline`, else `~/.cache/towline`, a folder for each kernel, named by a hash of
+everything that decides on the machine code. Where nothing can be written, kernels are compiled without it. Files are
+written whole or not at all, and a seal, the hash of them, tells what was damaged since: Numba would run it as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import platform
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..writing import whole_file
+
+Kernel = Callable[..., None]  # (start, stop, *inputs (N, r, c), *outputs (N, r, c)); it releases the GIL
+
+_LONG_AGO = 1_000_000_000  # [s]; Numba knows a source by its time and size, and two processes may write it at once
+
+_compiled: dict[str, Kernel] = {}
+_compiling = threading.Lock()
+
+
+def compile_kernel(source: str, n_in: int, n_out: int) -> Kernel:
+    """Compile `kernel(start, stop, *inputs, *outputs)`, or take it from memory or from the disk.
+
+    Parameters
+    ----------
+    source
+        From `tape.translate`.
+    n_in, n_out
+        How many inputs (N, r, c) of float64 in any layout, also read-only, and outputs in C order it has.
+    """
+    with _compiling:
+        if source not in _compiled:
+            _compiled[source] = _from_disk(source, n_in, n_out) or _compile(source, n_in, n_out)
+        return _compiled[source]
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept: `$TOWLINE_CACHE`, else `towline` in the user's cache folder."""
+    if place := os.environ.get("TOWLINE_CACHE"):
+        return Path(place)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "towline"
+
+
+def _compile(source: str, n_in: int, n_out: int, file: Path | None = None) -> Kernel:
+    """Compile, through Numba's cache beside `file` if one is given."""
+    import numba
+
+    # Numba imports the module that a function says it is from when it loads it.
+    space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np}
+    exec(compile(source, str(file or "<kernel>"), "exec"), space)
+    given = numba.types.Array(numba.float64, 3, "A", readonly=True)
+    result = numba.types.Array(numba.float64, 3, "C")
+    signature = numba.void(numba.intp, numba.intp, *[given] * n_in, *[result] * n_out)
+    return numba.njit(signature, nogil=True, error_model="numpy", cache=file is not None)(space["kernel"])
+
+
+def _from_disk(source: str, n_in: int, n_out: int) -> Kernel | None:
+    """Compile with the cache on the disk; None where there is none or it is broken beyond repair."""
+    try:
+        folder = cache_folder() / _key(source)
+        file, seal = folder / "kernel.py", folder / "seal"
+        if not _is_intact(folder, source):
+            for damaged in [seal, *_machine_code(folder)]:
+                damaged.unlink(missing_ok=True)
+            with whole_file(file) as place:
+                place.write_text(source)
+                os.utime(place, (_LONG_AGO, _LONG_AGO))
+        kernel = _compile(source, n_in, n_out, file)
+        if not seal.exists():
+            with whole_file(seal) as place:
+                place.write_text(_hash_of(folder))
+    except Exception:  # a full or read-only disk, a pickle of anything: the cache is only ever a help
+        return None
+    return kernel
+
+
+def _key(source: str) -> str:
+    """What decides on the machine code: the source, the compilers and the processor."""
+    import llvmlite.binding
+    import numba
+
+    parts = [source, __version__, numba.__version__, np.__version__, platform.python_version()]
+    parts += [llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+def _is_intact(folder: Path, source: str) -> bool:
+    file, seal = folder / "kernel.py", folder / "seal"
+    if not file.exists() or file.read_bytes() != source.encode():
+        return False
+    # Without a seal another process is about to write it, or was killed before: what is there is whole.
+    return not seal.exists() or seal.read_bytes() == _hash_of(folder).encode()
+
+
+def _machine_code(folder: Path) -> list[Path]:
+    return sorted([*folder.glob("__pycache__/*.nbi"), *folder.glob("__pycache__/*.nbc")])
+
+
+def _hash_of(folder: Path) -> str:
+    return hashlib.sha256(b"".join(file.read_bytes() for file in _machine_code(folder))).hexdigest()

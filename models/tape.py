@@ -1,0 +1,146 @@
+"""A CasADi Function's instruction tape as the Python source of a loop that Numba can compile.
+
+An SX Function is a straight list of scalar instructions on a work vector: load an input's element, compute, store an
+output's element. The source has one local variable for each distinct value on the tape (two instructions that do the
+same with the same values share it, which changes no bit) and does the operations in the tape's order, so that it
+rounds where CasADi does.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from ..errors import InputError
+
+LONGEST = 15_000  # instructions; compiling takes about 1 ms for each, and more beyond
+
+_OPERATIONS = {
+    "ADD": "{0} + {1}",
+    "SUB": "{0} - {1}",
+    "MUL": "{0} * {1}",
+    "DIV": "{0} / {1}",
+    "NEG": "-{0}",
+    "INV": "1.0 / {0}",
+    "SQ": "{0} * {0}",
+    "TWICE": "2.0 * {0}",
+    "SQRT": "math.sqrt({0})",
+    "POW": "math.pow({0}, {1})",
+    "CONSTPOW": "math.pow({0}, {1})",
+    "HYPOT": "math.hypot({0}, {1})",
+    "EXP": "math.exp({0})",
+    "EXPM1": "math.expm1({0})",
+    "LOG": "math.log({0})",
+    "LOG1P": "math.log1p({0})",
+    "SIN": "math.sin({0})",
+    "COS": "math.cos({0})",
+    "TAN": "math.tan({0})",
+    "ASIN": "math.asin({0})",
+    "ACOS": "math.acos({0})",
+    "ATAN": "math.atan({0})",
+    "ATAN2": "math.atan2({0}, {1})",
+    "SINH": "math.sinh({0})",
+    "COSH": "math.cosh({0})",
+    "TANH": "math.tanh({0})",
+    "ASINH": "math.asinh({0})",
+    "ACOSH": "math.acosh({0})",
+    "ATANH": "math.atanh({0})",
+    "ERF": "math.erf({0})",
+    "FABS": "math.fabs({0})",
+    "SIGN": "(-1.0 if {0} < 0.0 else (1.0 if {0} > 0.0 else {0}))",
+    "COPYSIGN": "math.copysign({0}, {1})",
+    "FMOD": "np.fmod({0}, {1})",
+    "FLOOR": "np.floor({0})",
+    "CEIL": "np.ceil({0})",
+    "FMIN": "np.fmin({0}, {1})",
+    "FMAX": "np.fmax({0}, {1})",
+    "LT": "(1.0 if {0} < {1} else 0.0)",
+    "LE": "(1.0 if {0} <= {1} else 0.0)",
+    "EQ": "(1.0 if {0} == {1} else 0.0)",
+    "NE": "(1.0 if {0} != {1} else 0.0)",
+    "NOT": "(1.0 if {0} == 0.0 else 0.0)",
+    "AND": "(1.0 if {0} != 0.0 and {1} != 0.0 else 0.0)",
+    "OR": "(1.0 if {0} != 0.0 or {1} != 0.0 else 0.0)",
+    "IF_ELSE_ZERO": "({1} if {0} != 0.0 else 0.0)",
+}
+_NAMES = {getattr(ca, name): name.removeprefix("OP_") for name in dir(ca) if name.startswith("OP_")}
+
+
+def dense(function: ca.Function) -> ca.Function:
+    """The same Function, of the same names, whose inputs and outputs have an element wherever they have a place."""
+    sparsities = [function.sparsity_in(i) for i in range(function.n_in())]
+    sparsities += [function.sparsity_out(i) for i in range(function.n_out())]
+    if all(sparsity.is_dense() for sparsity in sparsities):
+        return function
+    kind: Any = ca.SX if function.is_a("SXFunction") else ca.MX
+    inputs = [kind.sym(name, *function.size_in(name)) for name in function.name_in()]
+    outputs = [ca.densify(value) for value in function.call(inputs)]
+    return ca.Function(function.name(), inputs, outputs, function.name_in(), function.name_out())
+
+
+def translate(function: ca.Function) -> str:
+    """Python source of `kernel(start, stop, x0, x1, ..., y0, y1, ...)`: the rows start to stop of a batch.
+
+    Parameters
+    ----------
+    function
+        With dense inputs and outputs, see `dense`. An MX Function is expanded first.
+
+    Returns
+    -------
+    str
+        xi and yi are inputs and outputs, (N, rows, columns) each. It needs `math` and `np` as globals.
+
+    Raises
+    ------
+    InputError
+        If an MX Function cannot be expanded, the tape has an operation that is not known here, or is too long.
+    """
+    tape = _scalar(function)
+    if tape.n_instructions() > LONGEST:
+        raise InputError(
+            f"{function.name()}: has {tape.n_instructions()} instructions; accepted: at most {LONGEST} for a kernel"
+        )
+    work: dict[int, str] = {}  # what each slot of the work vector holds now
+    variables: dict[str, str] = {}  # of each expression on the tape
+    stores: dict[tuple[int, int, int], str] = {}
+    for k in range(tape.n_instructions()):
+        operation = _NAMES[tape.instruction_id(k)]
+        inputs, outputs = tape.instruction_input(k), tape.instruction_output(k)
+        if operation == "OUTPUT":
+            column, row = divmod(outputs[1], tape.size1_out(outputs[0]))
+            stores[outputs[0], row, column] = work[inputs[0]]
+            continue
+        if operation == "INPUT":
+            column, row = divmod(inputs[1], tape.size1_in(inputs[0]))
+            expression = f"x{inputs[0]}[k, {row}, {column}]"
+        elif operation == "CONST":
+            expression = _literal(tape.instruction_constant(k))
+        elif operation in _OPERATIONS:
+            expression = _OPERATIONS[operation].format(*(work[i] for i in inputs))
+        else:
+            raise InputError(
+                f"{function.name()}: has the operation {operation}; accepted in a kernel: {', '.join(_OPERATIONS)}"
+            )
+        work[outputs[0]] = variables.setdefault(expression, f"v{len(variables)}")
+    arguments = [f"x{i}" for i in range(tape.n_in())] + [f"y{i}" for i in range(tape.n_out())]
+    lines = [f"def kernel(start, stop, {', '.join(arguments)}):", "    for k in range(start, stop):"]
+    lines += [f"        {variable} = {expression}" for expression, variable in variables.items()]
+    # Row by row, as they lie in memory; the tape stores column by column.
+    lines += [f"        y{i}[k, {row}, {column}] = {value}" for (i, row, column), value in sorted(stores.items())]
+    return "\n".join([*lines, "        pass", ""])  # for a Function without outputs
+
+
+def _scalar(function: ca.Function) -> ca.Function:
+    if function.is_a("SXFunction"):
+        return function
+    try:
+        return function.expand()
+    except RuntimeError:
+        raise InputError(f"{function.name()}: cannot be expanded; accepted for a kernel: SX operations") from None
+
+
+def _literal(value: float) -> str:
+    text = repr(value)
+    return {"inf": "math.inf", "-inf": "-math.inf", "nan": "math.nan"}.get(text, text)
