@@ -1,0 +1,213 @@
+"""Paper F's procedure for the driving forces of the cables, over a motion with a small vibration on it.
+
+    T(t) = A^-1 (M ddX + F + D_B - W_e - A dT)       dT = dT_C + dT_K
+
+T is the steady traction that the motors give, dT what the vibration adds at the end of the cable; the platform feels
+F = T + dT. The cable's part is in `element_chain`, the platform's in `Dynamics.relative`.
+
+Source: paper F, section V, steps 1 to 8, where step 7 prints T' for dT; Eqs. 8 to 23 and 38.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from ...errors import InputError
+from ..batch import call
+from ..dynamics import Dynamics
+from ..robot import Robot
+from ..rotation import rotation
+from . import checks, element_chain
+
+SINGULAR = 1e-9  # of the largest singular value of A: what is below counts as zero
+
+
+@dataclass(frozen=True)
+class DrivingForce:
+    """What `driving_force` found, at N instants for m cables.
+
+    Attributes
+    ----------
+    time
+        (N,) [s].
+    lengths
+        Distances from anchor to attachment without vibration [m], (N, m).
+    T
+        Steady traction: what the motors give [N], (N, m). Nothing keeps it within limits or above zero.
+    dT_C, dT_K
+        Increments by damping and by elasticity [N], (N, m).
+    residual
+        Norm of A (T + dT) - w, moments over `Robot.length` [N], (N,): above rounding only where the cables cannot
+        give the wrench w in any way, because A is singular or there are fewer than six.
+    rank
+        Of A, (N,).
+    """
+
+    time: np.ndarray
+    lengths: np.ndarray
+    T: np.ndarray
+    dT_C: np.ndarray  # noqa: N815
+    dT_K: np.ndarray  # noqa: N815
+    residual: np.ndarray
+    rank: np.ndarray
+
+    @property
+    def dT(self) -> np.ndarray:
+        """Increment by the vibration [N], (N, m)."""
+        return self.dT_C + self.dT_K
+
+    @property
+    def total(self) -> np.ndarray:
+        """F = T + dT: what the platform feels [N], (N, m)."""
+        return self.T + self.dT
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """DT / T [-], (N, m): the paper's delta_SV. Large where T passes zero, nan or infinite where it is zero."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.dT / self.T
+
+
+def driving_force(
+    robot: Robot,
+    pose: Any,
+    velocity: Any,
+    acceleration: Any,
+    vibration: Any,
+    time_step: float,
+    elements: int = 8,
+    *,
+    carrier_pose: Any = None,
+    carrier_velocity: Any = None,
+    carrier_acceleration: Any = None,
+    wind: Any = None,
+    pretension: Any = 0.0,
+    winding: Literal["paid out", "printed"] = "paid out",
+) -> DrivingForce:
+    """Steady traction and vibration increments of each cable at each instant, in one pass over arrays.
+
+    With more than six cables T is the least-norm solution. Where A is singular, or the cables are fewer than the
+    coordinates, T solves the equations in the least-squares sense (moments over `Robot.length`), least norm again, and
+    `residual` says what is missing; nothing is raised.
+
+    Parameters
+    ----------
+    robot
+        With one carrier, point anchors, and stiffness and damping for every cable.
+    pose, velocity, acceleration
+        Of the platform frame relative to {A}, as seen in {A}, (N, 6).
+    vibration
+        (dx_B, dTheta): small displacement of the platform frame's origin [m] and small turn [rad], in {G}, (N, 6).
+        Each row is what one time step adds to the steady pose, as the paper has it: dT_C divides it by `time_step`.
+    time_step
+        Dt [s].
+    elements
+        N of the paper: elements of each cable.
+    carrier_pose, carrier_velocity, carrier_acceleration
+        Of {A} in {G}, (N, 6); None: at home and at rest.
+    wind
+        Velocity of the air in {G} [m/s], (N, 3) or (3,); None: no air at all.
+    pretension
+        What each cable carries when the slack switch looks at its elements [N], broadcast to (N, m). 0 is the paper's
+        rule, by which dT_K is never negative; `inf` keeps every cable taut.
+    winding
+        "paid out": the winch pays out what the steady motion takes, so that this adds nothing to dT_K. "printed": the
+        paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every step (the
+        last one repeats); at any usual speed this alone is far more than T.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value, or the robot has several carriers, a pulley, or a cable without
+        stiffness or damping.
+    """
+    stiffness, damping = _cable_constants(robot)
+    time_step = checks.positive("time_step", time_step)
+    elements = checks.count("elements", elements, 1)
+    pose = checks.array("pose", pose, (None, 6))
+    if pose.ndim != 2:
+        raise InputError(f"pose: has shape {pose.shape}; accepted: (N, 6), one row per instant")
+    instants = len(pose)
+    vibration = _series("vibration", vibration, instants)
+    base = robot.carrier_home[0] if carrier_pose is None else carrier_pose
+    base = _series("carrier_pose", base, instants)
+    if winding not in ("paid out", "printed"):
+        raise InputError(f"winding: is {winding!r}; accepted: 'paid out', 'printed'")
+    pretension = _pretension(pretension, (instants, robot.m))
+
+    dynamics = Dynamics(robot).relative
+    w = dynamics.required_wrench(pose, velocity, acceleration, base, carrier_velocity, carrier_acceleration, wind)
+    if w.shape != (instants, 6):
+        raise InputError(f"the arguments broadcast to {w.shape[:-1]} instants; accepted: {instants}, as pose has")
+    A = dynamics.wrench_matrix(pose)
+
+    arms = robot.attachments @ _rotations(pose[:, 3:]).transpose(0, 2, 1)  # R b, (N, m, 3), in {A}
+    vectors = robot.anchors - (pose[:, None, :3] + arms)  # A - B, (N, m, 3), in {A}
+    lengths = np.linalg.norm(vectors, axis=-1)
+    to_A = _rotations(base[:, 3:]).transpose(0, 2, 1)
+    in_A = np.concatenate([np.einsum("nij,nj->ni", to_A, part) for part in np.split(vibration, 2, axis=1)], axis=1)
+    displacements = element_chain.attachment_displacements(arms, in_A)
+    dT_C = element_chain.damping_increment(vectors, damping, displacements, time_step)
+    share = _unwound(lengths) / elements if winding == "printed" else 0.0
+    dT_K = element_chain.elastic_increment(vectors, stiffness, displacements, elements, share, pretension)
+
+    T, residual, rank = _traction(robot, A, w, dT_C + dT_K)
+    return DrivingForce(np.arange(instants) * time_step, lengths, T, dT_C, dT_K, residual, rank)
+
+
+def _cable_constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    for index, cable in enumerate(robot.cables):
+        if cable.pulley is not None:
+            raise InputError(f"cables[{index}].pulley: is there; accepted: point anchors, as the procedure has them")
+        if cable.stiffness is None:
+            raise InputError(f"cables[{index}].stiffness: is missing, dT_K needs it; accepted: E A > 0 [N]")
+        if cable.damping is None:
+            raise InputError(f"cables[{index}].damping: is missing, dT_C needs it; accepted: C >= 0 [N s/m]")
+    return (
+        np.array([cable.stiffness for cable in robot.cables]),
+        np.array([cable.damping for cable in robot.cables]),
+    )
+
+
+def _series(name: str, value: Any, instants: int) -> np.ndarray:
+    array = checks.array(name, value, (6,))
+    if array.shape not in ((6,), (1, 6), (instants, 6)):
+        raise InputError(f"{name}: has shape {array.shape}; accepted: ({instants}, 6), as pose has, or (6,)")
+    return np.broadcast_to(array, (instants, 6))
+
+
+def _pretension(value: Any, shape: tuple[int, int]) -> np.ndarray:
+    try:
+        array = np.broadcast_to(np.asarray(value, dtype=float), shape)
+    except (TypeError, ValueError):
+        raise InputError(f"pretension: {value!r} does not broadcast to {shape}; accepted: [N], one or each") from None
+    if not (array >= 0).all():
+        raise InputError(f"pretension: has {array.min():g} in it; accepted: numbers >= 0")
+    return array
+
+
+def _rotations(angles: np.ndarray) -> np.ndarray:
+    """R of each row of (N, 3), (N, 3, 3)."""
+    symbols = ca.SX.sym("angles", 3)
+    return call(ca.Function("rotation", [symbols], [rotation(symbols)], ["angles"], ["R"]), {"angles": angles})["R"]
+
+
+def _unwound(lengths: np.ndarray) -> np.ndarray:
+    steps = np.diff(lengths, axis=0)
+    return np.concatenate([steps, steps[-1:]]) if len(steps) else np.zeros_like(lengths)
+
+
+def _traction(robot: Robot, A: np.ndarray, w: np.ndarray, dT: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """T, (N, m), with |A (T + dT) - w|, (N,), and the rank of A, (N,), on the rows that can move."""
+    scale = robot.dof_mask / np.array([1, 1, 1, robot.length, robot.length, robot.length])
+    A, w = A * scale[:, None], w * scale
+    left = w - np.einsum("nij,nj->ni", A, dT)
+    T = np.einsum("nij,nj->ni", np.linalg.pinv(A, rcond=SINGULAR), left)
+    residual = np.linalg.norm(np.einsum("nij,nj->ni", A, T) - left, axis=1)
+    singular = np.linalg.svd(A, compute_uv=False)
+    rank = (singular > SINGULAR * singular[:, :1]).sum(axis=1)
+    return T, residual, rank

@@ -1,0 +1,43 @@
+"""A cable as a spring and a damper beside it: its tension, its stiffness, and how long it must be unstrained.
+
+    T = E A (l - L0) / L0 + C dl/dt   while l > L0 and T > 0, otherwise nothing: a cable never pushes
+    L0 = l / (1 + T / (E A))          the unstrained length that gives the tension T at rest
+    k = E A / L0
+
+All of it is element by element, for NumPy arrays that broadcast and for CasADi expressions. Source: paper F, Eqs. 6
+and 11; physics.md, section 3.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+Value = Any  # float, np.ndarray or a CasADi expression, in and out
+
+
+def tension(length: Value, rate: Value, unstrained: Value, stiffness: Value, damping: Value = 0.0) -> Value:
+    """T [N]: zero when slack, also where the damper outweighs the spring of a cable that is getting shorter.
+
+    Parameters
+    ----------
+    length, rate
+        l [m] and dl/dt [m/s].
+    unstrained
+        L0 [m], above zero.
+    stiffness
+        E A [N].
+    damping
+        C of the whole cable [N s/m].
+    """
+    pull = stiffness * (length - unstrained) / unstrained + damping * rate
+    return (pull + abs(pull)) / 2 * (length > unstrained)
+
+
+def unstrained_length(length: Value, tension: Value, stiffness: Value) -> Value:
+    """L0 [m] of the cable that, l = `length` [m] long and at rest, has T = `tension` [N]; E A = `stiffness` [N]."""
+    return length / (1 + tension / stiffness)
+
+
+def axial_stiffness(stiffness: Value, unstrained: Value) -> Value:
+    """K = E A / L0 [N/m]: how much the tension of a taut cable grows with its length."""
+    return stiffness / unstrained

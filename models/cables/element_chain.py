@@ -1,0 +1,224 @@
+r"""A cable cut into axial elements: the tension increment at its end when the platform vibrates a little.
+
+The cable runs from its anchor (node 0, held by the pulley) straight to its attachment (node n, moves with the
+platform), in n elements of length e = l / n, direction c = (B - A) / l. Node j is displaced by dx_j, each element is
+lengthened by de more (by winding), so that element j, between the nodes j - 1 and j, carries the increment
+
+    dtau_j = E A / e (c . dx_j - c . dx_{j-1} + de)
+
+and the nodes the increments  K_n dX + K_l dE, where
+
+    K_n = sum_j  sgn(j) E A / e [ c c^T  -c c^T ; -c c^T  c c^T ]      K_l = sum_j  sgn(j) E A / e [ -c ; c ]
+
+The cable has no mass, so its interior nodes rest where the forces on them vanish: every element carries the same, and
+with equal elements dx_j = (j / n) dx_n. The chain then equals E A / l times the elongation, for every n.
+
+The slack switch: sgn(j) = 1 while the element, with the tension it had before, still pulls. An element that would have
+to push carries nothing, so that its increment is minus what it had. With no tension before, that is the paper's rule.
+
+The damping increment is C times what the vibration adds to the length, over one time step:
+
+    dT_C = C (l(B + dB) - l(B)) / dt      dB = dx_B + [dTheta]x R b
+
+Source: paper F, section III, Eqs. 8 to 23, corrected: k_l has E A / e (Eq. 15 prints E A / de); sgn looks at the
+elongation of an element (Eq. 16 looks at the signs of its nodes' displacements, by which element 1, whose node 0 is
+held, never pulls); increments have a sign (Eq. 22 takes the norm).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import checks
+
+if TYPE_CHECKING:  # scipy.sparse takes a tenth of a second to import
+    from scipy.sparse import csr_array
+
+
+@dataclass(frozen=True)
+class ElementChain:
+    """One cable as n axial elements, straight from its anchor to its attachment, in {G} or any other frame.
+
+    Parameters
+    ----------
+    anchor, attachment
+        A and B, (3,) [m].
+    stiffness
+        E A [N].
+    elements
+        n.
+    pretension
+        What every element carries before the increments [N]; `inf`: the cable cannot become slack.
+
+    Raises
+    ------
+    InputError
+        If a number is not of its kind, or the cable has no length.
+    """
+
+    anchor: Any
+    attachment: Any
+    stiffness: float
+    elements: int
+    pretension: float = 0.0
+
+    def __post_init__(self):
+        for name in ("anchor", "attachment"):
+            object.__setattr__(self, name, checks.array(name, getattr(self, name), (3,)).reshape(3))
+        checks.positive("stiffness", self.stiffness)
+        checks.count("elements", self.elements, 1)
+        if self.pretension != np.inf:
+            checks.non_negative("pretension", self.pretension)
+        checks.positive("the distance of anchor and attachment", self.length)
+
+    @property
+    def length(self) -> float:
+        """L [m]."""
+        return float(np.linalg.norm(self.attachment - self.anchor))
+
+    @property
+    def direction(self) -> np.ndarray:
+        """C, (3,): from the anchor to the attachment, opposite to u."""
+        return (self.attachment - self.anchor) / self.length
+
+    def displacements(self, end: Any) -> np.ndarray:
+        """Displacement of each node [m], (n + 1, 3), in equilibrium, when node n is moved by `end` (3,) [m]."""
+        return np.arange(self.elements + 1)[:, None] / self.elements * checks.array("end", end, (3,))
+
+    def elongations(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
+        """C . (dx_j - dx_{j-1}) + de of each element [m], (n,), for node displacements (n + 1, 3) [m]."""
+        nodes = checks.array("displacements", displacements, (self.elements + 1, 3))
+        return np.diff(nodes @ self.direction) + winding
+
+    def taut(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
+        """sgn(j), (n,): 1.0 for the elements that pull, 0.0 for those that are slack."""
+        carried = self.pretension + self._element_stiffness * self.elongations(displacements, winding)
+        return (carried > 0).astype(float)
+
+    def K_n(self, taut: Any = None) -> csr_array:
+        """Stiffness to node displacements [N/m], sparse, 3(n + 1) square, node by node; `taut` (n,): none slack."""
+        from scipy.sparse import csr_array, diags_array, kron
+
+        switch = self._element_stiffness * self._switch(taut)
+        steps = self._steps()
+        axial = steps.T @ diags_array(switch) @ steps
+        return csr_array(kron(axial, np.outer(self.direction, self.direction)))
+
+    def K_l(self, taut: Any = None) -> csr_array:
+        """Stiffness to the elements' own lengthening de [N/m], sparse, (3(n + 1), n); `taut` as in `K_n`."""
+        from scipy.sparse import csr_array, diags_array, kron
+
+        switch = self._element_stiffness * self._switch(taut)
+        return csr_array(kron(self._steps().T @ diags_array(switch), self.direction[:, None]))
+
+    def node_forces(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
+        """Increments of what has to hold each node [N], (n + 1, 3): K_n dX + K_l dE, slack elements carrying nothing.
+
+        Parameters
+        ----------
+        displacements
+            Of the nodes [m], (n + 1, 3).
+        winding
+            De [m]: by how much each element is lengthened beside that, its share of what the winch did not pay out.
+        """
+        from scipy.sparse import kron
+
+        nodes = checks.array("displacements", displacements, (self.elements + 1, 3))
+        taut = self.taut(nodes, winding)
+        forces = self.K_n(taut) @ nodes.ravel() + self.K_l(taut) @ np.full(self.elements, winding)
+        if self.pretension > 0 and not taut.all():
+            lost = self.pretension * (1 - taut)
+            forces -= kron(self._steps().T, self.direction[:, None]) @ lost
+        return forces.reshape(-1, 3)
+
+    def end_increment(self, end: Any, winding: float = 0.0) -> float:
+        """dT_K [N]: the increment at the attachment when it is moved by `end` (3,) [m]; positive pulls more."""
+        return float(self.node_forces(self.displacements(end), winding)[-1] @ self.direction)
+
+    @property
+    def _element_stiffness(self) -> float:
+        return self.stiffness * self.elements / self.length
+
+    def _switch(self, taut: Any) -> np.ndarray:
+        return np.ones(self.elements) if taut is None else checks.array("taut", taut, (self.elements,))
+
+    def _steps(self) -> csr_array:
+        """(n, n + 1): from values at the nodes to their differences over the elements."""
+        from scipy.sparse import csr_array, eye_array
+
+        n = self.elements
+        return csr_array(eye_array(n, n + 1, k=1) - eye_array(n, n + 1))
+
+
+def elastic_increment(
+    vectors: np.ndarray,
+    stiffness: np.ndarray,
+    displacements: np.ndarray,
+    elements: int,
+    winding: np.ndarray | float = 0.0,
+    pretension: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """dT_K of many cables [N], (...): `ElementChain.end_increment` without the matrices.
+
+    The attachment is node n, which the last element alone holds, and that one shares the elongation equally.
+
+    Parameters
+    ----------
+    vectors
+        A - B of each cable [m], (..., 3).
+    stiffness
+        E A of each [N], (...).
+    displacements
+        Of the attachments [m], (..., 3).
+    elements
+        n.
+    winding
+        De of each element [m], (...).
+    pretension
+        What each cable carries before [N], (...); `inf`: it cannot become slack.
+    """
+    lengths = np.linalg.norm(vectors, axis=-1)
+    end = -np.einsum("...i,...i->...", vectors, displacements) / lengths
+    before_end = end * ((elements - 1) / elements)
+    increment = stiffness * elements / lengths * (end - before_end + winding)
+    return np.maximum(increment, -np.asarray(pretension))
+
+
+def damping_increment(
+    vectors: np.ndarray, damping: np.ndarray, displacements: np.ndarray, time_step: float
+) -> np.ndarray:
+    """dT_C = C (l(B + dB) - l(B)) / dt of many cables [N], (...).
+
+    Parameters
+    ----------
+    vectors
+        A - B of each cable [m], (..., 3).
+    damping
+        C of each [N s/m], (...).
+    displacements
+        dB of the attachments [m], (..., 3).
+    time_step
+        Dt [s].
+    """
+    before = np.linalg.norm(vectors, axis=-1)
+    after = np.linalg.norm(vectors - displacements, axis=-1)
+    # after - before, without the cancellation of two nearly equal lengths
+    change = np.einsum("...i,...i->...", displacements - 2 * vectors, displacements) / (after + before)
+    return damping * change / time_step
+
+
+def attachment_displacements(arms: np.ndarray, vibration: np.ndarray) -> np.ndarray:
+    """DB = dx_B + [dTheta]x R b [m], (..., m, 3), for a small change of pose.
+
+    Parameters
+    ----------
+    arms
+        R b of each cable [m], (..., m, 3), in the frame of `vibration`.
+    vibration
+        (dx_B, dTheta): displacement of the platform's origin [m] and small turn [rad], (..., 6).
+    """
+    shift, turn = vibration[..., None, :3], vibration[..., None, 3:]
+    return shift + np.cross(turn, arms)

@@ -1,0 +1,167 @@
+r"""A cable as point masses joined by springs with dampers: it sags, sways and rings, and its ends may move.
+
+L0 is cut into n segments of unstrained length e = L0 / n; between them sit n - 1 masses of rho e each. A segment with
+the nodes p_j, p_{j+1} at its ends is l_j = |p_{j+1} - p_j| long and pulls them together with
+
+    T_j = E A (l_j - e) / e + n C dl_j/dt      while l_j > e and T_j > 0, otherwise nothing
+
+(n dampers of n C in a row are one of C). The masses move by
+
+    rho e ddp_j = T_j u_j - T_{j-1} u_{j-1} + rho e g        u_j = (p_{j+1} - p_j) / l_j
+
+The two halves of a segment's mass that are left, rho e / 2 at each end (`end_mass`), ride with what holds the ends:
+their weight and inertia are in neither the forces nor the energy here. So the power that the ends put in is exactly
+what the energy gains and the dampers lose, at every state; with resting ends the energy never grows.
+
+Source: point-mass cables as in any textbook of multibody dynamics; elasticity and damping as in `elastic`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from . import checks, elastic
+
+
+@dataclass(frozen=True)
+class LumpedChain:
+    """A cable of point masses. Its state is (positions, velocities) of the inner nodes from start to end, in {G}.
+
+    Parameters
+    ----------
+    length
+        Unstrained length L0 [m].
+    stiffness
+        E A [N].
+    density
+        Mass per unstrained length rho [kg/m].
+    damping
+        C of the whole cable [N s/m].
+    segments
+        N, at least 2.
+    gravity
+        In {G} [m/s^2], (3,).
+
+    Raises
+    ------
+    InputError
+        If a number is not of its kind.
+    """
+
+    length: float
+    stiffness: float
+    density: float
+    damping: float = 0.0
+    segments: int = 10
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+
+    def __post_init__(self):
+        for name in ("length", "stiffness", "density"):
+            checks.positive(name, getattr(self, name))
+        checks.non_negative("damping", self.damping)
+        checks.count("segments", self.segments, 2)
+        checks.array("gravity", self.gravity, (3,))
+
+    @property
+    def segment_length(self) -> float:
+        """E, unstrained [m]."""
+        return self.length / self.segments
+
+    @property
+    def node_mass(self) -> float:
+        """Mass of an inner node [kg]."""
+        return self.density * self.segment_length
+
+    @property
+    def end_mass(self) -> float:
+        """Mass at each end that belongs to what holds it [kg]."""
+        return self.node_mass / 2
+
+    @property
+    def state_size(self) -> int:
+        """Length of the state: 6 (n - 1)."""
+        return 6 * (self.segments - 1)
+
+    def straight(self, start: Any, end: Any) -> np.ndarray:
+        """State at rest with the nodes evenly on the line between the ends [m, m/s], (6 (n - 1),)."""
+        start, end = checks.array("start", start, (3,)), checks.array("end", end, (3,))
+        share = np.arange(1, self.segments)[:, None] / self.segments
+        positions = start + share * (end - start)
+        return np.concatenate([positions.ravel(), np.zeros(positions.size)])
+
+    @cached_property
+    def dynamics(self) -> ca.Function:
+        """The equation of motion as a CasADi Function.
+
+        Inputs: `state` (6 (n - 1),); `start`, `start_velocity`, `end`, `end_velocity` (3,) each, in {G} [m, m/s].
+        Outputs: `dstate`, its time derivative; `start_force`, `end_force` (3,): what the cable pulls at its ends
+        [N], in {G}; `tensions` (n,) [N].
+        """
+        inputs = self._symbols()
+        _, velocities, tensions, directions = self._segments(inputs)
+        pulls = directions * ca.repmat(tensions.T, 3, 1)  # (3, n), each on its segment's first node
+        weight = ca.repmat(ca.DM(self.gravity), 1, self.segments - 1)
+        acceleration = (pulls[:, 1:] - pulls[:, :-1]) / self.node_mass + weight
+        dstate = ca.vertcat(ca.vec(velocities[:, 1:-1]), ca.vec(acceleration))
+        outputs = {
+            "dstate": dstate,
+            "start_force": pulls[:, 0],
+            "end_force": -pulls[:, -1],
+            "tensions": tensions,
+        }
+        return ca.Function("lumped_chain", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+
+    @cached_property
+    def energy(self) -> ca.Function:
+        """Kinetic, elastic and potential energy [J] as a CasADi Function, inputs as those of `dynamics`.
+
+        Outputs: `kinetic`, `elastic`, `potential` (zero at the origin of {G}), `total`, and `dissipation` [W], what the
+        dampers take, never negative. A damper that has slackened its segment by outweighing its spring takes all that
+        the spring gives.
+        """
+        inputs = self._symbols()
+        positions, velocities, tensions, directions = self._segments(inputs)
+        stretch, rates = self._stretch(positions, velocities, directions)
+        kinetic = self.node_mass / 2 * ca.sumsqr(velocities[:, 1:-1])
+        spring = self.stiffness / self.segment_length * ca.fmax(stretch, 0)
+        elastic_energy = ca.dot(spring, ca.fmax(stretch, 0)) / 2
+        potential = -self.node_mass * ca.dot(ca.DM(self.gravity), ca.sum2(positions[:, 1:-1]))
+        outputs = {
+            "kinetic": kinetic,
+            "elastic": elastic_energy,
+            "potential": potential,
+            "total": kinetic + elastic_energy + potential,
+            "dissipation": ca.dot(tensions - spring, rates),
+        }
+        return ca.Function("lumped_chain_energy", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+
+    def _symbols(self) -> dict[str, ca.SX]:
+        ends = ("start", "start_velocity", "end", "end_velocity")
+        return {"state": ca.SX.sym("state", self.state_size)} | {name: ca.SX.sym(name, 3) for name in ends}
+
+    def _segments(self, inputs: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """Positions and velocities of all nodes, (3, n + 1), tensions, (n, 1), and u_j, (3, n)."""
+        half = self.state_size // 2
+        inner = ca.reshape(inputs["state"][:half], 3, -1)
+        inner_velocity = ca.reshape(inputs["state"][half:], 3, -1)
+        positions = ca.horzcat(inputs["start"], inner, inputs["end"])
+        velocities = ca.horzcat(inputs["start_velocity"], inner_velocity, inputs["end_velocity"])
+        vectors = positions[:, 1:] - positions[:, :-1]
+        # A segment whose nodes coincide has no direction, but it is slack: any finite one will do.
+        lengths = ca.fmax(ca.sqrt(ca.sum1(vectors**2)), 1e-12 * self.segment_length)
+        directions = vectors / ca.repmat(lengths, 3, 1)
+        stretch, rates = self._stretch(positions, velocities, directions)
+        length = stretch + self.segment_length
+        tensions = elastic.tension(length, rates, self.segment_length, self.stiffness, self.segments * self.damping)
+        return positions, velocities, tensions, directions
+
+    def _stretch(self, positions: ca.SX, velocities: ca.SX, directions: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Elongation l_j - e [m] and dl_j/dt [m/s] of each segment, (n, 1) each."""
+        along = ca.sum1(directions * (positions[:, 1:] - positions[:, :-1])).T
+        rates = ca.sum1(directions * (velocities[:, 1:] - velocities[:, :-1])).T
+        return along - self.segment_length, rates

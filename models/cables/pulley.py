@@ -1,0 +1,156 @@
+r"""A swivelling pulley: where the cable leaves it, in which direction it pulls, how long it is, and how these change.
+
+The cable comes up the swivel axis k, touches the sheave at the anchor A and runs on along +k over the sheave. The
+sheave, of radius r, turns about the axis so that its plane holds the attachment B. With e the unit vector across the
+axis towards B, the sheave's centre is M = A + r e. Wrapped by the angle theta from A, the cable is at
+
+    C = M + r (-cos(theta) e + sin(theta) k)     and runs along     t = sin(theta) e + cos(theta) k
+
+and leaves where that points at B: B = C + s t, s >= 0. So theta is 0 for a B straight along +k, 90 degrees for one far
+out level with M, 180 degrees straight below the sheave's far rim (with k up), and more for a B between there and the
+axis. With d = B - M and D = |d|,
+
+    s = sqrt(D^2 - r^2)      theta = pi - atan2(s, r) - atan2(d . k, d . e)      l = r theta + s      u = -t
+
+From A to B the cable is l long, and dl/dB = t = -u: what the wrap gains or loses, the straight part makes up for. With
+r = 0 it is a point anchor.
+
+Domain: B off the swivel axis and outside the sheave, D > r. Turned about the axis, the sheave sweeps a torus that
+touches the axis at A; inside it no cable is tangent, and everything is nan. On the axis the sheave does not know where
+to turn: point and direction are nan there, and close to it, below A, they jump when B passes to the other side.
+
+Source: the usual model of a swivel pulley, as in A. Pott, Cable-Driven Parallel Robots, Springer, 2018, derived anew;
+the second order by algorithmic differentiation.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...errors import InputError
+from ..rotation import Matrix
+from . import checks
+
+
+class Exit(NamedTuple):
+    """How m cables leave their pulleys, in the frame that the pulleys and the attachments were given in.
+
+    Attributes
+    ----------
+    points
+        C, where each cable leaves its sheave [m], (3, m).
+    directions
+        U, the unit vector in which each pulls at its attachment, (3, m).
+    lengths
+        L, from the anchor over the sheave to the attachment [m], (m, 1).
+    wraps
+        Theta, the angle of the sheave that it touches [rad], (m, 1), from 0 to 2 pi; of a point anchor, nothing: 0.
+    """
+
+    points: Matrix
+    directions: Matrix
+    lengths: Matrix
+    wraps: Matrix
+
+
+def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -> Exit:
+    """Where m cables leave their pulleys, by CasADi SX, MX or DM in any frame that all arguments share.
+
+    Parameters
+    ----------
+    anchor
+        A, where each cable comes up the swivel axis [m], (3, m).
+    axis
+        K, in the sense in which the cable comes up, of unit length, (3, m).
+    radius
+        R of each sheave [m], numbers, (m,); zero: a point anchor, whose axis is not looked at.
+    attachment
+        B [m], (3, m).
+
+    Raises
+    ------
+    InputError
+        If a radius is below zero.
+    """
+    radii = checks.array("radius", radius, ()).ravel()
+    if not (radii >= 0).all():
+        raise InputError(f"radius: has {radii.min():g} in it; accepted: numbers >= 0")
+    columns = []
+    for i, r in enumerate(np.broadcast_to(radii, attachment.shape[1])):
+        place = _point_anchor if r == 0 else _over_sheave
+        columns.append(place(anchor[:, i], axis[:, i], float(r), attachment[:, i]))
+    points, directions, lengths, wraps = zip(*columns, strict=True)
+    return Exit(ca.horzcat(*points), ca.horzcat(*directions), ca.vertcat(*lengths), ca.vertcat(*wraps))
+
+
+def _point_anchor(anchor: Matrix, axis: Matrix, radius: float, attachment: Matrix) -> Exit:
+    vector = anchor - attachment
+    length = ca.norm_2(vector)
+    return Exit(anchor, vector / length, length, 0 * length)
+
+
+def _over_sheave(anchor: Matrix, axis: Matrix, radius: float, attachment: Matrix) -> Exit:
+    offset = attachment - anchor
+    up = ca.dot(offset, axis)  # d . k
+    across = offset - up * axis
+    distance = ca.norm_2(across)
+    e = across / distance
+    out = distance - radius  # d . e
+    D_squared = out**2 + up**2
+    s = ca.sqrt(distance**2 - 2 * distance * radius + up**2)  # D^2 - r^2, without the cancellation of r^2
+    # d = r n + s t with n = (C - M) / r and t a quarter turn from it: solved for both
+    n = ((radius * out - s * up) * e + (radius * up + s * out) * axis) / D_squared
+    t = ((s * out + radius * up) * e + (s * up - radius * out) * axis) / D_squared
+    wrap = np.pi - ca.atan2(s, radius) - ca.atan2(up, out)
+    return Exit(anchor + radius * (e + n), -t, radius * wrap + s, wrap)
+
+
+def pulley_motion(anchor: Any, axis: Any, radius: float) -> ca.Function:
+    """Length and direction of a cable over a pulley that rests, with their first and second time derivatives.
+
+    Parameters
+    ----------
+    anchor
+        A in the frame that the pulley rests in, as that of a carrier [m], (3,).
+    axis
+        Swivel axis in the same frame, (3,), of any length.
+    radius
+        R [m]; zero: a point anchor.
+
+    Returns
+    -------
+    CasADi Function
+        Inputs `attachment`, `velocity`, `acceleration`: B and its time derivatives in that frame, (3,) each. Outputs
+        `length`, `d_length`, `dd_length` [m, m/s, m/s^2] and `direction`, `d_direction`, `dd_direction`, (3,) each.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value.
+    """
+    anchor = checks.array("anchor", anchor, (3,)).reshape(3)
+    axis = checks.array("axis", axis, (3,)).reshape(3)
+    axis = axis / checks.positive("the length of axis", np.linalg.norm(axis))
+    radius = checks.non_negative("radius", radius)
+    motion = [ca.SX.sym(name, 3) for name in ("attachment", "velocity", "acceleration")]
+    leaving = exit_points(ca.DM(anchor), ca.DM(axis), radius, motion[0])
+    outputs = [
+        value
+        for quantity in (leaving.lengths, leaving.directions)
+        for value in (quantity, *time_derivatives(quantity, *motion))
+    ]
+    names = ["attachment", "velocity", "acceleration"]
+    told = ["length", "d_length", "dd_length", "direction", "d_direction", "dd_direction"]
+    return ca.Function("pulley_motion", motion, outputs, names, told)
+
+
+def time_derivatives(
+    value: Matrix, coordinates: Matrix, velocity: Matrix, acceleration: Matrix
+) -> tuple[Matrix, Matrix]:
+    """First and second time derivative of an SX or MX column `value` of `coordinates` that move as given."""
+    first = ca.jtimes(value, coordinates, velocity)
+    second = ca.jtimes(first, coordinates, velocity) + ca.jtimes(value, coordinates, acceleration)
+    return first, second

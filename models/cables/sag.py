@@ -1,0 +1,290 @@
+r"""An elastic cable that sags under its weight, at rest between two points: Irvine's elastic catenary.
+
+With s the unstrained length from the start, T(s) = (H, V(s)) the tension in the vertical plane of the cable,
+V(s) = V_m + w (s - L0 / 2), and T_1, T_2 its norms at both ends, the end lies from the start
+
+    x = H   L0 (1 / EA + 2 g / (T_1 + T_2))       g = artanh(q) / q,   q = w L0 / (T_1 + T_2)
+    z = V_m L0 (1 / EA + 2 / (T_1 + T_2))
+
+This is Irvine's pair of equations with the differences of asinh and of the square roots taken exactly, so that it
+holds its digits from w = 0 (the straight elastic cable: g = 1) to a cable that hangs in a heap (q = 1).
+
+(x, z) is the gradient of the complementary energy, the integral of T^2 / (2 EA) + T over s, which is strictly convex in
+(H, V_m). So the forces of given end points are the minimum of that energy less H x + V_m z: one and only one, and
+Newton's method with a line search finds it from any start.
+
+Source: H. M. Irvine, Cable Structures, MIT Press, 1981 (the elastic catenary); its form here is derived anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, SolverError
+from . import checks
+
+TOLERANCE = 1e-14  # how exactly the ends have to meet, in unstrained lengths or spans, the longer ones
+ITERATIONS = 200
+STEEP = 0.3  # of the slope at the start of a step: what the line search lets the energy rise with at its end
+TAUT = 10.0  # sum of both end tensions in weights of the cable
+VERTICAL = 1e-13  # horizontal distance in unstrained lengths: below, the cable hangs in a vertical line
+
+
+@dataclass(frozen=True)
+class SaggingCable:
+    """Elastic catenaries at rest, one or a batch of shape (...).
+
+    Attributes
+    ----------
+    start, length, stiffness, weight, up
+        As given to `hang`; `up` of unit length.
+    across
+        Horizontal unit vector from start to end, (..., 3); zero for a cable in a vertical line.
+    H, V_m
+        Horizontal tension and, amid the cable, vertical component of the tension towards the end [N], (...).
+    start_force, end_force
+        What the cable pulls at what holds its ends [N], (..., 3). Their sum is its weight.
+    start_tension, end_tension
+        Their norms [N], (...).
+    iterations
+        Newton steps that were taken, for the slowest of the batch.
+    """
+
+    start: np.ndarray
+    length: np.ndarray
+    stiffness: float
+    weight: float
+    up: np.ndarray
+    across: np.ndarray
+    H: np.ndarray
+    V_m: np.ndarray
+    iterations: int
+
+    @property
+    def start_force(self) -> np.ndarray:  # noqa: D102
+        return self._vector(self.H, self._V(0.0))
+
+    @property
+    def end_force(self) -> np.ndarray:  # noqa: D102
+        return -self._vector(self.H, self._V(1.0))
+
+    @property
+    def start_tension(self) -> np.ndarray:  # noqa: D102
+        return np.hypot(self.H, self._V(0.0))
+
+    @property
+    def end_tension(self) -> np.ndarray:  # noqa: D102
+        return np.hypot(self.H, self._V(1.0))
+
+    def points(self, fractions: Any) -> np.ndarray:
+        """Points of the cable [m], (..., k, 3), at these fractions (k,) of its unstrained length from the start."""
+        share = checks.array("fractions", fractions, (None,))
+        if share.ndim != 1 or not ((share >= 0) & (share <= 1)).all():
+            raise InputError(f"fractions: {fractions!r}; accepted: a list of numbers from 0 to 1")
+        unit = (self.weight * self.length)[..., None]
+        middle = (self.V_m / unit[..., 0])[..., None] + (share - 1) / 2
+        x, z = _reach(self.H[..., None] / unit, middle, share, unit / self.stiffness)
+        x, z = x * self.length[..., None], z * self.length[..., None]
+        return self.start[..., None, :] + x[..., None] * self.across[..., None, :] + z[..., None] * self.up
+
+    def tension(self, fractions: Any) -> np.ndarray:
+        """Tension of the cable [N], (..., k), at these fractions (k,) of its unstrained length from the start."""
+        return np.hypot(self.H[..., None], self._V(checks.array("fractions", fractions, (None,))))
+
+    def _V(self, share: Any) -> np.ndarray:
+        """Vertical component of the tension at fractions of the length, (...) or, for k of them, (..., k)."""
+        step = np.asarray(share) - 0.5
+        V_m, length = (self.V_m, self.length) if step.ndim == 0 else (self.V_m[..., None], self.length[..., None])
+        return V_m + self.weight * length * step
+
+    def _vector(self, across: np.ndarray, up: np.ndarray) -> np.ndarray:
+        return across[..., None] * self.across + up[..., None] * self.up
+
+
+def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up: Any = (0.0, 0.0, 1.0)) -> SaggingCable:
+    """Hang cables between two points each, at rest.
+
+    Parameters
+    ----------
+    start, end
+        Where the ends are held [m], (..., 3); for a robot's cable, its anchor and its attachment.
+    length
+        Unstrained length L0 [m], (...).
+    stiffness
+        E A [N]; `inf`: it does not stretch, and then must be longer than the distance of its ends.
+    weight
+        Per unstrained length w = rho g [N/m], above zero (`elastic` has the cable without weight).
+    up
+        Against gravity, (3,), of any length.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value, or a cable that does not stretch is too short.
+    SolverError
+        If Newton's method did not meet the ends within 1e-14 of the length.
+    """
+    stiffness = checks.positive("stiffness", stiffness, infinite=True)
+    weight = checks.positive("weight", weight)
+    upward = checks.array("up", up, (3,)).reshape(3)
+    upward = upward / checks.positive("the length of up", np.linalg.norm(upward))
+    start, end, length = (
+        checks.array("start", start, (3,)),
+        checks.array("end", end, (3,)),
+        checks.array("length", length, ()),
+    )
+    try:
+        batch = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], length.shape)
+    except ValueError:
+        told = f"start {start.shape}, end {end.shape}, length {length.shape}"
+        raise InputError(f"leading dimensions do not broadcast: {told}; accepted: equal ones, or 1") from None
+    start, length = np.broadcast_to(start, (*batch, 3)), np.broadcast_to(length, batch)
+    if not (length > 0).all():
+        raise InputError(f"length: has {length.min():g} in it; accepted: numbers > 0")
+    span = np.broadcast_to(end, (*batch, 3)) - start
+    if np.isinf(stiffness) and not (np.linalg.norm(span, axis=-1) < length).all():
+        raise InputError("length: is not above the distance of the ends; accepted: longer, or a finite stiffness")
+
+    z = span @ upward
+    level = span - z[..., None] * upward
+    x = np.linalg.norm(level, axis=-1)
+    vertical = x <= VERTICAL * length
+    across = np.where(vertical[..., None], 0.0, level) / np.where(vertical, 1.0, x)[..., None]
+    unit = weight * length  # forces in weights of the cable, lengths in unstrained lengths
+    problem = _Problem(*(a.ravel() for a in (np.where(vertical, 0.0, x) / length, z / length, unit / stiffness)))
+    h, v, iterations = problem.solve()
+    H, V_m = h.reshape(batch) * unit, v.reshape(batch) * unit
+    return SaggingCable(start, length, stiffness, weight, upward, across, H, V_m, iterations)
+
+
+def _reach(h: np.ndarray, v: np.ndarray, share: np.ndarray | float, softness: np.ndarray | float) -> tuple[Any, Any]:
+    """Span (x, z) of a piece that is `share` of a cable long and carries (h, v) in its middle, without dimensions."""
+    half = np.asarray(share) / 2
+    T_1, T_2 = np.hypot(h, v - half), np.hypot(h, v + half)
+    total = np.maximum(T_1 + T_2, np.finfo(float).tiny)
+    return h * (share * softness + 2 * _artanh(h, v, half, T_1, T_2)), v * share * (softness + 2 / total)
+
+
+def _artanh(h: np.ndarray, v: np.ndarray, half: np.ndarray, T_1: np.ndarray, T_2: np.ndarray) -> np.ndarray:
+    """Artanh(q) of q = 2 half / (T_1 + T_2), exact also where q is nearly 1; 0 where it is infinite, at h = 0."""
+    a, b = v - half, v + half
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # T_1 + a and T_2 - b, whose sum is T_1 + T_2 - 2 half, each without cancellation
+        below = np.where(a < 0, h**2 / (T_1 - a), T_1 + a)
+        above = np.where(b > 0, h**2 / (T_2 + b), T_2 - b)
+        return np.where(h == 0, 0.0, np.log1p(4 * half / (below + above)) / 2)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Find (h, v) for spans (x, z), all (k,), of cables of unit length and weight and of softness w L0 / EA."""
+
+    x: np.ndarray
+    z: np.ndarray
+    softness: np.ndarray
+
+    def solve(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """The forces, (k,) each, and the number of steps."""
+        h, v = self._first_guess()
+        open_ones = np.flatnonzero(self.x > 0)
+        if not len(open_ones):
+            return h, v, 0
+        for iteration in range(ITERATIONS):
+            part = _Problem(self.x[open_ones], self.z[open_ones], self.softness[open_ones])
+            d_h, d_v, slope = part.newton_step(h[open_ones], v[open_ones])
+            taken = part.line_search(h[open_ones], v[open_ones], d_h, d_v, slope)
+            h[open_ones] += taken * d_h
+            v[open_ones] += taken * d_v
+            miss_x, miss_z = part.misses(h[open_ones], v[open_ones])
+            met = np.maximum(np.abs(miss_x), np.abs(miss_z)) <= TOLERANCE * np.maximum(1, np.hypot(part.x, part.z))
+            open_ones = open_ones[~met]
+            if not len(open_ones):
+                return h, v, iteration + 1
+        worst = open_ones[0]
+        raise SolverError(
+            f"sag: {len(open_ones)} of {len(h)} cables did not converge in {ITERATIONS} steps; the first spans "
+            f"{self.x[worst]:.6g} lengths across and {self.z[worst]:.6g} up, w L0 / EA = {self.softness[worst]:.6g}"
+        )
+
+    def misses(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far beyond its place the end lies, (k,) each: the gradient of the energy."""
+        x, z = _reach(h, v, 1.0, self.softness)
+        return x - self.x, z - self.z
+
+    def newton_step(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The step in h and v and the energy's slope along it, (k,) each."""
+        miss_x, miss_z = self.misses(h, v)
+        c_xx, c_xz, c_zz = _compliance(h, v)
+        c_xx, c_zz = c_xx + self.softness, c_zz + self.softness
+        size = c_xx * c_zz - c_xz**2
+        d_h = -(c_zz * miss_x - c_xz * miss_z) / size
+        d_v = -(c_xx * miss_z - c_xz * miss_x) / size
+        return d_h, d_v, miss_x * d_h + miss_z * d_v
+
+    def line_search(
+        self, h: np.ndarray, v: np.ndarray, d_h: np.ndarray, d_v: np.ndarray, slope: np.ndarray
+    ) -> np.ndarray:
+        """How much of each step to take, (k,): half as much while the energy rises steeply at its end, and h stays > 0.
+
+        The energy is convex: while it still falls at the end of a step, the step was not too long.
+        """
+        taken = np.where(h + d_h > 0, 1.0, -0.9 * h / np.where(d_h < 0, d_h, -1.0))
+        allowed = STEEP * np.abs(slope) + 1e-15 * (np.abs(d_h) + np.abs(d_v))  # the second: rounding of the misses
+        for _ in range(60):
+            miss_x, miss_z = self.misses(h + taken * d_h, v + taken * d_v)
+            rising = miss_x * d_h + miss_z * d_v > allowed
+            if not rising.any():
+                break
+            taken = np.where(rising, taken / 2, taken)
+        return taken
+
+    def _first_guess(self) -> tuple[np.ndarray, np.ndarray]:
+        """H and v to start from, (k,): the catenary that does not stretch, or where that is too tight, a taut cable."""
+        chord = np.hypot(self.x, self.z)
+        spread = self.x > 0
+        safe_x, safe_chord = np.where(spread, self.x, 1.0), np.where(spread, chord, 1.0)
+        slack = spread & (chord < 1)
+        ratio = np.where(slack, np.sqrt(np.abs(1 - self.z**2)) / safe_x, 2.0)  # sinh(lam) / lam
+        lam = np.sqrt(6 * (ratio - 1))
+        for _ in range(8):
+            lam = np.where(ratio > 1.5, np.arcsinh(ratio * lam), lam)
+        lam = np.maximum(lam, 1e-12)
+        h_slack = np.where(slack, self.x / (2 * lam), np.inf)
+        v_slack = self.z / (2 * np.tanh(lam))
+
+        # T of a shallow parabola: chord = 1 + softness T - k / T^2; its two terms' roots in a sum are near enough
+        k = (self.x / safe_chord) ** 2 / 24
+        with np.errstate(divide="ignore", invalid="ignore"):
+            stretched = np.where(chord > 1, (chord - 1) / self.softness, 0.0)
+            taut = stretched + np.cbrt(k / self.softness)
+        use_slack = h_slack * safe_chord / safe_x <= taut
+        taut = np.where(use_slack, 0.0, taut)  # infinite where it does not stretch
+        h = np.where(use_slack, h_slack, taut * self.x / safe_chord)
+        v = np.where(use_slack, v_slack, taut * self.z / safe_chord)
+        return np.where(spread, h, 0.0), np.where(spread, v, self._vertical())
+
+    def _vertical(self) -> np.ndarray:
+        """V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
+        folded = self.z / (self.softness + 2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            taut = np.sign(self.z) * (np.abs(self.z) - 1) / self.softness
+        return np.where(np.abs(folded) <= 0.5, folded, taut)
+
+
+def _compliance(h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Integrals of V^2 / T^3, -h V / T^3 and h^2 / T^3 over the cable, (k,) each: its give without stretching."""
+    a, b = v - 0.5, v + 0.5
+    T_1, T_2 = np.hypot(h, a), np.hypot(h, b)
+    c_zz = b / T_2 - a / T_1
+    c_xz = h / T_2 - h / T_1
+    c_xx = 2 * _artanh(h, v, np.asarray(0.5), T_1, T_2) - c_zz
+    # Of a taut cable these are small differences; there three points of Gauss and Legendre are exact enough
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    V = v[:, None] + nodes / 2
+    T = np.hypot(h[:, None], V)
+    along = [(f / T**3) @ (weights / 2) for f in (V**2, -h[:, None] * V, np.broadcast_to(h[:, None] ** 2, V.shape))]
+    taut = T_1 + T_2 > TAUT
+    return np.where(taut, along[0], c_xx), np.where(taut, along[1], c_xz), np.where(taut, along[2], c_zz)
