@@ -1,0 +1,396 @@
+"""A CASPR robot folder as a towline robot, and what of it cannot be expressed.
+
+CASPR (D. Lau et al.) describes a robot by two XML files: NAME_bodies.xml has the links, NAME_cables.xml has one or more
+sets of cables. One link that moves freely, in space or in a plane, is a platform; link 0 is the ground. With the joint
+frame {J} as platform frame, c = com_location, and the joint's base at p in {G}:
+
+    r_JB = location             if attachment_reference is "joint"
+    r_JB = location + c         if it is "com"
+    I_com = I_J - m (c.c E - c c^T)           if the inertia's ref is "joint"
+    x = p + q_xyz,  R = Rx(q_4) Ry(q_5) Rz(q_6)   for SPATIAL_EULER_XYZ, whereas towline has Rz Ry Rx
+
+What would make a different robot is an error; what is merely left out is a note. The files may come from anywhere:
+entities and any DTD of their own are refused, and the DTD that CASPR names beside them is not read.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, TreeBuilder
+
+import casadi as ca
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import DefusedXMLParser, ParseError
+
+from ..errors import InputError
+from .parsing import brief, read_bytes, validate
+from .robot import COORDINATES, LARGEST, Cable, Coordinate, Platform, Robot, inertia_matrix
+from .rotation import rotation
+
+# What each joint's q moves, in the order of q; both spatial ones turn freely and write the angles in their own way.
+JOINTS: dict[str, tuple[Coordinate, ...]] = {
+    "SPATIAL_EULER_XYZ": COORDINATES,
+    "SPATIAL_QUATERNION": COORDINATES,
+    "T_XYZ": ("x", "y", "z"),
+    "P_X": ("x",),
+    "P_XY": ("x", "y"),
+    "P_XZ": ("x", "z"),
+    "PLANAR_XY": ("x", "y", "yaw"),
+    "PLANAR_XZ": ("x", "z", "pitch"),
+    "PLANAR_YZ": ("y", "z", "roll"),
+}
+# Their stiffness depends on the tension; their geometry and limits are those of ideal cables.
+VARIABLE_STIFFNESS = ("cable_vsd_torsion_spring", "cable_vsd_flexure_linear", "cable_vsd_polynomial")
+CABLES = ("cable_ideal", "cable_linear_spring", *VARIABLE_STIFFNESS)
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
+@dataclass(frozen=True)
+class CasprImport:
+    """A robot, and what the folder says beyond it.
+
+    Attributes
+    ----------
+    robot
+        The robot; its source names the folder and repeats the notes.
+    cable_set
+        Id of the set of cables that was read.
+    cable_sets
+        Ids of all sets in the file.
+    notes
+        Sentences on what was left out or assumed.
+    """
+
+    robot: Robot
+    cable_set: str
+    cable_sets: tuple[str, ...]
+    notes: list[str]
+
+
+def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> CasprImport:
+    """Read a folder with one *_bodies.xml and one *_cables.xml as CASPR has them.
+
+    Parameters
+    ----------
+    folder
+        The folder of one robot.
+    cable_set
+        Id of the set of cables; None: the file's default_cable_set.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or wrong, or the robot is none that towline can express: one line that names the file and
+        the element.
+    """
+    place = Path(folder)
+    notes = Counter[str]()
+    bodies = _read(_file(place, "_bodies.xml"), "bodies_system", notes)
+    cables = _read(_file(place, "_cables.xml"), "cables", notes)
+    name = place.resolve().name
+    link = _only_link(bodies)
+    platform, com = _platform(link, notes)
+    chosen, ids = _choose(cables, cable_set)
+    wires = [_cable(node, com, notes) for node in chosen.children()]
+    if not wires:
+        raise chosen.wrong("has no cables", "at least one")
+    default = cables.element.get("default_cable_set")
+    told = [text if count == 1 else f"{text} ({count} times)" for text, count in notes.items()]
+    source = (
+        f"Imported from the CASPR folder {brief(name)}, link {brief(link.element.get('name', ''))}, cable set "
+        f"{brief(chosen.attribute('id'))}: geometry, mass, inertia and tension limits. Home is q_initial."
+    )
+    data = {
+        "name": _name(name if chosen.attribute("id") == default else f"{name}-{chosen.attribute('id')}"),
+        "source": " ".join([source, *(f"Note: {note}." for note in told)]),
+        "platform": platform,
+        "carriers": [{"name": "frame", "kind": "ground"}],
+        "cables": wires,
+    }
+    return CasprImport(validate(data, Robot, chosen.where), chosen.attribute("id"), tuple(ids), told)
+
+
+class _Parser(DefusedXMLParser):
+    """Refuses entities, and every DOCTYPE but one that only names a DTD beside the file, as CASPR's files do."""
+
+    def __init__(self):
+        # The tree builder written in C: Python's own walks a deep tree by recursion.
+        super().__init__(target=TreeBuilder(), forbid_dtd=True, forbid_entities=True, forbid_external=True)
+
+    def defused_start_doctype_decl(
+        self, name: str, sysid: str | None, pubid: str | None, has_internal_subset: bool
+    ) -> None:
+        if has_internal_subset or "://" in (sysid or ""):
+            super().defused_start_doctype_decl(name, sysid, pubid, has_internal_subset)
+
+
+@dataclass(frozen=True)
+class _Node:
+    """An XML element, and where it stands: the file and the elements that lead to it."""
+
+    element: Element
+    where: str
+
+    def wrong(self, what: str, accepted: str) -> InputError:
+        return InputError(f"{self.where}: {what}; accepted: {accepted}")
+
+    def children(self, tag: str | None = None) -> list[_Node]:
+        return [_Node(child, f"{self.where}{_label(child)}") for child in self.element if tag in (None, child.tag)]
+
+    def find(self, tag: str) -> _Node | None:
+        """The child `tag`, of which there may be one or none."""
+        found = self.children(tag)
+        if len(found) > 1:
+            raise self.wrong(f"has {len(found)} elements {tag}", "one")
+        return found[0] if found else None
+
+    def child(self, tag: str) -> _Node:
+        found = self.find(tag)
+        if found is None:
+            raise self.wrong(f"{tag} is missing", f"an element {tag}")
+        return found
+
+    def attribute(self, name: str) -> str:
+        value = self.element.get(name)
+        if value is None:
+            raise self.wrong(f"the attribute {name} is missing", f'{name}="..."')
+        return value
+
+    def numbers(self, count: int, attribute: str | None = None) -> list[float]:
+        """The element's text, or one of its attributes, as `count` finite numbers."""
+        text = self.attribute(attribute) if attribute else self.element.text or ""
+        words = text.split()
+        values = [float(word) if NUMBER.fullmatch(word) else math.nan for word in words]
+        if len(values) != count or not all(map(math.isfinite, values)):
+            what = f"{attribute} is {brief(text)}" if attribute else f"is {brief(text.strip())}"
+            raise self.wrong(what, "one finite number" if count == 1 else f"{count} finite numbers")
+        return values
+
+
+def _label(element: Element) -> str:
+    """Its tag, and its name, id or number if it has one."""
+    called = next((element.get(key) for key in ("name", "id", "num") if element.get(key)), None)
+    return f": {brief(element.tag)[1:-1]}" + (f" {brief(called)}" if called else "")
+
+
+def _file(folder: Path, ending: str) -> Path:
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder; accepted: a folder with one *_bodies.xml and one *_cables.xml")
+    found = sorted(folder.glob(f"*{ending}"))
+    if len(found) != 1:
+        names = ", ".join(path.name for path in found) or "none"
+        raise InputError(f"{folder}: there must be one file *{ending}, found {names}; accepted: a CASPR robot folder")
+    return found[0]
+
+
+def _read(file: Path, root: str, notes: Counter[str]) -> _Node:
+    content = read_bytes(file, "an XML file")
+    parser = _Parser()
+    try:
+        parser.feed(content)
+        element: Any = parser.close()
+    except DefusedXmlException:
+        raise InputError(
+            f"{file}: has a DTD or entities of its own; accepted: plain XML, with at most a DOCTYPE that names a file"
+        ) from None
+    except ParseError as error:
+        raise InputError(f"{file}: is not XML ({brief(str(error))[1:-1]}); accepted: a CASPR {root} file") from None
+    except (LookupError, ValueError):  # encodings that Python or expat do not know
+        raise InputError(f"{file}: is not XML (its encoding is unknown); accepted: UTF-8") from None
+    if element.tag != root:
+        raise InputError(f"{file}: its root is {brief(element.tag)}; accepted: {root}")
+    for holder in _with_stray_text(element):
+        notes[f"{file.name}: text beside the elements of {brief(holder)[1:-1]} is left out"] += 1
+    return _Node(element, str(file))
+
+
+def _with_stray_text(root: Element) -> Iterator[str]:
+    """Tags of the elements that hold text beside other elements."""
+    for element in root.iter():
+        text = [element.text or ""] if len(element) else []
+        if any(part.strip() for part in (*text, *(child.tail or "" for child in element))):
+            yield element.tag
+
+
+def _only_link(bodies: _Node) -> _Node:
+    links = bodies.child("links").children()
+    for link in links:
+        if link.element.tag != "link_rigid":
+            raise link.wrong("is no link that towline knows", "link_rigid")
+    if len(links) != 1:
+        raise bodies.wrong(f"there are {len(links)} links", "one: towline's robots have one platform")
+    return links[0]
+
+
+def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
+    """The link as a platform in its joint's frame, and its centre of mass there [m]."""
+    joint, physical = link.child("joint"), link.child("physical")
+    kind = joint.attribute("type")
+    if kind not in JOINTS:
+        raise joint.wrong(f"type {brief(kind)} is no free body", ", ".join(JOINTS))
+    if joint.element.get("actuated") == "true":
+        raise joint.wrong("has a motor of its own", "a joint that only the cables move")
+    mass = physical.child("mass").numbers(1)[0]
+    com = np.array(physical.child("com_location").numbers(3))
+    if joint.element.get("q_min") or joint.element.get("q_max"):
+        notes["the joint's range, q_min to q_max, is left out"] += 1
+    end = physical.find("end_location")
+    if end is not None and any(end.numbers(3)):
+        notes["the place of the tool, end_location, is left out"] += 1
+    data: dict[str, Any] = {"mass": mass, "com": com.tolist(), "dof": JOINTS[kind], "home": _home(link, joint, kind)}
+    inertia = _inertia(physical.child("inertia"), mass, com)
+    if set(JOINTS[kind]) & {"roll", "pitch", "yaw"} or min(np.linalg.eigvalsh(inertia_matrix(inertia))) > 0:
+        data["inertia"] = inertia
+    else:
+        notes["the inertia is left out, it is not positive definite and the platform cannot turn"] += 1
+    return validate(data, Platform, link.where), com
+
+
+def _inertia(node: _Node, mass: float, com: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the centre of mass [kg m^2]."""
+    xx, yy, zz, xy, xz, yz = (node.child(name).numbers(1)[0] for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"))
+    reference = node.attribute("ref")
+    if reference not in ("com", "joint"):
+        raise node.wrong(f"ref is {brief(reference)}", "com, joint")
+    matrix = inertia_matrix((xx, yy, zz, xy, xz, yz))
+    if reference == "joint":
+        matrix = matrix - mass * (com @ com * np.eye(3) - np.outer(com, com))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = matrix.tolist()
+    return xx, yy, zz, xy, xz, yz
+
+
+def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
+    """q_initial as a pose in {G} [m, rad]."""
+    parent = link.child("parent")
+    if parent.child("num").numbers(1) != [0.0]:
+        raise parent.child("num").wrong("is not the ground", "0")
+    pose = np.zeros(6)
+    pose[:3] = parent.child("location").numbers(3)
+    dof = JOINTS[kind]
+    q = np.array(joint.numbers(7 if kind == "SPATIAL_QUATERNION" else len(dof), "q_initial"))
+    if len(dof) == len(COORDINATES):
+        pose[:3] += q[:3]
+        pose[3:] = _angles(_from_quaternion(joint, q[3:]) if kind == "SPATIAL_QUATERNION" else _from_xyz(q[3:]))
+    else:
+        pose[[COORDINATES.index(name) for name in dof]] += q
+    return pose.tolist()
+
+
+def _from_xyz(angles: np.ndarray) -> np.ndarray:
+    """R = Rx Ry Rz of three angles [rad], (3, 3)."""
+    x, y, z = (rotation(ca.DM(np.diag(angles)[i])).full() for i in range(3))
+    return x @ y @ z
+
+
+def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> np.ndarray:
+    """R of (e0, e1, e2, e3), e0 the real part, (3, 3)."""
+    norm = np.linalg.norm(quaternion)
+    if not 0.999 < norm < 1.001:
+        raise joint.wrong(f"the quaternion of q_initial has norm {norm:g}", "a norm of 1")
+    w, *v = quaternion / norm
+    x, y, z = v
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + 2 * w * skew + 2 * skew @ skew
+
+
+def _angles(R: np.ndarray) -> np.ndarray:
+    """(roll, pitch, yaw) of R = Rz Ry Rx [rad], also at pitch = +-90 degrees, where any roll will do."""
+    roll = math.atan2(R[2, 1], R[2, 2])
+    level = R @ rotation(ca.DM([roll, 0, 0])).full().T  # Rz Ry
+    pitch, yaw = math.atan2(-level[2, 0], level[2, 2]), math.atan2(-level[0, 1], level[1, 1])
+    return np.array([roll, pitch, yaw]) + 0.0  # -0 would only puzzle a reader
+
+
+def _choose(cables: _Node, wanted: str | None) -> tuple[_Node, list[str]]:
+    """The set of cables, and the ids of all."""
+    sets = cables.children("cable_set")
+    ids = [node.attribute("id") for node in sets]
+    known = ", ".join(brief(name)[1:-1] for name in ids) or "none, the file has no cable_set"
+    chosen = wanted or cables.element.get("default_cable_set") or (ids[0] if len(ids) == 1 else "")
+    if not chosen:
+        raise cables.wrong("default_cable_set is missing", f"a cable set out of {known}")
+    if ids.count(chosen) != 1:
+        what = "there twice" if chosen in ids else "not there"
+        raise cables.wrong(f"the cable set {brief(chosen)} is {what}", f"one of {known}")
+    return sets[ids.index(chosen)], ids
+
+
+def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
+    kind = node.element.tag
+    if kind not in CABLES:
+        raise node.wrong("is no cable that towline knows", ", ".join(CABLES))
+    reference = node.attribute("attachment_reference")
+    if reference not in ("com", "joint"):
+        raise node.wrong(f"attachment_reference is {brief(reference)}", "com, joint")
+    properties = node.child("properties")
+    lower = properties.find("force_min")
+    if lower is None:
+        notes["force_min is missing, taken as 0 N"] += 1
+    upper = properties.child("force_max").numbers(1)[0]
+    if upper > LARGEST:
+        notes[f"force_max {upper:g} N, which stands for no limit, is taken as {LARGEST:g} N"] += 1
+    data: dict[str, Any] = {
+        "carrier": "frame",
+        "t_min": 0.0 if lower is None else lower.numbers(1)[0],
+        "t_max": min(upper, LARGEST),
+    }
+    used = {"force_min", "force_max"}
+    if kind == "cable_linear_spring":
+        data["stiffness"] = properties.child("K").numbers(1)[0]  # CASPR divides it by the length: it is E A
+        used |= {"K"}
+    if kind in VARIABLE_STIFFNESS:
+        notes[f"the variable stiffness of {kind} is left out"] += 1
+    for extra in properties.children():
+        if extra.element.tag not in used:
+            notes[f"the property {brief(extra.element.tag)[1:-1]} of {kind} is left out"] += 1
+    return validate(data | _ends(node, com if reference == "com" else np.zeros(3), notes), Cable, node.where)
+
+
+def _ends(node: _Node, origin: np.ndarray, notes: Counter[str]) -> dict[str, Any]:
+    """Anchor, attachment and pulley of a cable; its locations on the link are relative to `origin`."""
+    points = node.child("attachments").children()
+    if points and points[-1].element.tag == "attachment" and _link(points[-1]) == 0:
+        points.reverse()
+    links = [_link(point) for point in points]
+    if len(points) < 2 or links != [0] * (len(points) - 1) + [1]:
+        way = ", ".join(str(number) for number in links[:9]) or "none"
+        raise node.wrong(f"runs over links {way}", "from the ground, link 0, straight to link 1")
+    anchor, attachment = points[-2], points[-1]
+    if len(points) > 2:
+        if node.element.tag != "cable_ideal":
+            raise node.wrong("stretches between points on the ground", "an elastic cable from one anchor to link 1")
+        notes["points on the ground before the last one are left out, they add a constant length"] += 1
+    ends: dict[str, Any] = {"attachment": (np.array(attachment.child("location").numbers(3)) + origin).tolist()}
+    if anchor.element.tag == "attachment":
+        return ends | {"anchor": anchor.child("location").numbers(3)}
+    pulley = {
+        "radius": anchor.child("pulley_radius").numbers(1)[0],
+        "axis": anchor.child("cable_entry_vector").numbers(3),
+    }
+    return ends | {"anchor": anchor.child("fixed_location").numbers(3), "pulley": pulley}
+
+
+def _link(point: _Node) -> int:
+    """Number of the link that a point sits on, 0 for the ground."""
+    if point.element.tag == "base_rotating_pulley":
+        return 0
+    if point.element.tag != "attachment":
+        raise point.wrong("is no attachment that towline knows", "attachment, base_rotating_pulley")
+    number = point.child("link").numbers(1)[0]
+    if not number.is_integer():
+        raise point.child("link").wrong(f"is {number:g}", "0 or 1")
+    return int(number)
+
+
+def _name(text: str) -> str:
+    """The text as a robot's name: lower case, words joined by hyphens."""
+    words = re.findall(r"[a-z0-9.]+", text.lower())
+    return "-".join(words).lstrip(".")[:64].rstrip("-.") or "caspr-robot"
