@@ -33,5 +33,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[dev]"
+	$(INSTALL) ".[dev,mujoco]"
 	touch $@

@@ -1,6 +1,7 @@
 """Files that are written whole or not at all."""
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,22 +14,62 @@ from .errors import InputError
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary place beside `path` to write to; it takes the name `path` when the block ends without an exception.
 
+    A link is followed to the file that it stands for; folders that are missing are made.
+
     Raises
     ------
     InputError
         If the place cannot be written to. A file that was there before is left as it was.
     """
+    target = check_writable(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         os.close(handle)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); accepted: a writable place") from None
+    except (OSError, ValueError) as error:
+        raise _refusal(path, error) from None
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o644)  # mkstemp makes files that only their owner may read
-        os.replace(temporary, path)
+        temporary.chmod(_mode(target))
+        os.replace(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def check_writable(path: Path) -> Path:
+    """The file that `path` stands for, its folder made, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        If it is a folder, a device or a pipe, or its folder cannot be written to.
+    """
+    try:
+        target = path.resolve()
+        if not path.name or target.is_dir():
+            raise InputError(f"{path}: is a folder; accepted: the path of a file")
+        if target.exists() and not stat.S_ISREG(target.stat().st_mode):
+            raise InputError(f"{path}: is a device or a pipe; accepted: the path of a file")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if not os.access(target.parent, os.W_OK):
+            raise PermissionError(13, "Permission denied")
+    except InputError:
+        raise
+    except (OSError, ValueError, RuntimeError) as error:
+        raise _refusal(path, error) from None
+    return target
+
+
+def _refusal(path: Path, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or str(error)
+    return InputError(f"{path}: cannot be written ({reason}); accepted: a writable place")
+
+
+def _mode(target: Path) -> int:
+    """Permissions of the file that is replaced, or what this process gives to new files."""
+    if target.exists():
+        return stat.S_IMODE(target.stat().st_mode)
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

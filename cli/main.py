@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TowlineError
-from . import demo, plan, robots, tension
+from . import demo, export, import_, plan, robots, tension
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -24,6 +24,8 @@ app.command("demo")(demo.demo)
 app.command("robots")(robots.robots)
 app.command("tension")(tension.tension)
 app.command("plan")(plan.plan)
+app.add_typer(import_.app, name="import")
+app.command("export")(export.export)
 
 
 def _print_version(asked: bool) -> None:
@@ -45,8 +47,15 @@ def main() -> None:
     """Run the command line; towline's own errors are one line on standard error and exit code 2."""
     try:
         app()
+        sys.stdout.flush()
     except TowlineError as error:
         typer.echo(f"towline: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("towline: stopped", err=True)
+        sys.exit(130)
+    except (OSError, MemoryError) as error:
+        typer.echo(f"towline: {error or 'out of memory'}", err=True)
         sys.exit(2)
 
 

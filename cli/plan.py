@@ -25,11 +25,14 @@ def plan(
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task
+    from ..writing import check_writable
 
     loaded, read = load(robot), read_task(task)
+    target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
+    check_writable(target)
     with watching(f"planning {read.name}") as progress:
         found = plan_motion(loaded, read, progress)
-    file = found.save(out or Path(f"{loaded.name}-{read.name}.nc"))
+    file = found.save(target)
     pictures = found.plot(figures) if figures else []
     if as_json:
         print_json({**found.summary(), "file": str(file), "figures": [str(picture) for picture in pictures]})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,10 +12,12 @@ from .options import JsonOption, print_json
 if TYPE_CHECKING:
     from ..models import Robot
     from ..models.diagnosis import Diagnosis
+    from ..solvers import TensionSolution
 
 
 def robots(
     name: Annotated[str | None, typer.Argument(metavar="[ROBOT]", help="A robot or robot file to diagnose.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Draw the robot into this PNG file.")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of robot files.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -26,14 +29,21 @@ def robots(
     elif name is None:
         _list([load(known) for known in available()], as_json)
     else:
+        from ..models import Dynamics
         from ..models.diagnosis import diagnose
+        from ..solvers import solve
+        from ..workspace import pose_problem
 
         robot = load(name)
-        found = _as_dict(robot, diagnose(robot))
+        at_home = solve(pose_problem(Dynamics(robot), robot.home))
+        found = _as_dict(robot, diagnose(robot), at_home)
+        if figure is not None:
+            _draw(robot, at_home, figure)
+            found["figure"] = str(figure)
         if as_json:
             print_json(found)
         else:
-            _show(robot, found)
+            _show(robot, found, at_home)
 
 
 def _list(library: list[Robot], as_json: bool) -> None:
@@ -50,15 +60,12 @@ def _list(library: list[Robot], as_json: bool) -> None:
     if as_json:
         print_json({"robots": rows})
         return
-    import textwrap
-
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("robot", "cables", "carriers", "mass [kg]", "source", box=None, pad_edge=False)
+    table = Table("robot", "cables", "carriers", "mass [kg]", box=None, pad_edge=False)
     for row in rows:
-        source = textwrap.shorten(row["source"], 30, placeholder="...")
-        table.add_row(row["name"], str(row["cables"]), row["carriers"], f"{row['mass']:g}", source)
+        table.add_row(row["name"], str(row["cables"]), row["carriers"], f"{row['mass']:g}")
     Console().print(table)
 
 
@@ -67,7 +74,7 @@ def _kinds(robot: Robot) -> dict[str, int]:
     return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
 
-def _as_dict(robot: Robot, diagnosis: Diagnosis) -> dict[str, Any]:
+def _as_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> dict[str, Any]:
     return {
         "name": robot.name,
         "source": robot.source.strip(),
@@ -86,12 +93,14 @@ def _as_dict(robot: Robot, diagnosis: Diagnosis) -> dict[str, Any]:
         "rank_tilted": diagnosis.rank_tilted,
         "reason": diagnosis.reason,
         "warnings": diagnosis.warnings,
+        "at_home": at_home.as_dict(),
     }
 
 
-def _show(robot: Robot, found: dict[str, Any]) -> None:
+def _show(robot: Robot, found: dict[str, Any], at_home: TensionSolution) -> None:
     carriers = ", ".join(f"{count} {kind}" for kind, count in found["carriers"].items())
-    rank = f"{found['rank']} of 6 at home, {found['rank_level']} when level, {found['rank_tilted']} when tilted"
+    moves = len(robot.platform.dof)
+    rank = f"{found['rank']} of {moves} at home, {found['rank_level']} when level, {found['rank_tilted']} when tilted"
     lines = [
         f"{found['name']}: {found['cables']} cables; carriers: {carriers}",
         f"  mass {found['mass']:g} kg, weight {found['weight']:.4g} N, characteristic length {found['length']:.4g} m",
@@ -99,11 +108,48 @@ def _show(robot: Robot, found: dict[str, Any]) -> None:
         f"  tension limits: t_min {_range(found['t_min'])} N, t_max {_range(found['t_max'])} N",
         f"  wrench matrix: rank {rank}" + (f": {found['reason']}" if found["reason"] else ""),
         f"  singular values, moments over that length: {_told(found['singular_values'])}",
+        *_rest(at_home),
         *(f"  warning: {warning}" for warning in found["warnings"]),
         "  source:",
         *(f"    {line.strip()}" for line in robot.source.strip().splitlines()),
     ]
     typer.echo("\n".join(lines))
+
+
+def _rest(at_home: TensionSolution) -> list[str]:
+    """Whether the robot can rest at home, or the proof that it cannot."""
+    if at_home.tensions is not None:
+        return [f"  at rest at home: tensions {_range(at_home.tensions.tolist())} N ({at_home.status.value})"]
+    lines = [f"  cannot rest at home ({at_home.status.value})"]
+    if at_home.certificate is not None:
+        lines += [f"    {line}" for line in at_home.certificate.in_words().splitlines()]
+    return lines
+
+
+def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
+    import numpy as np
+
+    from ..figures import robot as figure
+    from ..figures import style
+    from ..models import Dynamics
+    from ..models.robot import MobileCarrier
+    from ..workspace import hints
+
+    reach = [carrier.reach for carrier in robot.carriers if isinstance(carrier, MobileCarrier)]
+    positions, feasible = hints(Dynamics(robot))
+    sketch = figure.RobotSketch(
+        title=robot.name,
+        anchors=robot.home_anchors,
+        attachments=robot.home_attachments,
+        com=robot.home_com,
+        carriers=robot.carrier_home[:, :3],
+        names=[carrier.name for carrier in robot.carriers],
+        boxes=[(np.array(box.min), np.array(box.max)) for box in reach],
+        tensions=at_home.tensions,
+        positions=positions,
+        feasible=feasible,
+    )
+    style.save(figure.draw(sketch), file)
 
 
 def _told(values: list[float]) -> str:

@@ -59,7 +59,7 @@ def _problem(
     import numpy as np
 
     from ..models import Dynamics
-    from ..solvers import TensionProblem
+    from ..workspace import pose_problem
 
     at = robot.home if pose is None else numbers("--pose", pose, 6)
     rate = np.zeros(6) if velocity is None else numbers("--velocity", velocity, 6)
@@ -67,11 +67,8 @@ def _problem(
     count = len(robot.carriers)
     carriers = robot.carrier_home if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=count)
     air = None if wind is None else numbers("--wind", wind, 3)
-    dynamics = Dynamics(robot)
-    A = dynamics.wrench_matrix(at, carriers)
-    w = dynamics.required_wrench(at, rate, rate_rate, carriers, wind=air)
-    problem = TensionProblem(A, w, robot.t_min, robot.t_max, length=robot.length)
-    return problem, {"pose": at.tolist(), "wrench": w.tolist()}
+    problem = pose_problem(Dynamics(robot), at, rate, rate_rate, carriers, air)
+    return problem, {"pose": at.tolist(), "wrench": problem.w.tolist()}
 
 
 def _show(robot: Robot, at: dict[str, Any], answer: TensionSolution, methods: dict[str, TensionSolution]) -> None:

@@ -42,8 +42,8 @@ def path(trajectory: xr.Dataset) -> Figure:
     ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
     for axis in "xyz":
         getattr(ax, f"set_{axis}label")(f"{axis} [m]")
-        getattr(ax, f"{axis}axis").set_major_locator(_few_ticks())
-    _equal_scales(ax, np.concatenate([position, carriers.reshape(-1, 3)]))
+        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    equal_scales(ax, np.concatenate([position, carriers.reshape(-1, 3)]))
     ax.legend(fontsize="small", loc="upper left")
     return canvas
 
@@ -121,7 +121,7 @@ def _draw_limit(ax: Axes, value: float, text: str, above: bool) -> None:
     ax.annotate(text, (1, value), xycoords=place, ha="right", va=side, fontsize=8)
 
 
-def _equal_scales(ax: Any, points: np.ndarray) -> None:
+def equal_scales(ax: Any, points: np.ndarray) -> None:
     """The same scale on all three axes, so that a circle is a circle."""
     low, high = points.min(axis=0), points.max(axis=0)
     half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
@@ -130,7 +130,8 @@ def _equal_scales(ax: Any, points: np.ndarray) -> None:
     ax.set_box_aspect((1, 1, 1))
 
 
-def _few_ticks() -> MaxNLocator:
+def few_ticks() -> MaxNLocator:
+    """Tick marks that leave a small 3-D axis legible."""
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(4, prune="both")

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from .dynamics import Dynamics
-from .kinematics import transform
 from .robot import Robot
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value; exact singularities come out near 1e-16
@@ -26,11 +24,11 @@ class Diagnosis:
     rank_level, rank_tilted
         Largest rank among seeded random poses about home, unrotated and rotated.
     singular_values
-        Of the wrench matrix at home with moments divided by `Robot.length`, largest first.
+        Of the wrench matrix's rows that count, at home with moments divided by `Robot.length`, largest first.
     lengths
         Cable lengths at home [m].
     reason
-        Why the rank is below six, empty if it is not.
+        Why the rank is below the platform's degrees of freedom, empty if it is not.
     warnings
         Sentences on numbers that can be computed with but are hard to believe.
     """
@@ -48,18 +46,19 @@ def diagnose(robot: Robot) -> Diagnosis:
     """Diagnose `robot` at its home pose, with its carriers at home."""
     dynamics = Dynamics(robot)
     scale = np.array([1.0, 1, 1, robot.length, robot.length, robot.length])[:, None]
-    A = dynamics.wrench_matrix(robot.home) / scale
+    rows = robot.dof_mask[:, None]
+    A = dynamics.wrench_matrix(robot.home) / scale * rows
     lengths = dynamics.cable_lengths(robot.home)
-    singular_values = np.linalg.svd(A, compute_uv=False)
+    singular_values = np.linalg.svd(A, compute_uv=False)[: len(robot.platform.dof)]
     level, tilted = _poses_about_home(robot, lengths)
     rank = _rank(A)
     return Diagnosis(
         rank=rank,
-        rank_level=int(_ranks(dynamics.wrench_matrix(level) / scale).max()),
-        rank_tilted=int(_ranks(dynamics.wrench_matrix(tilted) / scale).max()),
+        rank_level=int(_ranks(dynamics.wrench_matrix(level) / scale * rows).max()),
+        rank_tilted=int(_ranks(dynamics.wrench_matrix(tilted) / scale * rows).max()),
         singular_values=singular_values,
         lengths=lengths,
-        reason=_why(robot, A, rank, lengths) if rank < 6 else "",
+        reason=_why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else "",
         warnings=_implausible(robot),
     )
 
@@ -67,10 +66,10 @@ def diagnose(robot: Robot) -> Diagnosis:
 def _poses_about_home(robot: Robot, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(0)
     level = np.tile(robot.home, (LEVEL_POSES, 1))
-    level[:, :3] += rng.uniform(-0.2, 0.2, size=(LEVEL_POSES, 3)) * lengths.min()
+    level[:, :3] += robot.dof_mask[:3] * rng.uniform(-0.2, 0.2, size=(LEVEL_POSES, 3)) * lengths.min()
     level[:, 3:] = 0
     tilted = level.copy()
-    tilted[:, 3:] = rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
+    tilted[:, 3:] = robot.dof_mask[3:] * rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
     return level, tilted
 
 
@@ -84,9 +83,9 @@ def _rank(A: np.ndarray) -> int:
 
 
 def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
-    """The reason for a rank below six, from the cable lines at home."""
+    """The reason for a rank below the degrees of freedom, from the cable lines at home."""
     directions = A[:3].T  # (m, 3)
-    points = _attachment_points(robot)
+    points = robot.home_attachments
     projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     spread = np.linalg.svd(directions, compute_uv=False)
     if spread[1:].max(initial=0.0) < RANK_TOLERANCE * spread[0]:
@@ -95,16 +94,13 @@ def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
     distance = np.linalg.norm((projectors @ (meeting - points)[:, :, None])[:, :, 0], axis=1)
     if distance.max() < RANK_TOLERANCE * lengths.max():
         return f"all cable lines meet in one point, {_told(meeting)} m, so no cable has a moment about it"
-    if rank == min(6, robot.m) == robot.m:
-        return f"{robot.m} cables span at most {robot.m} of 6 directions"
-    free = np.linalg.svd(A)[0][:, rank:]
+    if rank == robot.m:
+        return f"{robot.m} cables span at most {robot.m} of {len(robot.platform.dof)} directions"
+    moving = np.flatnonzero(robot.dof_mask)
+    free = np.eye(6)[:, moving] @ np.linalg.svd(A[moving])[0][:, rank:]
     if free.shape[1] == 1:
         return f"no cable resists {_motion(free[:, 0], robot)}"
     return f"no cable resists {free.shape[1]} independent motions"
-
-
-def _attachment_points(robot: Robot) -> np.ndarray:
-    return transform(ca.DM(robot.home), robot.attachments).full().T  # (m, 3)
 
 
 def _motion(twist: np.ndarray, robot: Robot) -> str:
@@ -138,9 +134,28 @@ def _implausible(robot: Robot) -> list[str]:
             f"platform.inertia: {moments[2]:.3g} kg m^2 at {robot.platform.mass:g} kg is a gyration radius of "
             f"{gyration:.2g} m, but no attachment is farther than {robot.length:.2g} m from the CoM"
         )
+    if robot.m >= 3 and not _com_between_attachments(robot):
+        warnings.append(
+            "platform.com: seen from above it lies outside the attachments, so hanging cables cannot hold it level"
+        )
     warnings.extend(
         f"cables[{index}]: t_min equals t_max, {cable.t_max:g} N"
         for index, cable in enumerate(robot.cables)
         if cable.t_min == cable.t_max
     )
     return warnings
+
+
+def _com_between_attachments(robot: Robot) -> bool:
+    """Whether the CoM lies in the convex hull of the attachments along gravity, with the platform at home."""
+    down = np.array(robot.gravity)
+    if not np.linalg.norm(down) > 0:
+        return True
+    # The directions from the CoM to the attachments, seen along gravity, must not fit into a half plane.
+    across = np.linalg.svd(down[None])[2][1:]  # (2, 3) basis of the plane
+    seen = (robot.home_attachments - robot.home_com) @ across.T
+    if (np.linalg.norm(seen, axis=1) < 1e-9 * robot.length).any():
+        return True
+    angles = np.sort(np.arctan2(seen[:, 1], seen[:, 0]))
+    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+    return bool(gaps.max() <= np.pi + 1e-9)

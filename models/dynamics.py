@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ..errors import InputError
-from . import kinematics, relative, rigid_body, wind
+from . import elasticity, forward, kinematics, rigid_body, wind
 from .batch import call
-from .robot import Robot
-
-Array = Any  # np.ndarray with leading batch dimensions in and out, or a CasADi expression in and out
+from .relative_dynamics import Array, RelativeDynamics
+from .robot import QuadrotorCarrier, Robot
 
 
 class Dynamics:
@@ -56,7 +54,8 @@ class Dynamics:
         InputError
             If an argument has a wrong shape or a value that is not finite.
         """
-        return call(self.functions["wrench_matrix"], {"pose": pose, "carrier_pose": self._carriers(carrier_pose)})["A"]
+        arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
+        return call(self.functions["wrench_matrix"], arguments, matrices=("A",))["A"]
 
     def cable_lengths(self, pose: Array, carrier_pose: Array | None = None) -> Array:
         """Distance from anchor to attachment of each cable [m], (..., m). Arguments as in `wrench_matrix`."""
@@ -109,6 +108,143 @@ class Dynamics:
         arguments = {"pose": pose, "velocity": velocity, "wind": wind}
         return call(self._aerodynamic, arguments)["W_e"]
 
+    def acceleration(
+        self,
+        pose: Array,
+        velocity: Array,
+        tensions: Array,
+        carrier_pose: Array | None = None,
+        wind: Array | None = None,
+    ) -> Array:
+        """Forward dynamics: the second time derivative of `pose` under the tensions, (..., 6) [m/s^2, rad/s^2].
+
+        Parameters
+        ----------
+        pose, velocity
+            (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivative, (..., 6).
+        tensions
+            (..., m) [N]; taken as they are, also beyond their limits.
+        carrier_pose
+            (..., c, 6); None: at home.
+        wind
+            Velocity of the air in {G} [m/s], (..., 3); None: no air at all.
+        """
+        arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
+        arguments["carrier_pose"] = self._carriers(carrier_pose)
+        if wind is None:
+            return call(self.functions["acceleration"], arguments)["acceleration"]
+        return call(self._acceleration_in_wind, arguments | {"wind": wind})["acceleration"]
+
+    def coupled_acceleration(
+        self,
+        pose: Array,
+        velocity: Array,
+        carrier_pose: Array,
+        carrier_velocity: Array,
+        tensions: Array,
+        thrust: Array,
+        torque: Array,
+    ) -> tuple[Array, Array]:
+        """Forward dynamics of platform and quadrotor carriers as one system: each cable pulls at both of its ends.
+
+        Parameters
+        ----------
+        pose, velocity
+            Of the platform frame in {G}, (..., 6).
+        carrier_pose, carrier_velocity
+            Of the carriers in {G}, (..., c, 6).
+        tensions
+            (..., m) [N].
+        thrust
+            Of each carrier along its z axis, (..., c) [N].
+        torque
+            Of each carrier about its axes, (..., c, 3) [N m].
+
+        Returns
+        -------
+        Accelerations of the platform, (..., 6), and of the carriers, (..., c, 6); carriers of other kinds have zero.
+        """
+        arguments = {
+            "pose": pose,
+            "velocity": velocity,
+            "carrier_pose": carrier_pose,
+            "carrier_velocity": carrier_velocity,
+            "tensions": tensions,
+            "thrust": thrust,
+            "torque": torque,
+        }
+        result = call(self._coupled, arguments)
+        return result["acceleration"], result["carrier_acceleration"]
+
+    def linearise(
+        self, pose: Array, velocity: Array, tensions: Array, carrier_pose: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Linearised forward dynamics, d(dx)/dt = A dx + B dt about a state x = (pose, velocity) and tensions.
+
+        Returns
+        -------
+        A, (..., 12, 12), and B, (..., 12, m). The tensions stay as they are when the platform moves; for elastic cables
+        see `stiffness`.
+        """
+        arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
+        arguments["carrier_pose"] = self._carriers(carrier_pose)
+        result = call(self._linearisation, arguments, matrices=("B",))
+        return result["A"], result["B"]
+
+    def stiffness(self, pose: Array, tensions: Array, carrier_pose: Array | None = None, elastic: bool = True) -> Array:
+        """Stiffness K about the CoM in {G}, (..., 6, 6) [N/m, N, N m]: a small displacement delta makes -K delta.
+
+        delta is (translation of the CoM [m], rotation vector [rad]).
+
+        Parameters
+        ----------
+        elastic
+            True: the cables stretch, each needs its `stiffness`; False: their tensions stay, only geometry counts.
+
+        Raises
+        ------
+        InputError
+            If `elastic` and a cable has no stiffness.
+        """
+        if elastic:
+            for index, cable in enumerate(self.robot.cables):
+                if cable.stiffness is None:
+                    raise InputError(
+                        f"cables[{index}].stiffness: robot {self.robot.name!r} has none; accepted: E A > 0 [N] for "
+                        "every cable, or elastic=False"
+                    )
+        arguments = {"pose": pose, "tensions": tensions, "carrier_pose": self._carriers(carrier_pose)}
+        return call(self._stiffness if elastic else self._tension_stiffness, arguments)["K"]
+
+    def natural_frequencies(
+        self, pose: np.ndarray, tensions: np.ndarray, carrier_pose: np.ndarray | None = None, elastic: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Natural frequencies of small motions about an equilibrium, undamped.
+
+        Parameters
+        ----------
+        pose, tensions, carrier_pose
+            An equilibrium: (6,), (m,) [N] and (c, 6). Cables with zero tension are slack and do not count.
+        elastic
+            False: inextensible cables, which leave 6 - rank motions (none if the platform is held on all sides).
+
+        Returns
+        -------
+        Frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
+        translation of the CoM [m] and rotation vector [rad] in {G}.
+        """
+        tensions = np.asarray(tensions, dtype=float)
+        K = self.stiffness(pose, tensions, carrier_pose, elastic=elastic)
+        rows = np.flatnonzero(self.robot.dof_mask)
+        free = np.eye(6)[:, rows]
+        if not elastic:
+            taut = tensions > 1e-9 * max(tensions.max(initial=0.0), 1e-300)
+            A = self.wrench_matrix(pose, carrier_pose)[rows][:, taut]
+            U, sigma, _ = np.linalg.svd(A)
+            rank = int((sigma > 1e-9 * sigma.max(initial=1e-300)).sum())
+            free = free @ U[:, rank:]
+        return elasticity.frequencies(K, elasticity.spatial_inertia(self.robot, np.asarray(pose, dtype=float)), free)
+
     @cached_property
     def relative(self) -> RelativeDynamics:
         """The form of paper F, in the frame {A} of the robot's only carrier.
@@ -128,6 +264,76 @@ class Dynamics:
         return self.robot.carrier_home if carrier_pose is None else carrier_pose
 
     @cached_property
+    def _acceleration_in_wind(self) -> ca.Function:
+        names = ["pose", "velocity", "tensions", "carrier_pose"]
+        symbols = _symbols(self.robot, names)
+        pose, velocity, tensions, carriers = symbols
+        air = ca.SX.sym("wind", 3)
+        pull = self.wrench_matrix(pose, carriers) @ tensions
+        wrench = pull + wind.aerodynamic_wrench(self.robot, pose, velocity, air)
+        acceleration = forward.platform_acceleration(self.robot, pose, velocity, wrench)
+        return ca.Function("acceleration_in_wind", [*symbols, air], [acceleration], [*names, "wind"], ["acceleration"])
+
+    @cached_property
+    def _coupled(self) -> ca.Function:
+        robot = self.robot
+        names = ["pose", "velocity", "tensions", "carrier_pose", "carrier_velocity"]
+        symbols = _symbols(robot, names)
+        pose, velocity, tensions, carriers, rates = symbols
+        thrust, torque = ca.SX.sym("thrust", self._count), ca.SX.sym("torque", self._count, 3)
+        A = self.wrench_matrix(pose, carriers)
+        accelerations = []
+        for index, carrier in enumerate(robot.carriers):
+            if isinstance(carrier, QuadrotorCarrier):
+                at, rate = carriers[index, :].T, rates[index, :].T
+                pull = forward.pull_on_carrier(robot, index, A, at, tensions)
+                inputs = (thrust[index], torque[index, :].T)
+                accelerations.append(
+                    forward.quadrotor_acceleration(carrier, np.array(robot.gravity), at, rate, *inputs, pull).T
+                )
+            else:
+                accelerations.append(ca.SX.zeros(1, 6))
+        acceleration = forward.platform_acceleration(robot, pose, velocity, A @ tensions)
+        outputs = [acceleration, ca.vertcat(*accelerations)]
+        return ca.Function(
+            "coupled_acceleration",
+            [*symbols, thrust, torque],
+            outputs,
+            [*names, "thrust", "torque"],
+            ["acceleration", "carrier_acceleration"],
+        )
+
+    @cached_property
+    def _linearisation(self) -> ca.Function:
+        names = ["pose", "velocity", "tensions", "carrier_pose"]
+        symbols = _symbols(self.robot, names)
+        pose, velocity, tensions, carriers = symbols
+        state = ca.vertcat(pose, velocity)
+        rate = ca.vertcat(velocity, self.acceleration(pose, velocity, tensions, carriers))
+        outputs = [ca.densify(ca.jacobian(rate, state)), ca.densify(ca.jacobian(rate, tensions))]
+        return ca.Function("linearisation", symbols, outputs, names, ["A", "B"])
+
+    @cached_property
+    def _tension_stiffness(self) -> ca.Function:
+        names = ["pose", "tensions", "carrier_pose"]
+        symbols = _symbols(self.robot, names)
+        pose, tensions, carriers = symbols
+        owner = self.robot.carrier_of_cable
+        anchors = kinematics.anchors(self.robot.anchors, owner, carriers)
+        axes = kinematics.axes(self.robot.pulley_axes, owner, carriers)
+        K = elasticity.tension_stiffness(self.robot, pose, anchors, axes, tensions)
+        return ca.Function("tension_stiffness", symbols, [K], names, ["K"])
+
+    @cached_property
+    def _stiffness(self) -> ca.Function:
+        names = ["pose", "tensions", "carrier_pose"]
+        symbols = _symbols(self.robot, names)
+        pose, tensions, carriers = symbols
+        A, lengths = self.wrench_matrix(pose, carriers), self.cable_lengths(pose, carriers)
+        K = self._tension_stiffness(*symbols) + elasticity.cable_stiffness(self.robot, A, lengths, tensions)
+        return ca.Function("stiffness", symbols, [K], names, ["K"])
+
+    @cached_property
     def _aerodynamic(self) -> ca.Function:
         pose, velocity, air = ca.SX.sym("pose", 6), ca.SX.sym("velocity", 6), ca.SX.sym("wind", 3)
         W_e = wind.aerodynamic_wrench(self.robot, pose, velocity, air)
@@ -142,138 +348,29 @@ class Dynamics:
         return ca.Function("required_wrench_in_wind", [*inputs, air], [w], [*still.name_in(), "wind"], ["w"])
 
 
-class RelativeDynamics:
-    """Paper F's form of the dynamics: everything in {A}, the carrier's motion apart in D_B (paper F, Eq. 38).
-
-    `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, as seen in {A}; `carrier_*`
-    are those of {A} in {G}. Each is (..., 6), a single carrier having no row of its own.
-
-    Attributes
-    ----------
-    functions
-        The CasADi Functions by name, with named inputs and outputs.
-    """
-
-    def __init__(self, robot: Robot):
-        if len(robot.carriers) != 1:
-            raise InputError(
-                f"relative: robot {robot.name!r} has {len(robot.carriers)} carriers; accepted: robots with one carrier"
-            )
-        self.robot = robot
-        self.functions: dict[str, ca.Function] = _relative_functions(robot)
-
-    def wrench_matrix(self, pose: Array) -> Array:
-        """Wrench matrix A in {A}, (..., 6, m); it depends on the relative pose alone."""
-        return call(self.functions["wrench_matrix"], {"pose": pose})["A"]
-
-    def base_disturbance(
-        self,
-        pose: Array,
-        velocity: Array,
-        carrier_pose: Array | None = None,
-        carrier_velocity: Array | None = None,
-        carrier_acceleration: Array | None = None,
-    ) -> Array:
-        """D_B, the coupled quadrotor-disturbance term: force [N] and moment about the CoM [N m] in {A}, (..., 6).
-
-        The weight is part of it (D_F has - m R_A^T g), as in paper F. None: carrier at home and at rest.
-        """
-        arguments = {"pose": pose, "velocity": velocity}
-        arguments |= self._carrier(carrier_pose, carrier_velocity, carrier_acceleration)
-        return call(self.functions["base_disturbance"], arguments)["D_B"]
-
-    def required_wrench(
-        self,
-        pose: Array,
-        velocity: Array,
-        acceleration: Array,
-        carrier_pose: Array | None = None,
-        carrier_velocity: Array | None = None,
-        carrier_acceleration: Array | None = None,
-        wind: Array | None = None,
-    ) -> Array:
-        """M_B ddX_b + F_B + D_B - W_e: force [N] and moment about the CoM [N m] in {A}, (..., 6).
-
-        `wind` is the velocity of the air in {G} [m/s], (..., 3); None: no air at all.
-        """
-        arguments = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
-        arguments |= self._carrier(carrier_pose, carrier_velocity, carrier_acceleration)
-        if wind is None:
-            return call(self.functions["required_wrench"], arguments)["w"]
-        return call(self._in_wind, arguments | {"wind": wind})["w"]
-
-    def motion_in_world(
-        self,
-        pose: Array,
-        velocity: Array,
-        acceleration: Array,
-        carrier_pose: Array | None = None,
-        carrier_velocity: Array | None = None,
-        carrier_acceleration: Array | None = None,
-    ) -> tuple[Array, Array, Array]:
-        """Pose, velocity and acceleration of the platform frame in {G}, (..., 6) each.
-
-        The Euler angles lie in (-pi, pi], so that a series of them may jump by 2 pi; `numpy.unwrap` undoes it.
-        """
-        arguments = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
-        arguments |= self._carrier(carrier_pose, carrier_velocity, carrier_acceleration)
-        motion = call(self.functions["motion_in_world"], arguments)
-        return motion["pose_G"], motion["velocity_G"], motion["acceleration_G"]
-
-    def _carrier(self, pose: Array | None, velocity: Array | None, acceleration: Array | None) -> dict[str, Array]:
-        return {
-            "carrier_pose": self.robot.carrier_home[0] if pose is None else pose,
-            "carrier_velocity": np.zeros(6) if velocity is None else velocity,
-            "carrier_acceleration": np.zeros(6) if acceleration is None else acceleration,
-        }
-
-    @cached_property
-    def _in_wind(self) -> ca.Function:
-        still = self.functions["required_wrench"]
-        inputs = [ca.SX.sym(name, *still.size_in(name)) for name in still.name_in()]
-        air = ca.SX.sym("wind", 3)
-        pose_G, velocity_G, _ = relative.motion_in_world(*inputs)
-        W_e = wind.aerodynamic_wrench(self.robot, pose_G, velocity_G, air)
-        R_A = kinematics.rotation(inputs[3][3:6])
-        in_A = ca.vertcat(R_A.T @ W_e[0:3], R_A.T @ W_e[3:6])
-        names = [*still.name_in(), "wind"]
-        return ca.Function("relative_required_wrench_in_wind", [*inputs, air], [still(*inputs) - in_A], names, ["w"])
+def _symbols(robot: Robot, names: list[str]) -> list[ca.SX]:
+    """Symbols of the shapes that these arguments have."""
+    count = len(robot.carriers)
+    shapes = {"tensions": (robot.m, 1)}
+    return [ca.SX.sym(name, *shapes.get(name, (count, 6) if name.startswith("carrier") else (6, 1))) for name in names]
 
 
 def _world_functions(robot: Robot) -> dict[str, ca.Function]:
-    count = len(robot.carriers)
-    pose, velocity, acceleration = (ca.SX.sym(name, 6) for name in ("pose", "velocity", "acceleration"))
-    carriers = [ca.SX.sym(f"carrier_{name}", count, 6) for name in ("pose", "velocity", "acceleration")]
-    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers[0])
-    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, anchors)
-    lengths = kinematics.norms(kinematics.cable_vectors(robot.attachments, pose, anchors))
-    w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
-    place = ["pose", "carrier_pose"]
-    motion = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
-    return {
-        "wrench_matrix": ca.Function("wrench_matrix", [pose, carriers[0]], [A], place, ["A"]),
-        "cable_lengths": ca.Function("cable_lengths", [pose, carriers[0]], [lengths], place, ["lengths"]),
-        "required_wrench": ca.Function(
-            "required_wrench", [pose, velocity, acceleration, *carriers], [w], motion, ["w"]
-        ),
-    }
-
-
-def _relative_functions(robot: Robot) -> dict[str, ca.Function]:
     names = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
-    motion = [ca.SX.sym(name, 6) for name in names]
-    pose, velocity, acceleration, *carrier = motion
-    anchors = ca.SX(robot.anchors.T)
-    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, anchors)
-    D_B = relative.base_disturbance(robot, pose, velocity, *carrier)
-    w = relative.relative_inertial_wrench(robot, pose, velocity, acceleration) + D_B
-    in_world = relative.motion_in_world(*motion)
-    disturbing = [name for name in names if name != "acceleration"]
+    motion = _symbols(robot, names)
+    pose, velocity, acceleration, carriers = motion[:4]
+    (tensions,) = _symbols(robot, ["tensions"])
+    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
+    axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, carriers)
+    run = kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii)
+    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, run.directions)
+    w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
+    forward_acceleration = forward.platform_acceleration(robot, pose, velocity, A @ tensions)
+    place, state = [pose, carriers], [pose, velocity, tensions, carriers]
+    place_names, state_names = ["pose", "carrier_pose"], ["pose", "velocity", "tensions", "carrier_pose"]
     return {
-        "wrench_matrix": ca.Function("relative_wrench_matrix", [pose], [A], ["pose"], ["A"]),
-        "base_disturbance": ca.Function("base_disturbance", [pose, velocity, *carrier], [D_B], disturbing, ["D_B"]),
-        "required_wrench": ca.Function("relative_required_wrench", motion, [w], names, ["w"]),
-        "motion_in_world": ca.Function(
-            "motion_in_world", motion, list(in_world), names, ["pose_G", "velocity_G", "acceleration_G"]
-        ),
+        "wrench_matrix": ca.Function("wrench_matrix", place, [A], place_names, ["A"]),
+        "cable_lengths": ca.Function("cable_lengths", place, [run.lengths], place_names, ["lengths"]),
+        "required_wrench": ca.Function("required_wrench", motion, [w], names, ["w"]),
+        "acceleration": ca.Function("acceleration", state, [forward_acceleration], state_names, ["acceleration"]),
     }

@@ -31,14 +31,24 @@ def load(name: str | os.PathLike[str]) -> Robot:
     InputError
         If there is no such robot or file, or the file is not a valid robot: one line with file, field and value.
     """
-    text = os.fspath(name)
+    try:
+        text = os.fspath(name)
+    except TypeError:
+        raise InputError(f"robot: {name!r}; accepted: a name or a path") from None
     if text in available():
         return read_yaml(LIBRARY / f"{text}.yaml", Robot)
     path = Path(text)
-    if path.suffix in (".yaml", ".yml") or path.exists():
+    if path.suffix in (".yaml", ".yml") or _exists(path):
         return read_yaml(path, Robot)
     close = difflib.get_close_matches(text, available(), n=1)
     hint = f", did you mean {close[0]!r}?" if close else ""
     raise InputError(
         f"robot: {text!r} is unknown{hint}; accepted: {', '.join(available())}, or the path of a YAML file"
     )
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # too long for a file name, or with a NUL in it: no file has that name
+        return False

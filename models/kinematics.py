@@ -14,11 +14,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from .cables.pulley import Exit, exit_points
 from .rotation import Matrix, rotation
 
 
 def transform(pose: Matrix, points: np.ndarray) -> Matrix:
-    """x + R p of each row p of `points` (k, 3), as columns (3, k), in the frame that `pose` (6, 1) is given in [m]."""
+    """Place x + R p of each row p of `points` (k, 3), as columns (3, k), in the frame of `pose` (6, 1) [m]."""
     return rotation(pose[3:6]) @ ca.DM(points.T) + pose[0:3]
 
 
@@ -30,20 +31,23 @@ def anchors(points: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matr
     return ca.horzcat(*columns)
 
 
-def cable_vectors(attachments: np.ndarray, pose: Matrix, anchor_points: Matrix) -> Matrix:
-    """l_i = A_i - B_i, (3, m), in [m], for anchors (3, m) in the frame that `pose` (6, 1) is given in."""
-    return anchor_points - transform(pose, attachments)
+def axes(directions: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
+    """Swivel axes in {G}, (3, m), of `directions` (m, 3) in the frames of their carriers at `carrier_pose` (c, 6)."""
+    columns = []
+    for direction, carrier in zip(directions, carrier_of_cable, strict=True):
+        columns.append(rotation(carrier_pose[int(carrier), 3:6].T) @ ca.DM(direction))
+    return ca.horzcat(*columns)
 
 
-def norms(vectors: Matrix) -> Matrix:
-    """Euclidean length of each column, (m, 1)."""
-    return ca.sqrt(ca.sum1(vectors**2)).T
+def cables(
+    attachments: np.ndarray, pose: Matrix, anchor_points: Matrix, axis_directions: Matrix, radii: np.ndarray
+) -> Exit:
+    """How the cables run, in the frame that `pose` (6, 1), anchors (3, m) and axes (3, m) are given in; see `Exit`."""
+    return exit_points(anchor_points, axis_directions, radii, transform(pose, attachments))
 
 
-def wrench_matrix(attachments: np.ndarray, com: np.ndarray, pose: Matrix, anchor_points: Matrix) -> Matrix:
+def wrench_matrix(attachments: np.ndarray, com: np.ndarray, pose: Matrix, directions: Matrix) -> Matrix:
     """A, (6, m): force [N per N] and moment about the CoM [N m per N] of each cable, in the frame of `pose`."""
-    vectors = cable_vectors(attachments, pose, anchor_points)
-    directions = vectors / ca.repmat(norms(vectors).T, 3, 1)
     arms = rotation(pose[3:6]) @ ca.DM((attachments - com).T)  # (3, m)
     moments = [ca.cross(arms[:, i], directions[:, i]) for i in range(len(attachments))]
     return ca.vertcat(directions, ca.horzcat(*moments))

@@ -7,14 +7,34 @@ with R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
-Finite = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+from ..errors import InputError
+
+LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
+
+
+def _plain_number(value: Any) -> Any:
+    if isinstance(value, bool | str):
+        raise ValueError(f"accepted: a number, not {'text' if isinstance(value, str) else 'true or false'}")
+    return value
+
+
+Finite = Annotated[float, BeforeValidator(_plain_number), Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, BeforeValidator(_plain_number), Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Vector3 = tuple[Finite, Finite, Finite]
 Pose = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 Inertia = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
@@ -27,6 +47,22 @@ class Part(BaseModel):
     """What all parts share: they do not change, and a key that is not theirs is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """Check a mapping, as pydantic does, but with towline's errors.
+
+        Raises
+        ------
+        InputError
+            In one line that names the field, the value and what is accepted.
+        """
+        from .parsing import one_line
+
+        try:
+            return super().model_validate(obj, **options)
+        except ValidationError as error:
+            raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
 
 
 class Aero(Part):
@@ -45,7 +81,7 @@ class Aero(Part):
     )
 
 
-def _positive_definite(inertia: Inertia) -> Inertia:
+def _check_positive_definite(inertia: Inertia) -> Inertia:
     smallest = float(np.linalg.eigvalsh(inertia_matrix(inertia))[0])
     if not smallest > 0:
         raise ValueError(
@@ -54,19 +90,46 @@ def _positive_definite(inertia: Inertia) -> Inertia:
     return inertia
 
 
+BodyInertia = Annotated[Inertia, AfterValidator(_check_positive_definite)]
+Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
+COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
 class Platform(Part):
     """The rigid body that the cables pull."""
 
     mass: Positive = Field(description="[kg]")
-    inertia: Annotated[Inertia, AfterValidator(_positive_definite)] = Field(
-        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]"
+    inertia: BodyInertia | None = Field(
+        default=None,
+        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
+        "only a platform that cannot turn may do without",
     )
     com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
     home: Pose | None = Field(
         default=None,
         description="a pose in {G} to start from and to diagnose at [m, rad]; none: level, amid or below the anchors",
     )
+    dof: tuple[Coordinate, ...] = Field(
+        default=COORDINATES,
+        min_length=1,
+        description="coordinates that can move; a point mass has x, y, z. The cables balance only the rows of these",
+    )
     aero: Aero | None = Field(default=None, description="none: no wind force is known")
+
+    @field_validator("dof")
+    @classmethod
+    def _in_order(cls, dof: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
+        if len(set(dof)) != len(dof):
+            raise ValueError("each coordinate may be there once")
+        return tuple(name for name in COORDINATES if name in dof)
+
+    @model_validator(mode="after")
+    def _turns_with_inertia(self) -> Self:
+        if self.inertia is None and any(name in self.dof for name in COORDINATES[3:]):
+            raise ValueError(
+                "inertia is missing; accepted: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2], or a dof without angles"
+            )
+        return self
 
 
 class Carrier(Part):
@@ -118,7 +181,53 @@ class MobileCarrier(Carrier):
         return self
 
 
-AnyCarrier = Annotated[GroundCarrier | PrescribedCarrier | MobileCarrier, Field(discriminator="kind")]
+class QuadrotorCarrier(Carrier):
+    """A flying robot that feels its cables: rigid body, thrust along its z axis, torques about its axes.
+
+    Its frame sits in its CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
+    """
+
+    kind: Literal["quadrotor"]
+    mass: Positive = Field(description="[kg]")
+    inertia: BodyInertia = Field(description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]")
+    thrust_min: NonNegative = Field(default=0.0, description="smallest total thrust [N]")
+    thrust_max: Positive = Field(description="largest total thrust [N]")
+    torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
+    tilt_max: Positive = Field(default=0.6, description="largest angle of its z axis to the vertical [rad]")
+    speed_max: Positive = Field(default=10.0, description="[m/s]")
+    acceleration_max: Positive = Field(default=10.0, description="[m/s^2]")
+
+    @model_validator(mode="after")
+    def _thrusts_in_order(self) -> Self:
+        if self.thrust_min >= self.thrust_max:
+            raise ValueError(
+                f"thrust_min must be below thrust_max, but they are {self.thrust_min:g} N and {self.thrust_max:g} N"
+            )
+        return self
+
+
+AnyCarrier = Annotated[
+    GroundCarrier | PrescribedCarrier | MobileCarrier | QuadrotorCarrier, Field(discriminator="kind")
+]
+
+
+class Pulley(Part):
+    """A swivelling pulley: the cable comes up the swivel axis at the anchor, runs over the sheave, leaves tangentially.
+
+    The sheave's plane holds the axis and turns about it so that it also holds the attachment.
+    """
+
+    radius: Positive = Field(description="of the sheave [m]")
+    axis: Vector3 = Field(
+        default=(0.0, 0.0, 1.0), description="swivel axis in the carrier frame, need not be of unit length"
+    )
+
+    @field_validator("axis")
+    @classmethod
+    def _has_a_direction(cls, axis: Vector3) -> Vector3:
+        if not np.linalg.norm(axis) > 0:
+            raise ValueError("the swivel axis needs a direction")
+        return axis
 
 
 class Cable(Part):
@@ -131,7 +240,8 @@ class Cable(Part):
     t_max: Positive = Field(description="largest tension [N]")
     stiffness: Positive | None = Field(default=None, description="E A [N]; none: the cable does not stretch")
     damping: NonNegative | None = Field(default=None, description="C [N s/m]")
-    pulley: None = Field(default=None, description="null: the anchor is a point")
+    length: Positive | None = Field(default=None, description="[m]; only where the drive keeps it fixed")
+    pulley: Pulley | None = Field(default=None, description="null: the anchor is a point")
 
     @model_validator(mode="after")
     def _limits_in_order(self) -> Self:
@@ -151,6 +261,11 @@ class Robot(Part):
     name: Name
     source: str = Field(min_length=1, description="where the numbers come from, and which are assumed")
     gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
+    drive: Literal["both", "fixed-length", "variable-length"] = Field(
+        default="both",
+        description="what moves (paper C): fixed-length: the carriers alone, each cable keeps its length; "
+        "variable-length: winches alone, mobile carriers stay; both",
+    )
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
     cables: tuple[Cable, ...] = Field(min_length=1)
@@ -159,21 +274,40 @@ class Robot(Part):
     def _parts_fit(self) -> Self:
         names = [carrier.name for carrier in self.carriers]
         for index, name in enumerate(names):
+            if name == "world":
+                raise ValueError(f"carriers[{index}].name: 'world' means the global frame; accepted: any other name")
             if name in names[:index]:
                 raise ValueError(f"carriers[{index}].name: {name!r} is there twice, each carrier needs its own name")
         for index, cable in enumerate(self.cables):
             if cable.carrier not in names:
                 raise ValueError(f"cables[{index}].carrier: {cable.carrier!r} is unknown, accepted: {', '.join(names)}")
-        from . import kinematics  # CasADi is needed only once a whole robot stands
-
-        attachments = kinematics.transform(kinematics.ca.DM(self.home), self.attachments).full().T
-        lengths = np.linalg.norm(self.home_anchors - attachments, axis=1)
+        lengths = np.linalg.norm(self.home_anchors - self.home_attachments, axis=1)
+        if self.drive == "fixed-length":
+            for index, cable in enumerate(self.cables):
+                if cable.length is None:
+                    raise ValueError(f"cables[{index}].length: is missing; drive fixed-length needs a number > 0 [m]")
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(
                 f"cables[{shortest}]: its anchor and attachment coincide at home, a cable needs a length > 0 m"
             )
+        if self.pulley_radii.any():
+            self._check_pulleys()
         return self
+
+    def _check_pulleys(self) -> None:
+        from . import kinematics
+
+        offsets = self.home_attachments - self.home_anchors
+        home = kinematics.ca.DM(self.carrier_home)
+        axes = kinematics.axes(self.pulley_axes, self.carrier_of_cable, home).full().T
+        up = np.sum(offsets * axes, axis=1)
+        across = np.linalg.norm(offsets - up[:, None] * axes, axis=1)
+        outside = (across > 1e-9) & (across**2 - 2 * across * self.pulley_radii + up**2 > 0)
+        for index in np.flatnonzero((self.pulley_radii > 0) & ~outside):
+            raise ValueError(
+                f"cables[{index}].pulley: at home the attachment must lie off the swivel axis and outside the sheave"
+            )
 
     @property
     def m(self) -> int:
@@ -191,6 +325,17 @@ class Robot(Part):
         return np.array([cable.attachment for cable in self.cables])  # (m, 3)
 
     @property
+    def pulley_radii(self) -> np.ndarray:
+        """Radius of each cable's pulley [m], 0 for a point anchor."""
+        return np.array([cable.pulley.radius if cable.pulley else 0.0 for cable in self.cables])  # (m,)
+
+    @property
+    def pulley_axes(self) -> np.ndarray:
+        """Swivel axis of each cable's pulley in the frame of its carrier, of unit length; z for a point anchor."""
+        axes = np.array([cable.pulley.axis if cable.pulley else (0.0, 0.0, 1.0) for cable in self.cables])
+        return axes / np.linalg.norm(axes, axis=1, keepdims=True)  # (m, 3)
+
+    @property
     def carrier_of_cable(self) -> np.ndarray:
         """Index of the carrier that each cable hangs from."""
         names = [carrier.name for carrier in self.carriers]
@@ -205,6 +350,13 @@ class Robot(Part):
     def t_max(self) -> np.ndarray:
         """Largest tensions [N]."""
         return np.array([cable.t_max for cable in self.cables])  # (m,)
+
+    @property
+    def fixed_lengths(self) -> np.ndarray | None:
+        """Lengths that the drive keeps, (m,) [m]; None if winches change them."""
+        if self.drive != "fixed-length":
+            return None
+        return np.array([cable.length for cable in self.cables], dtype=float)
 
     @property
     def carrier_home(self) -> np.ndarray:
@@ -229,14 +381,39 @@ class Robot(Part):
         return kinematics.anchors(self.anchors, self.carrier_of_cable, at_home).full().T  # (m, 3)
 
     @property
+    def home_attachments(self) -> np.ndarray:
+        """Attachments in {G} with the platform at home [m]."""
+        from . import kinematics
+
+        return kinematics.transform(kinematics.ca.DM(self.home), self.attachments).full().T  # (m, 3)
+
+    @property
+    def home_com(self) -> np.ndarray:
+        """CoM in {G} with the platform at home [m]."""
+        from . import kinematics
+
+        com = np.array([self.platform.com])
+        return kinematics.transform(kinematics.ca.DM(self.home), com).full().ravel()  # (3,)
+
+    @property
     def inertia(self) -> np.ndarray:
-        """Inertia matrix I_b about the CoM in platform axes [kg m^2]."""
-        return inertia_matrix(self.platform.inertia)  # (3, 3)
+        """Inertia matrix I_b about the CoM in platform axes [kg m^2], zero for a platform that cannot turn."""
+        return inertia_matrix(self.platform.inertia or (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))  # (3, 3)
+
+    @property
+    def dof_mask(self) -> np.ndarray:
+        """1 for the wrench rows that the cables have to balance, 0 for those of coordinates that cannot move."""
+        return np.array([float(name in self.platform.dof) for name in COORDINATES])  # (6,)
 
     @property
     def weight(self) -> float:
         """Weight of the platform [N]."""
         return float(self.platform.mass * np.linalg.norm(self.gravity))
+
+    @property
+    def force_scale(self) -> float:
+        """A force [N] to measure others by: the weight, or without gravity the mean of the largest tensions."""
+        return self.weight or float(self.t_max.mean())
 
     @property
     def length(self) -> float:

@@ -8,18 +8,24 @@ give inside their limits less the task's margin.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..solvers import Certificate, TensionProblem, solve
+from ..errors import InputError
+from ..solvers import Certificate, solve
+from ..workspace.pose import masked_problem
 from .path import Motion
-from .scenario import Deviation, Scenario
+from .scenario import AUDIT_RATE, Deviation, Scenario
+from .task import FreeBase
 
-RATE = 1000.0  # [1/s]
 TOLERANCE = 1e-6  # [N]
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer cables than degrees of freedom
 LIMIT_TOLERANCE = 1e-6  # relative, of the carriers' own limits
+PATH_TOLERANCE = 1e-7  # [m, rad], of the tube
+END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers start and end
+EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
+LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 
 
 @dataclass(frozen=True)
@@ -38,10 +44,10 @@ class Audit:
         What still counts as none [N].
     tracking_error
         Distance from the path at each time [m].
-    carrier_excess
-        The carriers' own limits that were exceeded: sentences, empty if none.
-    certificate
-        At the time of the worst violation, if there is one.
+    excess
+        Other limits that do not hold (carriers, tube, ends, lengths that the drive keeps): sentences, empty if none.
+    certificate, certificate_time
+        The certificate with the largest shortfall and its time [s]; None if there is none.
     """
 
     rate: float
@@ -53,74 +59,154 @@ class Audit:
     violation: np.ndarray  # (n,)
     tolerance: float
     tracking_error: np.ndarray  # (n,)
-    carrier_excess: list[str] = field(default_factory=list)
+    excess: list[str] = field(default_factory=list)
     certificate: Certificate | None = None
+    certificate_time: float | None = None
 
     @property
     def passed(self) -> bool:
         """Whether nothing is violated anywhere."""
-        return bool(self.violation.max() <= self.tolerance) and not self.carrier_excess
+        return bool(self.violation.max() <= self.tolerance) and not self.excess
 
     @property
     def worst(self) -> int:
-        """Index of the time with the largest violation, or else with the smallest margin."""
+        """Index of the time with the largest violation; of a plan that passed, of its largest rounding error."""
         return int(self.violation.argmax())
 
     def summary(self) -> dict[str, Any]:
-        """{"rate_hz", "worst_violation" [N], "at_s", "tolerance" [N], "carrier_excess"}, ready for JSON."""
+        """{"rate_hz", "worst_violation" [N], "at_s", "tolerance" [N], "excess"}, ready for JSON."""
         return {
             "rate_hz": self.rate,
             "worst_violation": float(self.violation.max()),
             "at_s": float(self.times[self.worst]),
             "tolerance": self.tolerance,
-            "carrier_excess": self.carrier_excess,
+            "excess": self.excess,
         }
 
 
-def audit(scenario: Scenario, deviation: Deviation | None, rate: float = RATE) -> Audit:
-    """Audit the motion that `deviation` (None: the references alone) stands for, at `rate` [1/s]."""
-    count = max(int(np.ceil(scenario.duration * rate)), 1)
-    return examine(scenario, deviation, np.linspace(0.0, scenario.duration, count + 1), rate)
-
-
-def examine(scenario: Scenario, deviation: Deviation | None, times: np.ndarray, rate: float) -> Audit:
-    """Audit the motion at the given times."""
+def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
+    """Audit the motion that `deviation` (None: the references alone) stands for, at `AUDIT_RATE` or a little more."""
+    times = np.linspace(0.0, scenario.duration, scenario.output_samples * _audits_per_output(scenario) + 1)
     robot = scenario.robot
     motion, carriers = scenario.motion(times, deviation)
+    _refuse_zero_lengths(scenario, times, motion, carriers)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
     w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.task.wind)
-    wished = _wished_tensions(deviation, times, robot.m)
-    low, high = scenario.bounds()
-    tensions = np.full((len(times), robot.m), np.nan)
-    violation = np.zeros(len(times))
-    worst: Certificate | None = None
-    for k in range(len(times)):
-        t_ref = None if wished is None else wished[k]
-        solution = solve(TensionProblem(A[k], w[k], low, high, t_ref=t_ref, length=robot.length))
-        if solution.tensions is not None:
-            tensions[k] = solution.tensions
-            violation[k] = solution.residual
-        elif solution.certificate is not None:
-            violation[k] = solution.certificate.shortfall
-            if solution.certificate.singular and robot.m < 6:
-                tensions[k] = solution.certificate.closest
-            if worst is None or solution.certificate.shortfall > worst.shortfall:
-                worst = solution.certificate
-        else:
-            violation[k] = np.inf
+    verdict = _distribute(scenario, A, w, _wished_tensions(deviation, times, robot.m))
+    off_path = scenario.off_path(times, motion, carriers)
+    excess = _carrier_excess(scenario, carriers) + _length_excess(scenario, motion, carriers)
+    dof = len(robot.platform.dof)
     return Audit(
-        rate=rate,
+        rate=(len(times) - 1) / scenario.duration,
         times=times,
         motion=motion,
         carriers=carriers,
-        tensions=tensions,
+        tensions=verdict.tensions,
         tensions_unlimited=(np.linalg.pinv(A, rcond=1e-9) @ w[..., None])[..., 0],
-        violation=violation,
-        tolerance=TOLERANCE if robot.m >= 6 else UNDERACTUATED_TOLERANCE * robot.weight,
-        tracking_error=scenario.tracking_error(times, deviation),
-        carrier_excess=_carrier_excess(scenario, carriers),
-        certificate=worst,
+        violation=verdict.violation,
+        tolerance=TOLERANCE if robot.m >= dof else UNDERACTUATED_TOLERANCE * robot.force_scale,
+        tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
+        excess=excess + _path_excess(scenario, off_path) + _end_excess(scenario, carriers),
+        certificate=verdict.certificate,
+        certificate_time=None if verdict.at is None else float(times[verdict.at]),
     )
+
+
+def _audits_per_output(scenario: Scenario) -> int:
+    """How many audited instants each sample of the output stands for: the saved instants are audited ones."""
+    return max(int(np.ceil(AUDIT_RATE * scenario.duration / scenario.output_samples - 1e-9)), 1)
+
+
+class _Verdict(NamedTuple):
+    tensions: np.ndarray  # (n, m)
+    violation: np.ndarray  # (n,)
+    certificate: Certificate | None
+    at: int | None  # row of the certificate
+
+
+def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.ndarray | None) -> _Verdict:
+    """Tensions of every instant, or how much is missing; the certificate of the worst.
+
+    Where the tensions nearest to the wished ones, without limits, happen to lie inside the limits they are the answer:
+    a batch of pseudo-inverses finds those. The exact solver judges the others one by one.
+    """
+    robot, (low, high) = scenario.robot, scenario.bounds()
+    scale = robot.dof_mask / np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    scaled_A, scaled_w = A * scale[:, None], w * scale
+    wish = np.zeros((len(w), robot.m)) if wished is None else wished
+    missing = scaled_w - np.einsum("nij,nj->ni", scaled_A, wish)
+    tensions = wish + (np.linalg.pinv(scaled_A, rcond=1e-9) @ missing[..., None])[..., 0]
+    violation = np.linalg.norm(scaled_w - np.einsum("nij,nj->ni", scaled_A, tensions), axis=1)
+    inside = ((tensions >= low) & (tensions <= high)).all(axis=1)
+    exact = violation <= EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1))
+    worst: Certificate | None = None
+    at: int | None = None
+    for k in np.flatnonzero(~(inside & exact)):
+        solution = solve(masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k]))
+        certificate = solution.certificate
+        tensions[k] = np.nan if solution.tensions is None else solution.tensions
+        if solution.tensions is not None:
+            violation[k] = solution.residual
+        elif certificate is None:
+            violation[k] = np.inf
+        else:
+            if certificate.singular and robot.m < len(robot.platform.dof):
+                tensions[k] = certificate.closest
+            violation[k] = certificate.shortfall
+            if worst is None or certificate.shortfall > worst.shortfall:
+                worst, at = certificate, int(k)
+    return _Verdict(tensions, violation, worst, at)
+
+
+def _refuse_zero_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion) -> None:
+    lengths = scenario.dynamics.cable_lengths(motion.pose, carriers.pose)
+    if (lengths > 1e-9).all():
+        return
+    row, cable = np.argwhere(~(lengths > 1e-9))[0]
+    raise InputError(
+        f"task {scenario.task.name!r}: path: at t = {times[row]:.3f} s anchor and attachment of cable {cable + 1} "
+        "coincide; accepted: paths on which every cable has a length"
+    )
+
+
+def _path_excess(scenario: Scenario, off_path: np.ndarray) -> list[str]:
+    """Whether the platform leaves its tube, one sentence each for position and attitude."""
+    tube, found = scenario.task.tube, []
+    away = float(np.linalg.norm(off_path[:, :3], axis=1).max())
+    if away > tube.position + PATH_TOLERANCE:
+        found.append(f"platform: {away:.6g} m off its path exceeds the tube's {tube.position:g} m")
+    turned = float(np.abs(off_path[:, 3:]).max())
+    if turned > tube.attitude + PATH_TOLERANCE:
+        found.append(f"platform: {turned:.6g} rad off its path exceeds the tube's {tube.attitude:g} rad")
+    return found
+
+
+def _end_excess(scenario: Scenario, carriers: Motion) -> list[str]:
+    """Whether free carriers start and end as the task says."""
+    base = scenario.task.base
+    if not isinstance(base, FreeBase):
+        return []
+    found = []
+    moving = sorted({index for index, _ in scenario.carrier_free})
+    speed = np.abs(carriers.velocity[[0, -1]][:, moving]).max()
+    if base.ends == "rest" and speed > END_TOLERANCE:
+        found.append(f"carriers: {speed:.3g} m/s at an end, which should be at rest")
+    gap = max(np.abs(part[0, moving] - part[-1, moving]).max() for part in carriers)
+    if base.ends == "periodic" and gap > END_TOLERANCE:
+        found.append(f"carriers: end {gap:.3g} away from where they started, in m, m/s or m/s^2")
+    return found
+
+
+def _length_excess(scenario: Scenario, motion: Motion, carriers: Motion) -> list[str]:
+    """Which cables leave the length that the drive keeps, one sentence each."""
+    kept = scenario.robot.fixed_lengths
+    if kept is None:
+        return []
+    off = np.abs(scenario.dynamics.cable_lengths(motion.pose, carriers.pose) - kept).max(axis=0)
+    return [
+        f"cable {i + 1}: its length is up to {off[i]:.3g} m off the fixed {kept[i]:g} m"
+        for i in np.flatnonzero(off > LENGTH_TOLERANCE)
+    ]
 
 
 def _wished_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> np.ndarray | None:
@@ -131,23 +217,24 @@ def _wished_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> 
 
 
 def _carrier_excess(scenario: Scenario, carriers: Motion) -> list[str]:
-    """Which limits of free carriers do not hold on the dense grid, one sentence each."""
+    """Which limits of carriers do not hold on the dense grid, one sentence each."""
     found = []
     for index, limit in scenario.limits.items():
         name = scenario.robot.carriers[index].name
         pose, velocity, acceleration = (part[:, index] for part in carriers)
-        largest = {
-            "acceleration": (np.linalg.norm(acceleration[:, :3], axis=1).max(), limit.acceleration, "m/s^2"),
-            "speed": (np.linalg.norm(velocity[:, :3], axis=1).max(), limit.speed, "m/s"),
+        tilt = np.arccos(np.clip(np.cos(pose[:, 3]) * np.cos(pose[:, 4]), -1, 1))
+        checks = {
+            "acceleration": (np.linalg.norm(acceleration[:, :3], axis=1), limit.acceleration, "m/s^2"),
+            "speed": (np.linalg.norm(velocity[:, :3], axis=1), limit.speed, "m/s"),
+            "tilt": (tilt, limit.tilt, "rad"),
+            "turn acceleration": (np.abs(acceleration[:, 3:5]).max(axis=1), limit.turn_acceleration, "rad/s^2"),
         }
-        if limit.tilt > 0:
-            tilt = np.arccos(np.clip(np.cos(pose[:, 3]) * np.cos(pose[:, 4]), -1, 1)).max()
-            largest["tilt"] = (tilt, limit.tilt, "rad")
-            largest["turn acceleration"] = (np.abs(acceleration[:, 3:5]).max(), limit.turn_acceleration, "rad/s^2")
-        for quantity, (value, bound, unit) in largest.items():
-            if bound is not None and value > bound * (1 + LIMIT_TOLERANCE):
-                found.append(f"{name}: {quantity} {value:.6g} {unit} exceeds {bound:g} {unit}")
+        for quantity, (values, bound, unit) in checks.items():
+            if bound is not None and values.max() > bound * (1 + LIMIT_TOLERANCE):
+                found.append(f"{name}: {quantity} {values.max():.6g} {unit} exceeds {bound:g} {unit}")
         outside = np.maximum(limit.low - pose[:, :3], pose[:, :3] - limit.high).max()
         if outside > LIMIT_TOLERANCE:
             found.append(f"{name}: {outside:.3g} m outside its reach box")
+        if limit.attitude is not None and np.abs(pose[:, 3:] - limit.attitude).max() > LIMIT_TOLERANCE:
+            found.append(f"{name}: turns, but a mobile carrier keeps its attitude")
     return found

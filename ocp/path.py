@@ -118,7 +118,10 @@ class CirclePath(PathBase):
 
 
 class WaypointPath(PathBase):
-    """A spline of degree 7 through given poses, from rest to rest, acceleration and jerk zero there too."""
+    """A spline of degree 7 through given poses, from rest to rest, acceleration and jerk zero there too.
+
+    Angles are taken as they are: from 3.1 to -3.1 rad is a turn of 6.2 rad, not of 0.08.
+    """
 
     kind: Literal["waypoints"]
     points: tuple[PoseOrPosition, ...] = Field(min_length=2, description="two poses or positions or more [m, rad]")
@@ -130,6 +133,9 @@ class WaypointPath(PathBase):
     def _times_fit(self) -> Self:
         if self.times is not None:
             _check_times(self.times, len(self.points))
+        for index, (before, after) in enumerate(pairwise(self.points)):
+            if before == after and self.times is None:
+                raise ValueError(f"points[{index + 1}] is points[{index}] again; accepted: different points, or times")
         return self
 
     @property
@@ -143,7 +149,7 @@ class WaypointPath(PathBase):
 
         points = np.array(self.points)
         if self.times is None:
-            steps = np.maximum(np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1), 1e-6)
+            steps = np.linalg.norm(np.diff(points, axis=0), axis=1)  # a radian counts as a metre
             knots = np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
         else:
             knots = np.array(self.times)

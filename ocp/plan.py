@@ -6,17 +6,20 @@ import os
 import time
 from typing import Any
 
-import numpy as np
-
 from ..models import Robot
 from . import transcription
-from .audit import RATE, Audit, audit, examine
+from .audit import Audit, audit
 from .result import Plan, PlanStatus
 from .scenario import Deviation, Scenario, lay_out
 from .task import Task, read_task
-from .transcription import Progress
+from .transcription import Mesh, Outcome, Progress
 
-ATTEMPTS = 3  # each with more distance from the limits, for what happens between the nodes
+REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
+MOST_STEPS = 1600
+RESERVE = 1e-3  # of the weight, from the tension limits
+LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
+SHRINK = 2e-3  # of the carriers' speed and acceleration limits
+NO_SLACK = 1e-6  # of the weight: a motion that misses less at its nodes is a start for another try
 
 
 def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], progress: Progress | None = None) -> Plan:
@@ -39,7 +42,8 @@ def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], pro
     -------
     Plan
         With status `feasible`; or `infeasible`, proven by the certificate, if the motion was fixed by the task; or
-        `not-found`, with the certificate at the worst time of the closest motion that was found.
+        `not-found`, with the certificate at the worst time of the closest motion that was found, or with the limits
+        that it leaves.
 
     Raises
     ------
@@ -55,52 +59,57 @@ def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], pro
 def _fixed_motion(scenario: Scenario) -> Plan:
     """Nothing is free but the tensions: each instant is a tension-distribution problem of its own."""
     start = time.perf_counter()
-    nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
-    coarse = examine(scenario, None, nodes, scenario.task.steps / scenario.duration)
-    seen = audit(scenario, None) if coarse.passed else _around_worst(scenario, None, coarse)
+    seen = audit(scenario, None)
     status = PlanStatus.FEASIBLE if seen.passed else PlanStatus.INFEASIBLE
     return Plan(scenario, status, None, seen, build_s=0.0, solve_s=time.perf_counter() - start)
 
 
-def _free_motion(scenario: Scenario, progress: Progress | None) -> Plan:
-    reserve, build_s, solve_s = 0.0, 0.0, 0.0
-    for _ in range(ATTEMPTS):
+class _Search:
+    """Solves one scenario's programs, one after the other, and keeps the time that it took."""
+
+    def __init__(self, scenario: Scenario, progress: Progress | None):
+        self.scenario, self._progress = scenario, progress
+        self.build_s, self.solve_s = 0.0, 0.0
+
+    def solve(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
+        """Build and solve the program of `mesh` from `guess`; None: from one that it makes."""
         start = time.perf_counter()
-        program = transcription.build(scenario, reserve)
-        guess = transcription.initial_guess(scenario, program.nodes)
+        program = transcription.build(self.scenario, mesh)
+        nodes = program.nodes
+        start_at = transcription.initial_guess(self.scenario, nodes) if guess is None else guess.at(nodes)
         built = time.perf_counter()
-        outcome = transcription.solve(program, guess, progress)
-        build_s += built - start
-        solve_s += time.perf_counter() - built
-        if not outcome.success:
+        outcome = transcription.solve(program, start_at, self._progress)
+        self.build_s += built - start
+        self.solve_s += time.perf_counter() - built
+        return outcome
+
+    def plan(self, status: PlanStatus, outcome: Outcome, seen: Audit) -> Plan:
+        """What came of it."""
+        told = (outcome.iterations, outcome.message)
+        return Plan(self.scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told)
+
+
+def _free_motion(scenario: Scenario, progress: Progress | None) -> Plan:
+    """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
+    search = _Search(scenario, progress)
+    steps = scenario.task.steps
+    outcome = search.solve(Mesh(steps), None)
+    if not outcome.success:
+        closest = search.solve(Mesh(steps, elastic=True), None)
+        if closest.slack > NO_SLACK * scenario.robot.force_scale:
+            return search.plan(PlanStatus.NOT_FOUND, closest, audit(scenario, closest.deviation))
+        outcome = search.solve(Mesh(steps), closest.deviation)
+    reserve, shrink = 0.0, 0.0
+    seen = audit(scenario, outcome.deviation)
+    for attempt in range(1, REFINEMENTS + 1):
+        if seen.passed or not outcome.success:
             break
+        # Between finer nodes less can happen; a little distance from the limits takes care of what still does.
+        steps = min(2 * steps, MOST_STEPS)
+        missed = float(seen.violation.max()) / scenario.robot.force_scale
+        reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
+        shrink = SHRINK * attempt if seen.excess else shrink
+        outcome = search.solve(Mesh(steps, reserve * scenario.robot.force_scale, shrink), outcome.deviation)
         seen = audit(scenario, outcome.deviation)
-        if seen.passed:
-            iterations, message = outcome.iterations, outcome.message
-            return Plan(scenario, PlanStatus.FEASIBLE, outcome.deviation, seen, build_s, solve_s, iterations, message)
-        reserve = 2 * (reserve + float(seen.violation.max()))
-    return _closest_motion(scenario, progress, build_s, solve_s)
-
-
-def _closest_motion(scenario: Scenario, progress: Progress | None, build_s: float, solve_s: float) -> Plan:
-    """No plan was found: the motion that misses the least wrench, and the certificate at its worst time."""
-    start = time.perf_counter()
-    program = transcription.build(scenario, elastic=True)
-    built = time.perf_counter()
-    outcome = transcription.solve(program, transcription.initial_guess(scenario, program.nodes), progress)
-    build_s, solve_s = build_s + built - start, solve_s + time.perf_counter() - built
-    deviation: Deviation = outcome.deviation
-    coarse = examine(scenario, deviation, program.nodes, scenario.task.steps / scenario.duration)
-    seen = audit(scenario, deviation) if coarse.violation.max() <= coarse.tolerance else coarse
-    if not seen.passed and seen is coarse:
-        seen = _around_worst(scenario, deviation, coarse)
-    status = PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND
-    return Plan(scenario, status, deviation, seen, build_s, solve_s, outcome.iterations, outcome.message)
-
-
-def _around_worst(scenario: Scenario, deviation: Deviation | None, coarse: Audit) -> Audit:
-    """The coarse audit with the neighbourhood of its worst time at the dense rate: where the certificate is wanted."""
-    step = coarse.times[1] - coarse.times[0]
-    around = coarse.times[coarse.worst] + np.arange(-step, step, 1 / RATE)
-    inside = around[(around >= 0) & (around <= scenario.duration)]
-    return examine(scenario, deviation, np.union1d(coarse.times, inside), RATE)
+    feasible = seen.passed and outcome.success
+    return search.plan(PlanStatus.FEASIBLE if feasible else PlanStatus.NOT_FOUND, outcome, seen)

@@ -30,10 +30,12 @@ class PlanStatus(StrEnum):
     """The audit saw no violation anywhere."""
 
     INFEASIBLE = "infeasible"
-    """The task fixes the motion, and at some time no tensions give the wrench it needs: proven by the certificate."""
+    """The task fixes the motion, and it cannot be: at some time no tensions give the wrench that it needs, proven by
+    the certificate, or it leaves a carrier's or drive's limits, told by the audit's `excess`."""
 
     NOT_FOUND = "not-found"
-    """The planner found no motion without violation; the certificate is for the closest one, and proves no more."""
+    """The planner found no motion without violation. The certificate and the `excess` are those of the closest motion
+    that it found, and prove no more."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """Whether the audit saw every tension inside its limits, and every carrier inside its own."""
+        """Whether the audit saw every tension inside its limits, and all else that the task and the robot limit too."""
         return self.status is PlanStatus.FEASIBLE
 
     @property
@@ -100,7 +102,7 @@ class Plan:
         """
         if self.feasible or self.audit.certificate is None:
             return None
-        return {"time": float(self.audit.times[self.audit.worst]), **self.audit.certificate.as_dict()}
+        return {"time": self.audit.certificate_time, **self.audit.certificate.as_dict()}
 
     @cached_property
     def trajectory(self) -> xr.Dataset:
@@ -194,18 +196,12 @@ class Plan:
         seen = self.audit.summary()
         lines.append(
             f"  audit at {seen['rate_hz']:g} Hz: worst violation {seen['worst_violation']:.3g} N at "
-            f"t = {seen['at_s']:.3f} s"
+            f"t = {seen['at_s']:.3f} s (up to {seen['tolerance']:.2g} N counts as none)"
         )
-        lines += [f"  {sentence}" for sentence in seen["carrier_excess"]]
+        lines += [f"  {sentence}" for sentence in seen["excess"]]
         lines.append(f"  built in {self.build_s:.3f} s, solved in {self.solve_s:.3f} s")
         return "\n".join(lines)
 
     def _output_rows(self) -> np.ndarray:
-        """Rows of the audit nearest to the output rate; the first and the last always."""
-        times = self.audit.times
-        count = max(round(self.scenario.duration * self.scenario.task.output_rate), 1)
-        wanted = np.linspace(0.0, self.scenario.duration, min(count, len(times) - 1) + 1)
-        rows = np.clip(np.searchsorted(times, wanted - 1e-9), 0, len(times) - 1)
-        if not self.feasible:
-            rows = np.append(rows, self.audit.worst)
-        return np.unique(rows)
+        """Rows of the audit that are saved: at equal times, and each of them audited."""
+        return np.arange(0, len(self.audit.times), (len(self.audit.times) - 1) // self.scenario.output_samples)

@@ -6,7 +6,7 @@ its home. The deviations are the unknowns of the planner, cubic splines of the t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,18 +18,28 @@ from .path import AnyPath, Motion, RestPath
 from .task import FreeBase, GivenBase, HoldBase, Task
 
 POSITION, ATTITUDE = range(3), range(3, 6)
+AUDIT_RATE = 1000.0  # [1/s]
+MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What one free carrier may do; None or infinite: no limit."""
+    """What one carrier may do; None or infinite: no limit."""
 
     acceleration: float | None  # [m/s^2]
     speed: float | None  # [m/s]
     low: np.ndarray  # (3,) corner of the reach box in {G} [m]
     high: np.ndarray  # (3,)
-    tilt: float  # [rad]
+    tilt: float | None  # [rad]
     turn_acceleration: float | None  # [rad/s^2]
+    attitude: np.ndarray | None  # (3,) that it keeps [rad]
+
+    def shrunk(self, share: float) -> Limits:
+        """Acceleration and speed limits less a share of themselves, for what happens between the nodes."""
+        keep = 1.0 - share
+        acceleration = self.acceleration and self.acceleration * keep
+        turn = self.turn_acceleration and self.turn_acceleration * keep
+        return replace(self, acceleration=acceleration, speed=self.speed and self.speed * keep, turn_acceleration=turn)
 
 
 @dataclass(frozen=True)
@@ -41,6 +51,12 @@ class Deviation:
     v: np.ndarray  # (k, n)
     a: np.ndarray  # (k, n)
     tensions: np.ndarray  # (k, m) [N]
+
+    def at(self, nodes: np.ndarray) -> Deviation:
+        """The same motion at other nodes."""
+        values = spline.evaluate(self.nodes, self.q, self.v, self.a, nodes)
+        tensions = [np.interp(nodes, self.nodes, column) for column in self.tensions.T]
+        return Deviation(nodes, *values, np.stack(tensions, axis=1))
 
 
 @dataclass(frozen=True)
@@ -76,6 +92,11 @@ class Scenario:
         """Number n of free coordinates."""
         return len(self.platform_free) + len(self.carrier_free)
 
+    @property
+    def output_samples(self) -> int:
+        """How many intervals the saved trajectory has."""
+        return max(round(self.duration * self.task.output_rate), 1)
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Tension limits less the task's margin, (m,) each [N]."""
         return self.robot.t_min + self.task.margin, self.robot.t_max - self.task.margin
@@ -105,12 +126,13 @@ class Scenario:
         stacked = Motion(*(np.stack(parts, axis=1) for parts in zip(*carriers, strict=True)))
         return platform, stacked
 
-    def tracking_error(self, times: np.ndarray, deviation: Deviation | None) -> np.ndarray:
-        """Distance of the platform from its path, (n,) [m]."""
-        if deviation is None:
-            return np.zeros(len(times))
-        q = spline.evaluate(deviation.nodes, deviation.q, deviation.v, deviation.a, times)[0]
-        return np.linalg.norm(self._spread(q, None)[:, :3], axis=1)
+    def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
+        """How far the platform at `motion` in {G} is from its path, (n, 6) [m, rad], along the path's own axes."""
+        wanted = self.task.path.at(times, self.duration).pose
+        pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
+        off = pose - wanted
+        off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
+        return off
 
     def _spread(self, value: np.ndarray, carrier: int | None) -> np.ndarray:
         """Free coordinates (n, count) as the six of the platform (None) or of a carrier."""
@@ -119,6 +141,11 @@ class Scenario:
             if owner[0] == carrier:
                 spread[:, owner[1]] = value[:, column]
         return spread
+
+    def free_limits(self, shrink: float = 0.0) -> dict[int, Limits]:
+        """Limits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
+        free = {index for index, _ in self.carrier_free}
+        return {index: limit.shrunk(shrink) for index, limit in self.limits.items() if index in free}
 
     def owners(self) -> list[tuple[int | None, int]]:
         """Whose coordinate each free one is: (None for the platform or the carrier's index, coordinate)."""
@@ -135,6 +162,12 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     """
     where = f"task {task.name!r}"
     relative = _frame(robot, task, where)
+    for carrier in robot.carriers:
+        if carrier.kind == "quadrotor":
+            raise InputError(
+                f"{where}: robot {robot.name!r} hangs from {carrier.name!r} of kind quadrotor, whose thrust and "
+                "attitude the planner does not know; accepted: carriers of kind ground, prescribed, mobile"
+            )
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:
             raise InputError(
@@ -143,19 +176,19 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
             )
     if task.wind is not None and robot.platform.aero is None:
         raise InputError(f"{where}: wind: robot {robot.name!r} has no platform.aero; accepted: none")
-    platform_free = [*POSITION] * (task.tube.position > 0) + [*ATTITUDE] * (task.tube.attitude > 0)
-    carrier_free, limits = _free_carriers(robot, task.base, where)
+    opened = [*POSITION] * (task.tube.position > 0) + [*ATTITUDE] * (task.tube.attitude > 0)
+    platform_free = [coordinate for coordinate in opened if robot.dof_mask[coordinate]]
     scenario = Scenario(
         robot=robot,
         task=task,
         dynamics=Dynamics(robot),
         relative=relative,
         platform_free=platform_free,
-        carrier_free=carrier_free,
-        limits=limits,
+        carrier_free=_free_carriers(robot, task.base, where),
+        limits=_limits(robot, task.base),
         carrier_paths=_carrier_paths(robot, task.base, where),
     )
-    _within_spline(task, where)
+    _check_times(task, where)
     return scenario
 
 
@@ -168,8 +201,13 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
     return frame != "world"
 
 
-def _within_spline(task: Task, where: str) -> None:
-    """Refuse a task that lasts longer than its waypoints or samples: beyond them a spline is anything."""
+def _check_times(task: Task, where: str) -> None:
+    """Refuse a task that does not last as long as its waypoints: beyond their times a spline is anything."""
+    if task.seconds * AUDIT_RATE > MOST_SAMPLES:
+        raise InputError(
+            f"{where}: duration: {task.seconds:g} s; accepted: at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the "
+            f"audit looks {AUDIT_RATE:g} times a second"
+        )
     paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
     for name, path in paths.items():
         end = path.natural_duration if path.kind in ("waypoints", "samples") else None
@@ -177,6 +215,9 @@ def _within_spline(task: Task, where: str) -> None:
             raise InputError(
                 f"{where}: duration: {task.seconds:g} s is longer than {name}, whose times end at {end:g} s"
             )
+    end = task.path.natural_duration if task.path.kind in ("waypoints", "samples") else None
+    if end is not None and task.seconds < end * (1 - 1e-9):
+        raise InputError(f"{where}: duration: {task.seconds:g} s is shorter than path, whose times end at {end:g} s")
 
 
 def _carrier_paths(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> dict[int, AnyPath]:
@@ -192,7 +233,7 @@ def _carrier_paths(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
     for name, path in paths.items():
         if name not in names:
             raise InputError(f"{where}: base.{field_name}: carrier {name!r} is unknown; accepted: {', '.join(names)}")
-        if robot.carriers[names.index(name)].kind == "ground" and path.kind != "rest":
+        if robot.carriers[names.index(name)].kind == "ground":
             raise InputError(f"{where}: base.{field_name}: carrier {name!r} is of kind ground and never moves")
         if path.frame != "world":
             raise InputError(f"{where}: base.{field_name}.{name}.frame: {path.frame!r}; accepted: world")
@@ -200,30 +241,62 @@ def _carrier_paths(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
     return found
 
 
-def _free_carriers(
-    robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str
-) -> tuple[list[tuple[int, int]], dict[int, Limits]]:
+def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:
+    """(carrier, coordinate) pairs that the planner chooses."""
     if not isinstance(base, FreeBase):
-        return [], {}
+        return []
     free: list[tuple[int, int]] = []
-    limits: dict[int, Limits] = {}
     for index, carrier in enumerate(robot.carriers):
-        if carrier.kind == "ground":
-            continue
-        unbounded = np.full(3, np.inf)
-        if isinstance(carrier, MobileCarrier):
-            acceleration = _tighter(base.acceleration_max, carrier.acceleration_max)
-            speed = _tighter(base.speed_max, carrier.speed_max)
-            low, high, tilt = np.array(carrier.reach.min), np.array(carrier.reach.max), 0.0
-        else:
-            acceleration, speed, tilt = base.acceleration_max, base.speed_max, base.tilt_max
-            low, high = -unbounded, unbounded
-        free += [(index, coordinate) for coordinate in (*POSITION, *([3, 4] if tilt > 0 else []))]
-        limits[index] = Limits(acceleration, speed, low, high, tilt, base.turn_acceleration_max)
+        if carrier.kind == "prescribed":
+            free += [(index, coordinate) for coordinate in (*POSITION, *([3, 4] if base.tilt_max > 0 else []))]
+        elif carrier.kind == "mobile" and robot.drive != "variable-length":
+            free += [(index, coordinate) for coordinate in POSITION]
     if not free:
-        raise InputError(f"{where}: base.kind: 'free', but robot {robot.name!r} has no carrier that moves")
-    return free, limits
+        raise InputError(
+            f"{where}: base.kind: 'free', but robot {robot.name!r} has no carrier that moves (drive: {robot.drive})"
+        )
+    return free
+
+
+def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, Limits]:
+    """Limits of carriers by index: the robot's own whatever the base does, and the task's for a free base."""
+    limits = {}
+    free = base if isinstance(base, FreeBase) else None
+    for index, carrier in enumerate(robot.carriers):
+        acceleration = free.acceleration_max if free else None
+        speed = free.speed_max if free else None
+        if isinstance(carrier, MobileCarrier):
+            limits[index] = Limits(
+                acceleration=_tighter(acceleration, carrier.acceleration_max),
+                speed=_tighter(speed, carrier.speed_max),
+                low=np.array(carrier.reach.min),
+                high=np.array(carrier.reach.max),
+                tilt=None,
+                turn_acceleration=None,
+                attitude=np.array(carrier.home[3:]),
+            )
+        elif free and carrier.kind == "prescribed":
+            limits[index] = Limits(
+                acceleration=acceleration,
+                speed=speed,
+                low=np.full(3, -np.inf),
+                high=np.full(3, np.inf),
+                tilt=free.tilt_max or None,
+                turn_acceleration=free.turn_acceleration_max,
+                attitude=None,
+            )
+    return limits
 
 
 def _tighter(first: float | None, second: float) -> float:
     return second if first is None else min(first, second)
+
+
+def _pose_in(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Poses (n, 6) in {G} as seen from the frames at poses (n, 6), by scipy's rotations."""
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_euler("ZYX", frame[:, 5:2:-1])
+    position = turned.inv().apply(pose[:, :3] - frame[:, :3])
+    angles = (turned.inv() * Rotation.from_euler("ZYX", pose[:, 5:2:-1])).as_euler("ZYX")
+    return np.hstack([position, angles[:, ::-1]])

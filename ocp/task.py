@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..models.parsing import read_yaml, validate
-from ..models.robot import Name, NonNegative, Part, Pose, Positive
+from ..models.robot import Name, NonNegative, Part, Pose, Positive, Vector3
 from .path import AnyPath
 
 
@@ -47,13 +47,16 @@ class FreeBase(Part):
     )
     acceleration_max: Positive | None = Field(default=None, description="[m/s^2]")
     speed_max: Positive | None = Field(default=None, description="[m/s]")
-    tilt_max: NonNegative = Field(
-        default=0.0, description="largest angle to the vertical [rad] of carriers that can tilt; 0: keep the attitude"
+    tilt_max: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1.5,
+        description="largest angle to the vertical [rad] of carriers that can tilt; 0: keep the attitude",
     )
     turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
     ends: Literal["free", "rest", "periodic", "exact"] = Field(
         default="free",
-        description="free: start and end wherever it suits; rest: at zero speed; periodic: end as it started; "
+        description="free: start and end wherever it suits; rest: at zero speed; periodic: end as they started; "
         "exact: as `around` says",
     )
 
@@ -62,14 +65,16 @@ AnyBase = Annotated[HoldBase | GivenBase | FreeBase, Field(discriminator="kind")
 
 
 class Objective(Part):
-    """What costs: each number is the amount that costs as much as one of the others does (Bryson's rule); null: free.
+    """What costs: each number is the amount that costs as much as one of the others does (Bryson's rule).
 
     The cost is the mean over time of sum |quantity / number|^2. A term has a part only where its quantity is free to
     choose.
     """
 
     tension: Positive | None = Field(default=None, description="tension of each cable [N]; null: the platform's weight")
-    deviation: Positive = Field(default=0.01, description="platform off its path [m], angles times `Robot.length`")
+    deviation: Positive | None = Field(
+        default=None, description="platform off its path [m], angles times `Robot.length`; null: a tenth of the tube"
+    )
     carrier_acceleration: Positive = Field(default=1.0, description="[m/s^2, rad/s^2]")
     carrier_offset: Positive = Field(default=10.0, description="carrier away from `around` or home [m, rad]")
     jerk: Positive = Field(default=10.0, description="of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth")
@@ -84,10 +89,12 @@ class Task(Part):
     base: AnyBase = Field(default=HoldBase(kind="hold"), description="what the carriers do: hold, given or free")
     tube: Tube = Tube()
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
-    wind: tuple[float, float, float] | None = Field(default=None, description="constant, in {G} [m/s]; none: no air")
+    wind: Vector3 | None = Field(default=None, description="constant, in {G} [m/s]; none: no air")
     steps: int = Field(default=100, ge=4, le=20_000, description="intervals of the transcription")
     objective: Objective = Objective()
-    output_rate: Positive = Field(default=100.0, description="samples of the saved trajectory [1/s]")
+    output_rate: Positive = Field(
+        default=100.0, description="samples of the saved trajectory, each of them audited [1/s]"
+    )
 
     @property
     def seconds(self) -> float:
@@ -116,4 +123,8 @@ def read_task(task: Task | dict[str, Any] | str | os.PathLike[str]) -> Task:
         return task
     if isinstance(task, dict):
         return validate(task, Task, "task")
-    return read_yaml(Path(task), Task)
+    try:
+        path = Path(task)
+    except TypeError:
+        raise InputError(f"task: {task!r}; accepted: a Task, a mapping or the path of a YAML file") from None
+    return read_yaml(path, Task)

@@ -8,8 +8,8 @@ Unknown at each node k are the free coordinates q_k, their rates v_k and acceler
           t_min + margin <= t_k <= t_max - margin
           tube, reach, speed, tilt at the Bernstein points, acceleration at the nodes: so they hold between nodes too
 
-Tensions are in units of the platform's weight, moments over `Robot.length`. `build` makes the program, `solve` solves
-it, so that it can be looked at in between.
+Tensions are in units of `Robot.force_scale`, the weight, moments over `Robot.length`. `build` makes the program and
+`solve` solves it, so that it can be looked at in between.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..errors import SolverError
 from . import spline
 from .scenario import ATTITUDE, POSITION, Deviation, Limits, Scenario
 
-SLACK_COST = 1e4  # of a missing wrench as large as the weight, squared, in the elastic program
+OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
+SLACK_COST = 1e2  # of a missing wrench as large as the weight
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 
 
@@ -38,8 +40,6 @@ class Program:
         {"x", "f", "g"} for `casadi.nlpsol`.
     lower, upper, lower_g, upper_g
         Bounds of x and g.
-    rows
-        Names of the blocks of g, with their sizes, in their order.
     """
 
     scenario: Scenario
@@ -49,7 +49,6 @@ class Program:
     upper: np.ndarray
     lower_g: np.ndarray
     upper_g: np.ndarray
-    rows: list[tuple[str, int]]
     width: int  # unknowns of a node
 
     def read(self, x: np.ndarray) -> Deviation:
@@ -57,12 +56,12 @@ class Program:
         n, m = self.scenario.count, self.scenario.robot.m
         columns = x[: self.width * len(self.nodes)].reshape(len(self.nodes), self.width)
         q, v, a, t = np.split(columns[:, : 3 * n + m], [n, 2 * n, 3 * n], axis=1)
-        return Deviation(self.nodes, q, v, a, t * self.scenario.robot.weight)
+        return Deviation(self.nodes, q, v, a, t * self.scenario.robot.force_scale)
 
     def pack(self, deviation: Deviation) -> np.ndarray:
         """The x that a deviation at the nodes stands for, slacks zero."""
         columns = np.zeros((len(self.nodes), self.width))
-        parts = (deviation.q, deviation.v, deviation.a, deviation.tensions / self.scenario.robot.weight)
+        parts = (deviation.q, deviation.v, deviation.a, deviation.tensions / self.scenario.robot.force_scale)
         values = np.hstack(parts)
         columns[:, : values.shape[1]] = values
         return columns.ravel()
@@ -76,28 +75,41 @@ class Outcome:
     success: bool
     message: str
     iterations: int
-    objective: float
     slack: float  # largest missing wrench at a node [N], zero in the rigid program
 
 
-def build(scenario: Scenario, reserve: float = 0.0, elastic: bool = False) -> Program:
-    """The nonlinear program of `scenario`.
+@dataclass(frozen=True)
+class Mesh:
+    """How finely and how carefully a program looks at its scenario.
 
-    Parameters
+    Attributes
     ----------
+    steps
+        Intervals.
     reserve
         Further distance from the tension limits [N], for what happens between the nodes.
+    shrink
+        Share by which the carriers' speed and acceleration limits are lowered, likewise.
     elastic
         Let A t = w + s with a high cost on the slack s, so that there always is a solution.
     """
-    n, m, steps = scenario.count, scenario.robot.m, scenario.task.steps
+
+    steps: int
+    reserve: float = 0.0
+    shrink: float = 0.0
+    elastic: bool = False
+
+
+def build(scenario: Scenario, mesh: Mesh) -> Program:
+    """The nonlinear program of `scenario` on `mesh`."""
+    n, m, steps = scenario.count, scenario.robot.m, mesh.steps
     nodes = np.linspace(0.0, scenario.duration, steps + 1)
-    width = 3 * n + m + (6 if elastic else 0)
+    width = 3 * n + m + (6 if mesh.elastic else 0)
     parameters = ca.DM(_parameters(scenario, nodes))
     X = ca.MX.sym("x", width, steps + 1)
 
-    node, node_rows = _node_function(scenario, elastic)
-    interval, interval_rows = _interval_function(scenario, nodes[1], width)
+    node, node_rows = _node_function(scenario, mesh)
+    interval, interval_rows = _interval_function(scenario, mesh, nodes[1], width)
     cost, node_values = node.map(steps + 1)(X, parameters)
     jerk_cost, interval_values = interval.map(steps)(X[:, :-1], X[:, 1:], parameters[:, :-1], parameters[:, 1:])
     # Trapezoid rule: the two end nodes stand for half an interval each.
@@ -108,16 +120,14 @@ def build(scenario: Scenario, reserve: float = 0.0, elastic: bool = False) -> Pr
     g = [ca.vec(node_values), ca.vec(interval_values)]
     low = [np.tile([row[1] for row in node_rows], steps + 1), np.tile([row[1] for row in interval_rows], steps)]
     high = [np.tile([row[2] for row in node_rows], steps + 1), np.tile([row[2] for row in interval_rows], steps)]
-    rows = [("node", len(low[0])), ("interval", len(low[1]))]
     if getattr(scenario.task.base, "ends", None) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
         picked = [block * n + i for block in range(3) for i in carriers]
         g.append(X[picked, 0] - X[picked, -1])
         low.append(np.zeros(len(picked)))
         high.append(np.zeros(len(picked)))
-        rows.append(("periodic", len(picked)))
 
-    lower, upper = _simple_bounds(scenario, width, steps, reserve)
+    lower, upper = _simple_bounds(scenario, mesh, nodes, width)
     return Program(
         scenario=scenario,
         nodes=nodes,
@@ -126,13 +136,20 @@ def build(scenario: Scenario, reserve: float = 0.0, elastic: bool = False) -> Pr
         upper=upper,
         lower_g=np.concatenate(low),
         upper_g=np.concatenate(high),
-        rows=rows,
         width=width,
     )
 
 
 def solve(program: Program, guess: Deviation, progress: Progress | None = None, max_iterations: int = 400) -> Outcome:
-    """Solve the program with IPOPT from `guess`; its failure is told, not raised."""
+    """Solve the program with IPOPT from `guess`; that it found nothing is told, not raised.
+
+    Raises
+    ------
+    SolverError
+        If CasADi or IPOPT break.
+    KeyboardInterrupt
+        If a person stopped it.
+    """
     options: dict[str, Any] = {
         "ipopt": {
             "print_level": 0,
@@ -145,25 +162,28 @@ def solve(program: Program, guess: Deviation, progress: Progress | None = None, 
         "print_time": False,
         "error_on_fail": False,
     }
-    if progress is not None:
-        options["iteration_callback"] = _Watch(program, progress)
-    solver = ca.nlpsol("planner", "ipopt", program.problem, options)
-    result = solver(
-        x0=program.pack(guess), lbx=program.lower, ubx=program.upper, lbg=program.lower_g, ubg=program.upper_g
-    )
+    watch = _Watch(program, progress)
+    options["iteration_callback"] = watch
+    bounds = {"lbx": program.lower, "ubx": program.upper, "lbg": program.lower_g, "ubg": program.upper_g}
+    try:
+        solver = ca.nlpsol("planner", "ipopt", program.problem, options)
+        result = solver(x0=program.pack(guess), **bounds)
+    except RuntimeError as error:
+        raise SolverError(f"planner: CasADi failed ({str(error).splitlines()[-1]})") from None
     statistics = solver.stats()
+    if watch.interrupted or statistics["return_status"] == "User_Requested_Stop":
+        raise KeyboardInterrupt
     x = result["x"].full().ravel()
     slack = 0.0
     n, robot = program.scenario.count, program.scenario.robot
     if program.width > 3 * n + robot.m:
         columns = x.reshape(len(program.nodes), program.width)
-        slack = float(np.linalg.norm(columns[:, 3 * n + robot.m :], axis=1).max() * robot.weight)
+        slack = float(np.linalg.norm(columns[:, 3 * n + robot.m :], axis=1).max() * robot.force_scale)
     return Outcome(
         deviation=program.read(x),
         success=bool(statistics["success"]) and bool(np.isfinite(x).all()),
         message=str(statistics["return_status"]),
         iterations=int(statistics["iter_count"]),
-        objective=float(result["f"]),
         slack=slack,
     )
 
@@ -219,38 +239,44 @@ def _motions(scenario: Scenario, x: ca.SX, parameters: ca.SX) -> list[list[ca.SX
     return motions
 
 
-def _node_function(scenario: Scenario, elastic: bool) -> tuple[ca.Function, list[Row]]:
+def _node_function(scenario: Scenario, mesh: Mesh) -> tuple[ca.Function, list[Row]]:
     """Cost and constraints of one node: the balance A t = w and the limits on accelerations."""
     robot, n, dynamics = scenario.robot, scenario.count, scenario.dynamics
-    width = 3 * n + robot.m + (6 if elastic else 0)
+    width = 3 * n + robot.m + (6 if mesh.elastic else 0)
     x = ca.SX.sym("x", width)
     parameters = ca.SX.sym("p", 18 * (1 + len(robot.carriers)))
     platform, *carriers = _motions(scenario, x, parameters)
-    tensions = robot.weight * x[3 * n : 3 * n + robot.m]
+    tensions = robot.force_scale * x[3 * n : 3 * n + robot.m]
     wind = scenario.task.wind
+    pose_rows = [ca.vertcat(*(carrier[k].T for carrier in carriers)) for k in range(3)]
     if scenario.relative:
         A = dynamics.relative.wrench_matrix(platform[0])
         w = dynamics.relative.required_wrench(*platform, *carriers[0], wind=wind)
     else:
-        rows = [ca.vertcat(*(carrier[k].T for carrier in carriers)) for k in range(3)]
-        A = dynamics.wrench_matrix(platform[0], rows[0])
-        w = dynamics.required_wrench(*platform, *rows, wind=wind)
-    scale = robot.weight * np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
-    balance = (A @ tensions - w) / ca.DM(scale)
+        A = dynamics.wrench_matrix(platform[0], pose_rows[0])
+        w = dynamics.required_wrench(*platform, *pose_rows, wind=wind)
+    scale = robot.force_scale * np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
+    balance = ((A @ tensions - w) / ca.DM(scale))[moving]
     cost = _node_cost(scenario, x)
-    if elastic:
+    if mesh.elastic:
         slack = x[3 * n + robot.m :]
-        balance -= slack
-        cost += SLACK_COST * ca.sumsqr(slack)
+        balance -= slack[moving]
+        cost = OTHER_COSTS * cost + SLACK_COST * ca.sumsqr(slack)
 
     values: list[ca.SX] = [balance]
-    rows_of_g: list[Row] = [(f"balance {axis}", 0.0, 0.0) for axis in ("fx", "fy", "fz", "mx", "my", "mz")]
-    for index, limit in scenario.limits.items():
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    rows_of_g: list[Row] = [(f"balance {axes[row]}", 0.0, 0.0) for row in moving]
+    if robot.fixed_lengths is not None and not scenario.relative:
+        lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
+        values.append((lengths / robot.fixed_lengths) ** 2)  # squared: no square root in the derivatives
+        rows_of_g += [(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
+    for index, limit in scenario.free_limits(mesh.shrink).items():
         name, acceleration = robot.carriers[index].name, carriers[index][2]
         if limit.acceleration is not None:
             values.append(ca.sumsqr(acceleration[0:3]) / limit.acceleration**2)
             rows_of_g.append((f"{name} acceleration", -np.inf, 1.0))
-        if limit.tilt > 0 and limit.turn_acceleration is not None:
+        if limit.tilt and limit.turn_acceleration is not None:
             values.append(acceleration[3:5] / limit.turn_acceleration)
             rows_of_g += [(f"{name} turn acceleration", -1.0, 1.0)] * 2
     return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)]), rows_of_g
@@ -258,19 +284,21 @@ def _node_function(scenario: Scenario, elastic: bool) -> tuple[ca.Function, list
 
 def _node_cost(scenario: Scenario, x: ca.SX) -> ca.SX:
     robot, n, objective = scenario.robot, scenario.count, scenario.task.objective
-    tension_scale = objective.tension or robot.weight
-    cost = ca.sumsqr(robot.weight * x[3 * n : 3 * n + robot.m] / tension_scale)
+    tension_scale = objective.tension or robot.force_scale
+    tube = scenario.task.tube
+    deviation_scale = objective.deviation or 0.1 * max(tube.position, robot.length * tube.attitude)
+    cost = ca.sumsqr(robot.force_scale * x[3 * n : 3 * n + robot.m] / tension_scale)
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         q, a = x[column], x[2 * n + column]
         if owner is None:
             arm = 1.0 if coordinate in POSITION else robot.length
-            cost += (arm * q / objective.deviation) ** 2
+            cost += (arm * q / deviation_scale) ** 2
         else:
             cost += (q / objective.carrier_offset) ** 2 + (a / objective.carrier_acceleration) ** 2
     return cost
 
 
-def _interval_function(scenario: Scenario, h: float, width: int) -> tuple[ca.Function, list[Row]]:
+def _interval_function(scenario: Scenario, mesh: Mesh, h: float, width: int) -> tuple[ca.Function, list[Row]]:
     """Cost of jerk and constraints of one interval: integration, and limits at the Bernstein points."""
     robot, n = scenario.robot, scenario.count
     x, x_end = ca.SX.sym("x", width), ca.SX.sym("x_end", width)
@@ -279,7 +307,7 @@ def _interval_function(scenario: Scenario, h: float, width: int) -> tuple[ca.Fun
     start = (x[:n], x[n : 2 * n], x[2 * n : 3 * n])
     end = (x_end[:n], x_end[n : 2 * n], x_end[2 * n : 3 * n])
     jerk = (end[2] - start[2]) / h
-    cost = ca.sumsqr(jerk / scenario.task.objective.jerk)
+    cost = ca.sumsqr(jerk / scenario.task.objective.jerk) * (OTHER_COSTS if mesh.elastic else 1.0)
 
     q_defect, v_defect = spline.defects(h, start, end)
     values: list[ca.SX] = [q_defect, v_defect * h]
@@ -287,7 +315,7 @@ def _interval_function(scenario: Scenario, h: float, width: int) -> tuple[ca.Fun
 
     _tube_rows(scenario, h, start, end, values, rows)
     before, after = (_motions(scenario, *pair)[1:] for pair in ((x, parameters), (x_end, parameters_end)))
-    for index, limit in scenario.limits.items():
+    for index, limit in scenario.free_limits(mesh.shrink).items():
         _carrier_rows(robot.carriers[index].name, limit, h, before[index], after[index], values, rows)
     return ca.Function("interval", [x, x_end, parameters, parameters_end], [cost, ca.vertcat(*values)]), rows
 
@@ -295,15 +323,16 @@ def _interval_function(scenario: Scenario, h: float, width: int) -> tuple[ca.Fun
 def _tube_rows(scenario: Scenario, h: float, start: tuple, end: tuple, values: list[ca.SX], rows: list[Row]) -> None:
     tube = scenario.task.tube
     inner = spline.position_points(h, start[0], start[1], end[0], end[1])
-    if tube.position > 0:
+    moving = [i for i, coordinate in enumerate(scenario.platform_free) if coordinate in POSITION]
+    turning = [i for i, coordinate in enumerate(scenario.platform_free) if coordinate in ATTITUDE]
+    if moving:
         for q in (start[0], *inner, end[0]):
-            values.append(ca.sumsqr(q[: len(POSITION)]) / tube.position**2)
+            values.append(ca.sumsqr(q[moving]) / tube.position**2)
             rows.append(("tube", -np.inf, 1.0))
-    if tube.attitude > 0:
-        first = len(scenario.platform_free) - len(ATTITUDE)
+    if turning:
         for q in inner:
-            values.append(q[first : first + len(ATTITUDE)] / tube.attitude)
-            rows += [("tube attitude", -1.0, 1.0)] * len(ATTITUDE)
+            values.append(q[turning] / tube.attitude)
+            rows += [("tube attitude", -1.0, 1.0)] * len(turning)
 
 
 def _carrier_rows(
@@ -318,40 +347,45 @@ def _carrier_rows(
         for speed in (start[1], spline.speed_point(h, start[1], start[2]), end[1]):
             values.append(ca.sumsqr(speed[0:3]) / limit.speed**2)
             rows.append((f"{name} speed", -np.inf, 1.0))
-    if limit.tilt > 0:
+    if limit.tilt:
         for point in (start[0], *inner, end[0]):
             # Below 90 degrees {cos r cos p >= c} is convex, so the Bernstein points bound the whole interval.
             values.append(ca.cos(point[3]) * ca.cos(point[4]))
             rows.append((f"{name} tilt", float(np.cos(limit.tilt)), np.inf))
 
 
-def _simple_bounds(scenario: Scenario, width: int, steps: int, reserve: float) -> tuple[np.ndarray, np.ndarray]:
+def _simple_bounds(scenario: Scenario, mesh: Mesh, nodes: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the unknowns themselves: tensions, attitude in the tube, and what is fixed at the ends."""
     n, m = scenario.count, scenario.robot.m
-    lower, upper = np.full((steps + 1, width), -np.inf), np.full((steps + 1, width), np.inf)
+    lower, upper = np.full((len(nodes), width), -np.inf), np.full((len(nodes), width), np.inf)
     low, high = scenario.bounds()
-    middle = (low + high) / 2
-    lower[:, 3 * n : 3 * n + m] = np.minimum(low + reserve, middle) / scenario.robot.weight
-    upper[:, 3 * n : 3 * n + m] = np.maximum(high - reserve, middle) / scenario.robot.weight
-    tube, ends = scenario.task.tube, getattr(scenario.task.base, "ends", None)
+    reserve = np.minimum(mesh.reserve, (high - low) / 4)
+    lower[:, 3 * n : 3 * n + m] = (low + reserve) / scenario.robot.force_scale
+    upper[:, 3 * n : 3 * n + m] = (high - reserve) / scenario.robot.force_scale
+    tube, ends = scenario.task.tube, getattr(scenario.task.base, "ends", "free")
+    references = scenario.references(nodes[[0, -1]])[1]
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         if owner is None and coordinate in ATTITUDE:
             lower[:, column], upper[:, column] = -tube.attitude, tube.attitude
-        fixed = {"exact": [column, n + column], "rest": [n + column]}
         for end in (0, -1):
-            zero = fixed.get(tube.ends if owner is None else ends or "free", [])
-            lower[end, zero] = upper[end, zero] = 0.0
+            if (tube.ends if owner is None else ends) == "exact":
+                lower[end, [column, n + column]] = upper[end, [column, n + column]] = 0.0
+            elif owner is not None and ends == "rest":
+                # The deviation undoes what speed the reference has there.
+                lower[end, n + column] = upper[end, n + column] = -references[owner].velocity[end, coordinate]
     return lower.ravel(), upper.ravel()
 
 
 class _Watch(ca.Callback):
-    """Tells a progress function about each iteration of the solver."""
+    """Tells a progress function about each iteration of the solver, and stops it when a person presses Ctrl-C."""
 
-    def __init__(self, program: Program, progress: Progress):
+    def __init__(self, program: Program, progress: Progress | None):
         super().__init__()
         self._sizes = {"x": program.problem["x"].numel(), "g": program.problem["g"].numel(), "f": 1}
         self._bounds = (program.lower_g, program.upper_g)
         self._progress = progress
         self._iteration = 0
+        self.interrupted = False
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
@@ -372,9 +406,13 @@ class _Watch(ca.Callback):
         return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[int]:
-        g = arg[2].full().ravel()
-        low, high = self._bounds
-        infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
-        self._progress(self._iteration, float(arg[1]), infeasibility)
-        self._iteration += 1
-        return [0]
+        try:
+            if self._progress is not None:
+                g = arg[2].full().ravel()
+                low, high = self._bounds
+                infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
+                self._progress(self._iteration, float(arg[1]), infeasibility)
+            self._iteration += 1
+        except KeyboardInterrupt:
+            self.interrupted = True
+        return [int(self.interrupted)]

@@ -65,6 +65,27 @@ def test_robots_lists_and_diagnoses():
     assert json.loads(run("robots", "--schema").stdout)["title"] == "Robot"
 
 
+def test_robots_draws_and_tells_whether_it_can_rest(tmp_path):
+    resting = run("robots", "wang-flying", "--figure", tmp_path / "robot.png")
+    assert resting.returncode == 0
+    assert "at rest at home: tensions 2.194 N" in resting.stdout
+    assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
+    falling = run("robots", "wang-ctmrts")
+    assert "cannot rest at home (singular)" in falling.stdout
+    assert "short by" in falling.stdout
+
+
+def test_export_writes_models_for_others(tmp_path):
+    for option, file in (("--mjcf", "wang-flying.xml"), ("--c", "wang-flying.c")):
+        done = run("export", "wang-flying", option, cwd=tmp_path)
+        assert done.returncode == 0
+        assert done.stdout.strip() == file
+        assert (tmp_path / file).stat().st_size > 1000
+    done = run("export", "wang-flying")
+    assert done.returncode == 2
+    assert "accepted: exactly one of --mjcf and --c" in done.stderr
+
+
 def test_tension_prints_the_promised_keys():
     done = run("tension", "wang-flying", "--pose", "0 0 -1 0 0 0", "--json")
     assert done.returncode == 0
@@ -201,5 +222,5 @@ def test_wrong_arguments_are_one_line_and_exit_code_2(arguments, message):
 
 def test_version_and_help():
     assert run("--version").stdout.strip() == "towline 0.1.0"
-    for command in ("demo", "robots", "tension", "plan"):
+    for command in ("demo", "robots", "tension", "plan", "export"):
         assert run(command, "--help").returncode == 0

@@ -279,6 +279,19 @@ def test_symbols_in_give_symbols_out(symbol):
     np.testing.assert_allclose(evaluated, dynamics.wrench_matrix(robot.home), rtol=1e-15)
 
 
+def test_wrong_symbols_are_named():
+    dynamics = Dynamics(load("wang-flying"))
+    pose = ca.MX.sym("pose", 6)
+    for arguments, message in (
+        ({"pose": ca.MX.sym("x")}, r"pose: is an expression of shape \(1, 1\); accepted: \(6, 1\)"),
+        ({"pose": pose, "carrier_pose": ca.SX.sym("c", 1, 6)}, "SX and MX in one call"),
+        ({"pose": pose, "carrier_pose": np.zeros((4, 1, 6))}, "beside expressions; accepted"),
+        ({"pose": pose, "carrier_pose": np.full((1, 6), np.nan)}, "carrier_pose: is nan"),
+    ):
+        with pytest.raises(InputError, match=message):
+            dynamics.wrench_matrix(**arguments)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -300,3 +313,30 @@ def test_wrong_arguments_are_named(arguments, message):
 def test_relative_form_needs_one_carrier():
     with pytest.raises(InputError, match="has 3 carriers; accepted: robots with one carrier"):
         _ = Dynamics(load("wang-ctmrts")).relative
+
+
+def test_pulleys_lead_the_cables():
+    """A robot with pulleys: lengths' derivatives are -A, also for carriers that turn; r -> 0 is the point anchor."""
+    robot = load("caroca-pulleys")
+    dynamics = Dynamics(robot)
+    pose = robot.home + np.array([0.1, -0.2, 0.1, 0.05, -0.1, 0.15])
+    carriers = robot.carrier_home + np.array([0.1, 0.2, -0.1, 0.1, -0.05, 0.2])
+    A = dynamics.wrench_matrix(pose, carriers)
+    R = rotation_of(pose)
+    for axis in range(6):
+        twist = np.eye(6)[axis]
+
+        def lengths(s, twist=twist):
+            moved = Rotation.from_rotvec(s * twist[3:]).as_matrix() @ R
+            angles = Rotation.from_matrix(moved).as_euler("ZYX")[::-1]
+            com = pose[:3] + R @ np.array(robot.platform.com) + s * twist[:3]
+            return dynamics.cable_lengths(
+                np.concatenate([com - moved @ np.array(robot.platform.com), angles]), carriers
+            )
+
+        np.testing.assert_allclose(-derivative(lengths), A.T @ twist, atol=1e-8)
+    cables = [c.model_copy(update={"pulley": c.pulley.model_copy(update={"radius": 1e-9})}) for c in robot.cables]
+    points = [c.model_copy(update={"pulley": None}) for c in robot.cables]
+    small = Dynamics(robot.model_copy(update={"cables": tuple(cables)})).wrench_matrix(pose)
+    bare = Dynamics(robot.model_copy(update={"cables": tuple(points)})).wrench_matrix(pose)
+    np.testing.assert_allclose(small, bare, atol=1e-8)

@@ -15,6 +15,7 @@ from towline.ocp.audit import audit
 from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
 from towline.ocp.scenario import Deviation, lay_out
 
+GRAVITY = 9.81
 HOVER = [50, 50, 100, 0, 0, 0]
 CIRCLE = {"kind": "circle", "centre": [50, 50, 99], "radius": 1, "rate": 0.2 * np.pi}
 FREE = {"kind": "free", "around": {"quad": {"kind": "rest", "pose": HOVER}}, "acceleration_max": 3, "ends": "periodic"}
@@ -99,8 +100,8 @@ def judge(robot, trajectory, margin=0.0, residual=1e-6):
     for prefix in ("", "carrier_"):
         for value, rate in (("pose", "velocity"), ("velocity", "acceleration")):
             differences = np.gradient(data[prefix + value], times, axis=0, edge_order=2)[2:-2]
-            scale = max(np.abs(data[prefix + rate]).max(), 1e-3)
-            assert np.abs(differences - data[prefix + rate][2:-2]).max() < 0.02 * scale
+            scale = np.abs(data[prefix + rate]).max()
+            assert np.abs(differences - data[prefix + rate][2:-2]).max() < 0.02 * scale + 0.005
 
 
 def support(A, direction, low, high):
@@ -262,7 +263,7 @@ def test_tilting_base_in_the_carriers_frame_stays_inside_its_tilt():
 
 def test_no_plan_is_told_with_the_worst_time_of_the_closest_motion():
     robot = load("wang-flying")
-    found = plan(robot, {"path": CIRCLE, "base": {**FREE, "speed_max": 0.05, "ends": "free"}, "steps": 40})
+    found = plan(robot, {"path": CIRCLE, "base": {**FREE, "ends": "exact"}, "steps": 40})  # starts 1 m beside it
     assert found.status is PlanStatus.NOT_FOUND
     row = int(np.argmin(np.abs(found.trajectory["time"].values - found.certificate["time"])))
     at = found.trajectory.isel(time=row)
@@ -271,8 +272,7 @@ def test_no_plan_is_told_with_the_worst_time_of_the_closest_motion():
     w = dynamics.required_wrench(at["pose"].values, at["velocity"].values, at["acceleration"].values)
     direction = np.array(found.certificate["direction"])
     short = direction @ w - support(A, direction, robot.t_min, robot.t_max)
-    assert short == pytest.approx(found.certificate["shortfall"], rel=1e-6)
-    assert short > 0
+    assert short == pytest.approx(found.certificate["shortfall"], rel=1e-2)  # the nearest saved instant
 
 
 def test_redundant_ground_robot_and_wind():
@@ -285,6 +285,140 @@ def test_redundant_ground_robot_and_wind():
     still = plan(flying, {"path": {**CIRCLE, "centre": [0, 0, -1], "radius": 0.1}})
     windy = plan(flying, {"path": {**CIRCLE, "centre": [0, 0, -1], "radius": 0.1}, "wind": [2, 0, 0]})
     assert windy.tension_min < still.tension_min
+
+
+def test_a_slow_base_finds_the_conical_pendulum():
+    """A base that hardly moves can still do it: from L = g / omega^2 = 24.8 m above, the load circles by itself."""
+    robot = load("wang-flying")
+    found = plan(robot, {"path": CIRCLE, "base": {**FREE, "speed_max": 0.02, "ends": "free"}, "steps": 40})
+    assert found.feasible, found.report()
+    judge(robot, found.trajectory)
+    height = found.trajectory["carrier_pose"].values[:, 0, 2] - 99
+    assert height.mean() == pytest.approx(GRAVITY / (0.2 * np.pi) ** 2, rel=0.35)
+
+
+def test_a_wide_tube_is_used_when_the_path_itself_is_impossible():
+    """Resting at the centre is inside the tube; the planner must find that, whatever its mesh."""
+    path = {"kind": "circle", "centre": [0, 0, -1], "radius": 1, "rate": 1}
+    for steps in (8, 25, 40):
+        found = plan(load("wang-flying"), {"path": path, "tube": {"position": 1.2}, "steps": steps})
+        assert found.feasible, found.report()
+        assert found.tracking_error_max <= 1.2 + 1e-7
+
+
+def test_limits_hold_between_nodes_also_for_a_curved_reference():
+    circle = {"kind": "circle", "centre": [0, 0, 0], "radius": 1, "rate": 0.628318}
+    base = {"kind": "free", "acceleration_max": 0.3, "ends": "periodic", "around": {"quad": circle}}
+    path = {**circle, "centre": [0, 0, -1]}
+    found = plan(load("wang-flying"), {"path": path, "steps": 50, "base": base})
+    assert found.feasible, found.report()
+    acceleration = found.trajectory["carrier_acceleration"].values[:, 0, :3]
+    assert np.linalg.norm(acceleration, axis=1).max() <= 0.3 * (1 + 1e-6)
+
+
+def test_rest_is_rest_also_beside_a_moving_reference():
+    line = {"kind": "line", "start": [0, 0, 0], "end": [2, 0, 0], "timing": "uniform"}
+    path = {"kind": "line", "start": [0, 0, -1], "end": [2, 0, -1]}
+    base = {"kind": "free", "ends": "rest", "around": {"quad": line}}
+    found = plan(load("wang-flying"), {"path": path, "duration": 4, "base": base})
+    assert found.feasible, found.report()
+    np.testing.assert_allclose(found.trajectory["carrier_velocity"].values[[0, -1]], 0, atol=1e-6)
+
+
+def test_carriers_limits_count_whatever_the_base_does():
+    """Held or given far outside their reach boxes, or too fast: no such plan is feasible."""
+    robot = load("wang-ctmrts")
+    rest = {"kind": "rest", "pose": [1.261, 0.961, 0.4]}
+    far = {"robot1": [22, 0.45, 1.2, 0, 0, 0], "robot2": [1.275, 20.27, 1.2, 0, 0, 0]}
+    found = plan(robot, {"path": rest, "duration": 1, "base": {"kind": "hold", "poses": far}, "tube": {"attitude": 1}})
+    assert not found.feasible
+    assert any("reach box" in sentence for sentence in found.audit.excess)
+    turned = {"robot1": [2.2, 0.45, 1.2, 0, 0, 0.5]}
+    found = plan(robot, {"path": rest, "duration": 1, "base": {"kind": "hold", "poses": turned}})
+    assert any("keeps its attitude" in sentence for sentence in found.audit.excess)
+    fast = {"kind": "line", "start": [2.1, 0.45, 1.2], "end": [2.3, 0.45, 1.2], "timing": "uniform"}
+    found = plan(robot, {"path": rest, "duration": 0.1, "base": {"kind": "given", "paths": {"robot1": fast}}})
+    assert any("speed 2 m/s exceeds 1 m/s" in sentence for sentence in found.audit.excess)
+
+
+def test_turning_in_place_is_not_infinitely_fast():
+    points = [[0, 0, 1, 0, 0, 0], [0.1, 0, 1, 0, 0, 0], [0.1, 0, 1, 0, 0, 0.05], [0.2, 0, 1, 0, 0, 0.05]]
+    path = WaypointPath(kind="waypoints", points=points)
+    assert np.abs(path.at(np.linspace(0, 10, 1001), 10.0).velocity).max() < 0.5
+
+
+def test_an_unconverged_motion_is_not_feasible(circle_free):
+    """The audit looks at tube and ends too, which only a converged program keeps."""
+    scenario = lay_out(load("wang-flying"), read_task({"path": CIRCLE, "base": {**FREE, "ends": "rest"}}))
+    seen = audit(scenario, circle_free.deviation)
+    assert any("should be at rest" in sentence for sentence in seen.excess)
+    narrow = {"path": {**CIRCLE, "centre": [0, 0, -1]}, "tube": {"position": 0.5}}
+    scenario = lay_out(load("wang-flying"), read_task(narrow))
+    nodes = np.linspace(0, 10, 5)
+    outside = Deviation(nodes, np.full((5, 3), 0.4), np.zeros((5, 3)), np.zeros((5, 3)), np.ones((5, 6)))
+    assert any("exceeds the tube" in sentence for sentence in audit(scenario, outside).excess)
+
+
+def test_drive_modes_of_three_robots():
+    """Paper C's three types: lengths fixed, lengths changing at fixed robot-ends, both."""
+    data = load("wang-ctmrts").model_dump(mode="json")
+    for cable in data["cables"]:
+        cable["length"] = 1.2
+    path = {"kind": "line", "start": [1.2, 0.92, 0.65], "end": [1.3, 1.0, 0.75]}
+    task = {"path": path, "duration": 3, "base": {"kind": "free", "ends": "rest"}, "margin": 1}
+    fixed = Robot.model_validate({**data, "drive": "fixed-length"})
+    found = plan(fixed, task)
+    assert found.feasible, found.report()
+    judge(fixed, found.trajectory, margin=1, residual=1e-3 * fixed.weight)
+    values = found.trajectory
+    lengths = Dynamics(fixed).cable_lengths(values["pose"].values, values["carrier_pose"].values)
+    np.testing.assert_allclose(lengths, 1.2, atol=1e-4)
+    held = plan(fixed, {**task, "base": {"kind": "hold"}})
+    assert any("off the fixed 1.2 m" in sentence for sentence in held.audit.excess)
+    with pytest.raises(InputError, match=r"has no carrier that moves .drive: variable-length."):
+        plan(Robot.model_validate({**data, "drive": "variable-length"}), task)
+
+
+def test_without_gravity():
+    """A robot in space is held from all sides or not at all; nothing divides by its weight."""
+    data = load("ipanema-1").model_dump(mode="json")
+    robot = Robot.model_validate({**data, "gravity": [0, 0, 0]})
+    found = plan(
+        robot, {"path": {"kind": "line", "start": [0, 0, 1], "end": [0.2, 0, 1.1]}, "duration": 2, "margin": 5}
+    )
+    assert found.feasible
+    judge(robot, found.trajectory, margin=5)
+    flying = Robot.model_validate({**load("wang-flying").model_dump(mode="json"), "gravity": [0, 0, 0]})
+    task = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1, "steps": 10, "base": {"kind": "free"}}
+    assert not plan(flying, task).feasible
+
+
+def test_saved_samples_are_audited_and_equally_spaced():
+    path = {"kind": "line", "start": [0, 0, -1], "end": [0, 0, -1.1]}
+    for rate, duration in ((100, 1.2345), (5000, 0.1), (30, 2)):
+        found = plan(load("wang-flying"), {"path": path, "duration": duration, "output_rate": rate})
+        times = found.trajectory["time"].values
+        assert np.ptp(np.diff(times)) < 1e-12
+        assert times[[0, -1]] == pytest.approx([0, duration])
+        assert len(times) == round(duration * rate) + 1
+        assert found.audit.rate >= 1000
+
+
+def test_an_infeasible_plan_too_is_audited_throughout():
+    found = plan(load("wang-flying"), {"path": CIRCLE, "base": {"kind": "hold", "poses": {"quad": HOVER}}, "steps": 7})
+    assert found.audit.summary()["rate_hz"] == 1000
+    assert found.certificate["shortfall"] == pytest.approx(7.627487150, abs=1e-8)
+
+
+def test_interrupting_stops_the_planner():
+    """Ctrl-C ends the search; it is not taken for a failure that calls for another try."""
+
+    def impatient(iteration, *_):
+        if iteration == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan(load("wang-flying"), {"path": CIRCLE, "base": FREE}, impatient)
 
 
 def test_audit_sees_between_the_nodes():
@@ -300,8 +434,8 @@ def test_audit_sees_carriers_out_of_their_limits(circle_free):
     scenario = circle_free.scenario
     good = circle_free.deviation
     fast = Deviation(good.nodes, good.q, good.v, 10 * good.a, good.tensions)
-    seen = audit(scenario, fast, rate=20)
-    assert any("acceleration" in sentence for sentence in seen.carrier_excess)
+    seen = audit(scenario, fast)
+    assert any("acceleration" in sentence for sentence in seen.excess)
     assert not seen.passed
 
 
@@ -316,6 +450,27 @@ WRONG = {
     "too long": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 1]}, "duration": 2},
         "duration: 2 s is longer than path, whose times end at 1 s",
+    ),
+    "too short": (
+        {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 3]}, "duration": 2},
+        "duration: 2 s is shorter than path, whose times end at 3 s",
+    ),
+    "for ever": (
+        {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1e5},
+        "duration: 100000 s; accepted: at most",
+    ),
+    "at an anchor": (
+        {"path": {"kind": "rest", "pose": [0.395, -0.216506350946, -0.1]}, "duration": 1},
+        "path: at t = 0.000 s anchor and attachment of cable 1 coincide",
+    ),
+    "tilt in degrees": ({"path": CIRCLE, "base": {"kind": "free", "tilt_max": 10}}, "base.tilt_max: .*less than 1.5"),
+    "path without kind": (
+        {"path": CIRCLE, "base": {"kind": "free", "around": {"quad": {"pose": [0, 0, 0]}}}},
+        "base.around.quad.kind: is missing; accepted: one of circle, line, rest, samples, waypoints",
+    ),
+    "same point twice": (
+        {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -1], [0, 0, -2]]}, "duration": 2},
+        r"path: points\[1\] is points\[0\] again",
     ),
     "kind": ({"path": {"kind": "spiral"}}, "path.kind: 'spiral' is unknown; accepted"),
     "times": (

@@ -1,11 +1,13 @@
 """Files are written whole or not at all."""
 
+import os
+import stat
 from pathlib import Path
 
 import pytest
 
 from towline.errors import InputError
-from towline.writing import whole_file
+from towline.writing import check_writable, whole_file
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -24,3 +26,30 @@ def test_a_place_that_cannot_be_written_to_is_named():
         whole_file(Path("/proc/nowhere/robot.yaml")),
     ):
         pass
+
+
+def test_folders_devices_and_pipes_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path, kind in (
+        (tmp_path, "folder"),
+        (Path("/dev/null"), "device"),
+        (tmp_path / "pipe", "pipe"),
+        (Path(), "folder"),
+    ):
+        with pytest.raises(InputError, match=kind):
+            check_writable(path)
+        with pytest.raises(InputError, match=kind), whole_file(path):
+            pass
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+def test_links_are_followed_and_permissions_kept(tmp_path):
+    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
+    real.write_text("before")
+    real.chmod(0o640)
+    link.symlink_to(real)
+    with whole_file(link) as temporary:
+        temporary.write_text("after")
+    assert link.is_symlink()
+    assert real.read_text() == "after"
+    assert stat.S_IMODE(real.stat().st_mode) == 0o640

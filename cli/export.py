@@ -1,0 +1,44 @@
+"""`towline export`: a robot for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import JsonOption, RobotArgument, print_json
+
+
+def export(
+    robot: RobotArgument,
+    mjcf: Annotated[bool, typer.Option("--mjcf", help="A MuJoCo model.")] = False,
+    c_code: Annotated[
+        bool, typer.Option("--c", help="C code of the dynamics' functions, without dependencies.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option("--out", help="File to write; none: ROBOT.xml or ROBOT.c here.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Export a robot as a MuJoCo model (--mjcf) or as C code (--c)."""
+    from ..errors import InputError
+    from ..models import load
+    from ..writing import whole_file
+
+    if mjcf == c_code:
+        raise InputError("export: accepted: exactly one of --mjcf and --c")
+    loaded = load(robot)
+    path = out or Path(f"{loaded.name}{'.xml' if mjcf else '.c'}")
+    if mjcf:
+        from ..models.mjcf import to_mjcf
+
+        text = to_mjcf(loaded)
+    else:
+        from ..models.c_code import to_c
+
+        text = to_c(loaded)
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    if as_json:
+        print_json({"robot": loaded.name, "file": str(path)})
+    else:
+        typer.echo(str(path))

@@ -1,0 +1,98 @@
+"""A robot in space: carriers, anchors, cables coloured by tension, platform, and where it can rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import style
+from .plan import equal_scales, few_ticks
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class RobotSketch:
+    """What is drawn; everything in {G} [m].
+
+    Attributes
+    ----------
+    anchors, attachments
+        (m, 3).
+    com
+        (3,).
+    carriers
+        (c, 3) origins of the carriers' frames, and their names.
+    boxes
+        Corners (low, high) of reach boxes.
+    tensions
+        (m,) [N], or None: cables are grey.
+    positions, feasible
+        (k, 3) and (k,): where the platform can rest and where not.
+    """
+
+    title: str
+    anchors: np.ndarray
+    attachments: np.ndarray
+    com: np.ndarray
+    carriers: np.ndarray
+    names: list[str]
+    boxes: list[tuple[np.ndarray, np.ndarray]]
+    tensions: np.ndarray | None
+    positions: np.ndarray
+    feasible: np.ndarray
+
+
+def draw(sketch: RobotSketch) -> Figure:
+    """Draw a robot."""
+    from matplotlib import cm, colormaps, colors
+    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
+
+    canvas = style.figure(5.6, 4.6)
+    ax: Any = canvas.add_subplot(projection=Axes3D.name)
+    inside = sketch.positions[sketch.feasible]
+    if len(inside):
+        ax.scatter(*inside.T, s=5, color=style.colour(2), alpha=0.5, linewidths=0, label="can rest here")
+    tensions = sketch.tensions
+    scale = colors.Normalize(0, float(tensions.max()) or 1.0) if tensions is not None else None
+    for index, (anchor, attachment) in enumerate(zip(sketch.anchors, sketch.attachments, strict=True)):
+        shade = "#999999" if tensions is None or scale is None else colormaps["viridis_r"](scale(tensions[index]))
+        ax.plot(*np.stack([anchor, attachment]).T, color=shade, linewidth=1.2)
+    ax.scatter(*sketch.anchors.T, s=12, color="#000000", label="anchors")
+    ax.scatter(*sketch.com, s=24, color=style.colour(1), label="CoM")
+    ax.add_collection3d(_platform(sketch.attachments))
+    for low, high in sketch.boxes:
+        for edge in _edges(low, high):
+            ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
+    for position, name in zip(sketch.carriers, sketch.names, strict=True):
+        ax.text(*position, name, fontsize=7)
+    for axis in "xyz":
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
+        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
+    ax.set_title(sketch.title, fontsize=9)
+    ax.legend(fontsize="x-small", loc="upper left")
+    if scale is not None:
+        mappable = cm.ScalarMappable(scale, "viridis_r")
+        canvas.colorbar(mappable, ax=ax, shrink=0.6, pad=0.12, label="tension [N]")
+    return canvas
+
+
+def _platform(attachments: np.ndarray) -> Any:
+    """The attachments' hull as a filled shape, its corners in order of angle about their centre."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    centre = attachments.mean(axis=0)
+    _, _, axes = np.linalg.svd(attachments - centre)
+    flat = (attachments - centre) @ axes[:2].T
+    order = np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))
+    return Poly3DCollection([attachments[order]], facecolor=style.colour(4), edgecolor=style.colour(0), alpha=0.5)
+
+
+def _edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
+    """The twelve edges of a box, (2, 3) each."""
+    corners = np.array([[(low, high)[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
+    return [corners[[i, i | 1 << k]] for i in range(8) for k in range(3) if not i >> k & 1]

@@ -1,0 +1,75 @@
+"""Stiffness and natural frequencies of a robot about an equilibrium.
+
+The platform is displaced by a small twist delta = (translation of the CoM, rotation vector), both in {G}. Its cables
+then pull with another wrench, -K delta. With inextensible cables under constant tensions only the geometry changes,
+with elastic ones the tensions too:
+
+    K = K_t + sum_i k_i a_i a_i^T,   k_i = E A / L0_i,   L0_i = l_i / (1 + t_i / E A)
+
+with a_i the columns of A and K_t = -d(A t)/d delta at constant t. Frequencies solve K v = (2 pi f)^2 M v with
+M = blockdiag(m, I) about the CoM; inextensible cables leave the motions with A^T delta = 0.
+
+Source: Behzadipour and Khajepour, "Stiffness of cable-based parallel manipulators with application to stability
+analysis", 2006, for the split; the derivative is CasADi's.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from .cables.pulley import exit_points
+from .robot import Robot
+from .rotation import Matrix, rotation
+
+
+def tension_stiffness(robot: Robot, pose: Matrix, anchor_points: Matrix, axes: Matrix, tensions: Matrix) -> Matrix:
+    """K_t, (6, 6), in {G} about the CoM [N/m, N, N m]: what constant tensions make of a displacement."""
+    delta = ca.SX.sym("delta", 6)
+    symbols = [
+        ca.SX.sym("pose", 6),
+        ca.SX.sym("anchors", 3, robot.m),
+        ca.SX.sym("axes", 3, robot.m),
+        ca.SX.sym("t", robot.m),
+    ]
+    R = rotation(symbols[0][3:6])
+    com = symbols[0][0:3] + R @ ca.DM(robot.platform.com)
+    arms = R @ ca.DM((robot.attachments - np.array(robot.platform.com)).T)
+    turned = arms + ca.skew(delta[3:6]) @ arms  # to first order, which is all that a derivative at zero sees
+    moved = ca.repmat(com + delta[0:3], 1, robot.m) + turned
+    directions = exit_points(symbols[1], symbols[2], robot.pulley_radii, moved).directions
+    forces = directions * ca.repmat(symbols[3].T, 3, 1)
+    moments = [ca.cross(turned[:, i], forces[:, i]) for i in range(robot.m)]
+    wrench = ca.vertcat(ca.sum2(forces), ca.sum2(ca.horzcat(*moments)))
+    K = ca.substitute(-ca.jacobian(wrench, delta), delta, ca.DM.zeros(6))
+    return ca.Function("tension_stiffness", symbols, [K])(pose, anchor_points, axes, tensions)
+
+
+def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) -> Matrix:
+    """sum_i k_i a_i a_i^T, (6, 6), in {G} about the CoM [N/m, N, N m]; every cable needs its `stiffness` E A."""
+    EA = ca.DM([cable.stiffness or np.inf for cable in robot.cables])
+    k = (EA + tensions) / lengths  # E A / L0 with the unstrained length L0 = l / (1 + t / E A)
+    return A @ ca.diag(k) @ A.T
+
+
+def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
+    """blockdiag(m, I) about the CoM in {G}, (6, 6) [kg, kg m^2]."""
+    R = rotation(ca.DM(pose)[3:6]).full()
+    M = np.zeros((6, 6))
+    M[:3, :3] = robot.platform.mass * np.eye(3)
+    M[3:, 3:] = R @ robot.inertia @ R.T
+    return M
+
+
+def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Natural frequencies [Hz], ascending, and their modes (6, k) as twists, of motions in the span of `free` (6, k).
+
+    An unstable motion has a negative frequency: minus the rate of growth over 2 pi.
+    """
+    from scipy.linalg import eigh
+
+    if free.shape[1] == 0:
+        return np.zeros(0), np.zeros((6, 0))
+    symmetric = (K + K.T) / 2  # at an equilibrium K is symmetric; rounding and residual wrenches are cut off here
+    squares, modes = eigh(free.T @ symmetric @ free, free.T @ M @ free)
+    return np.sign(squares) * np.sqrt(np.abs(squares)) / (2 * np.pi), free @ modes

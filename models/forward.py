@@ -1,0 +1,97 @@
+"""Forward dynamics: accelerations from tensions, of the platform alone and together with quadrotor carriers.
+
+The wrench that a motion needs is affine in the accelerations, w = M(q) ddq + h(q, dq), so
+
+    platform   M ddq = A t + W_e - h
+    quadrotor  m_Q (ddx_Q - g) = f R_Q e_z - sum_i t_i u_i
+               I_Q alpha_Q + omega_Q x I_Q omega_Q = tau - sum_i (a_i x R_Q^T u_i) t_i       (in its own axes)
+
+for thrust f along its z axis, torque tau, and the cables i that it carries: what pulls the platform pulls the
+quadrotor back. Coordinates are (x, y, z, roll, pitch, yaw) and their derivatives. Source: Newton and Euler.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from . import rigid_body
+from .robot import QuadrotorCarrier, Robot, inertia_matrix
+from .rotation import Matrix, inverse_rate_matrix, rate_matrix, rate_matrix_derivative, rotation
+
+
+def mass_matrix(robot: Robot, pose: Matrix) -> Matrix:
+    """M(q), (6, 6): the wrench about the CoM in {G} that each coordinate's acceleration needs [kg, kg m, kg m^2]."""
+    R = rotation(pose[3:6])
+    offset = R @ ca.DM(robot.platform.com)
+    turning = R @ rate_matrix(pose[3:6])  # alpha = turning ddTheta + ...
+    inertia = R @ ca.DM(robot.inertia) @ R.T
+    mass = robot.platform.mass
+    top = ca.horzcat(mass * ca.DM.eye(3), -mass * ca.skew(offset) @ turning)
+    return ca.vertcat(top, ca.horzcat(ca.DM.zeros(3, 3), inertia @ turning))
+
+
+def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: Matrix) -> Matrix:
+    """ddq, (6, 1), of the platform under `wrench` (6, 1), the force and moment about the CoM in {G} beside gravity.
+
+    Coordinates that are not in `platform.dof` do not accelerate.
+    """
+    resting = rigid_body.inertial_wrench(robot, pose, velocity, ca.DM.zeros(6))
+    rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
+    moving = ca.solve(mass_matrix(robot, pose)[rows, rows], (wrench - resting)[rows])
+    chosen = ca.DM(6, len(rows))
+    for column, row in enumerate(rows):
+        chosen[row, column] = 1
+    return chosen @ moving
+
+
+def quadrotor_acceleration(
+    carrier: QuadrotorCarrier,
+    gravity: np.ndarray,
+    pose: Matrix,
+    velocity: Matrix,
+    thrust: Matrix,
+    torque: Matrix,
+    pull: Matrix,
+) -> Matrix:
+    """ddq, (6, 1), of a quadrotor carrier.
+
+    Parameters
+    ----------
+    pose, velocity
+        (6, 1) each, of its frame in {G}.
+    thrust
+        Total thrust f along its z axis [N].
+    torque
+        tau about its axes, (3, 1) [N m].
+    pull
+        Force in {G} [N] and moment about its CoM in its own axes [N m] of its cables, (6, 1).
+    """
+    angles, rates = pose[3:6], velocity[3:6]
+    R = rotation(angles)
+    acceleration = ca.DM(gravity) + (R[:, 2] * thrust + pull[0:3]) / carrier.mass
+    inertia = ca.DM(inertia_matrix(carrier.inertia))
+    Omega = rate_matrix(angles) @ rates
+    alpha = ca.DM(np.linalg.inv(inertia.full())) @ (torque + pull[3:6] - ca.cross(Omega, inertia @ Omega))
+    angular = inverse_rate_matrix(angles) @ (alpha - rate_matrix_derivative(angles, rates) @ rates)
+    return ca.vertcat(acceleration, angular)
+
+
+def pull_on_carrier(robot: Robot, index: int, A: Matrix, carrier_pose: Matrix, tensions: Matrix) -> Matrix:
+    """What the cables of carrier `index` do to it, (6, 1): force in {G} [N], moment about its frame in its axes [N m].
+
+    Parameters
+    ----------
+    A
+        Wrench matrix, (6, m), whose first three rows are the directions u_i in {G}.
+    carrier_pose
+        (6, 1), of the carrier in {G}.
+    """
+    R = rotation(carrier_pose[3:6])
+    force, moment = ca.DM.zeros(3), ca.DM.zeros(3)
+    for cable in np.flatnonzero(robot.carrier_of_cable == index):
+        i = int(cable)
+        along = -tensions[i] * A[0:3, i]
+        force = force + along
+        moment = moment + ca.cross(ca.DM(robot.anchors[i]), R.T @ along)
+    return ca.vertcat(force, moment)

@@ -1,0 +1,152 @@
+"""Forward geometrico-statics: where the platform comes to rest for given cable lengths and carriers.
+
+An inextensible cable holds the distance of its ends to at most its length and pulls only when it is straight. So the
+platform rests where its potential energy has a minimum among the poses that the cables allow,
+
+    min  - m g . c(q)    s.t.    l_i(q) <= L_i,
+
+whose multipliers are the tensions [N]: zero for slack cables, and A t + m g = 0 is its condition of optimality. That
+holds for any number of cables. There may be several minima; starts spread over the pose space look for them.
+
+Source: the energy form of the direct geometrico-static problem of Berti, Merlet and Carricato (2016).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..errors import InputError
+from .dynamics import Dynamics
+from .robot import Robot
+from .rotation import rotation
+
+SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length`, are one solution
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A pose at which the platform rests stably.
+
+    Attributes
+    ----------
+    pose
+        (6,) in {G} [m, rad].
+    tensions
+        (m,) [N], zero for slack cables.
+    lengths
+        Distances of anchors and attachments, (m,) [m].
+    energy
+        Potential energy relative to the origin of {G} [J].
+    residual
+        |A t + m g| with moments over `Robot.length` [N].
+    """
+
+    pose: np.ndarray
+    tensions: np.ndarray
+    lengths: np.ndarray
+    energy: float
+    residual: float
+
+    @property
+    def slack(self) -> np.ndarray:
+        """Indices of cables that do not pull."""
+        return np.flatnonzero(self.tensions < 1e-6 * max(self.tensions.max(initial=0.0), 1e-12))
+
+
+def equilibria(
+    robot: Robot,
+    lengths: np.ndarray,
+    carrier_pose: np.ndarray | None = None,
+    starts: int = 24,
+    seed: int = 0,
+) -> list[Equilibrium]:
+    """Stable equilibrium poses for cables of `lengths` (m,) [m], lowest potential energy first.
+
+    Parameters
+    ----------
+    lengths
+        One length > 0 for each cable [m].
+    carrier_pose
+        (c, 6) in {G}; None: at home.
+    starts
+        How many starting poses are tried: home, and random ones below and about it.
+
+    Returns
+    -------
+    list
+        Solutions whose residual is below 1e-6 of the weight; empty if the lengths cannot hold the platform together.
+
+    Raises
+    ------
+    InputError
+        If `lengths` or `carrier_pose` has a wrong shape or value, or the robot has no gravity.
+    """
+    wanted = np.asarray(lengths, dtype=float)
+    if wanted.shape != (robot.m,) or not (np.isfinite(wanted) & (wanted > 0)).all():
+        raise InputError(f"lengths: {lengths!r}; accepted: {robot.m} finite numbers > 0 [m]")
+    if robot.weight == 0:
+        raise InputError(f"gravity: robot {robot.name!r} has none; accepted: a gravity that is not zero")
+    carriers = robot.carrier_home if carrier_pose is None else np.asarray(carrier_pose, dtype=float)
+    dynamics = Dynamics(robot)
+    dynamics.cable_lengths(robot.home, carriers)  # checks the carriers' shape
+    solver = _energy_program(robot, dynamics, carriers)
+    rows = np.flatnonzero(robot.dof_mask)
+    found: list[Equilibrium] = []
+    for start in _starts(robot, starts, seed):
+        result = solver(x0=start[rows], lbg=-np.inf, ubg=wanted**2)
+        if not solver.stats()["success"]:
+            continue
+        pose = robot.home.copy()
+        pose[rows] = result["x"].full().ravel()
+        pose[3:] = np.arctan2(np.sin(pose[3:]), np.cos(pose[3:]))
+        # The constraint is on l^2, whose gradient is 2 l times that of l.
+        tensions = np.maximum(result["lam_g"].full().ravel() * 2 * wanted, 0.0)
+        candidate = _judge(robot, dynamics, pose, carriers, tensions)
+        if candidate.residual < 1e-6 * robot.weight and not any(_same(robot, candidate, known) for known in found):
+            found.append(candidate)
+    return sorted(found, key=lambda equilibrium: equilibrium.energy)
+
+
+def _energy_program(robot: Robot, dynamics: Dynamics, carriers: np.ndarray) -> ca.Function:
+    rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
+    free = ca.SX.sym("q", len(rows))
+    pose = ca.SX(robot.home)
+    pose[rows] = free
+    com = pose[0:3] + rotation(pose[3:6]) @ ca.DM(robot.platform.com)
+    energy = -robot.platform.mass * ca.dot(ca.DM(robot.gravity), com)
+    squares = dynamics.cable_lengths(pose, carriers) ** 2
+    options = {
+        "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-11, "constr_viol_tol": 1e-12, "max_iter": 300},
+        "print_time": False,
+        "error_on_fail": False,
+    }
+    return ca.nlpsol("rest", "ipopt", {"x": free, "f": energy, "g": squares}, options)
+
+
+def _starts(robot: Robot, count: int, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    poses = np.tile(robot.home, (max(count, 1), 1))
+    reach = np.ptp(np.vstack([robot.home_anchors, robot.home[:3]]), axis=0).max() + robot.length
+    poses[1:, :3] += rng.uniform(-0.5, 0.5, size=(len(poses) - 1, 3)) * reach
+    poses[1:, 3:] += rng.uniform(-np.pi, np.pi, size=(len(poses) - 1, 3)) * [1, 0.45, 1]
+    return poses
+
+
+def _judge(
+    robot: Robot, dynamics: Dynamics, pose: np.ndarray, carriers: np.ndarray, tensions: np.ndarray
+) -> Equilibrium:
+    w = dynamics.required_wrench(pose, np.zeros(6), np.zeros(6))
+    missing = (dynamics.wrench_matrix(pose, carriers) @ tensions - w) * robot.dof_mask
+    missing[3:] /= robot.length
+    com = pose[:3] + rotation(ca.DM(pose)[3:6]).full() @ np.array(robot.platform.com)
+    energy = -robot.platform.mass * float(np.dot(robot.gravity, com))
+    return Equilibrium(pose, tensions, dynamics.cable_lengths(pose, carriers), energy, float(np.linalg.norm(missing)))
+
+
+def _same(robot: Robot, one: Equilibrium, other: Equilibrium) -> bool:
+    turns = rotation(ca.DM(one.pose)[3:6]).full() - rotation(ca.DM(other.pose)[3:6]).full()
+    apart = np.linalg.norm(one.pose[:3] - other.pose[:3])
+    return bool(apart < SAME and np.abs(turns).max() * robot.length < SAME)

@@ -1,0 +1,68 @@
+"""One pose as a tension problem, and the first look at where a robot can rest."""
+
+import numpy as np
+import pytest
+
+from towline.models import Dynamics, Robot, load
+from towline.solvers import solve
+from towline.workspace import hints, pose_problem
+
+
+def test_hints_of_a_suspended_robot_lie_inside_its_anchors():
+    """No cable can push: a platform that hangs from a ring rests only where its CoM is under the ring."""
+    robot = load("wang-flying")
+    positions, feasible = hints(Dynamics(robot), count=150)
+    assert 5 < feasible.sum() < 150
+    radius = np.linalg.norm(positions[feasible, :2], axis=1)
+    assert radius.max() < 0.52
+    assert (positions[feasible, 2] < -0.07).all()
+
+
+def test_a_point_mass_balances_forces_only():
+    """Three cables hold a point mass, although they cannot hold a body: the moment rows do not count."""
+    data = {
+        "name": "point",
+        "source": "a test",
+        "platform": {"mass": 1, "dof": ["x", "y", "z"], "home": [0, 0, -1, 0, 0, 0]},
+        "carriers": [{"name": "frame", "kind": "ground"}],
+        "cables": [
+            {"carrier": "frame", "anchor": [np.cos(a), np.sin(a), 0], "attachment": [0, 0, 0], "t_min": 0, "t_max": 100}
+            for a in (0, 2, 4)
+        ],
+    }
+    solution = solve(pose_problem(Dynamics(Robot.model_validate(data)), [0, 0, -1, 0, 0, 0]))
+    assert solution.feasible
+    directions = np.array([[np.cos(a), np.sin(a), 1] for a in (0, 2, 4)]).T / np.sqrt(2)
+    np.testing.assert_allclose(solution.tensions, np.linalg.solve(directions, [0, 0, 9.81]), rtol=1e-9)
+
+
+def test_a_planar_robot_ignores_what_its_guide_takes():
+    data = {
+        "name": "planar",
+        "source": "a test",
+        "platform": {"mass": 2, "inertia": [1, 1, 1, 0, 0, 0], "dof": ["x", "z", "pitch"], "home": [0, 0, 0, 0, 0, 0]},
+        "carriers": [{"name": "frame", "kind": "ground"}],
+        "cables": [
+            {"carrier": "frame", "anchor": [x, 0, z], "attachment": [0.1 * x, 0, 0.1 * -z], "t_min": 1, "t_max": 500}
+            for x in (-1, 1)
+            for z in (-1, 1)
+        ],
+    }
+    robot = Robot.model_validate(data)
+    dynamics = Dynamics(robot)
+    pose, acceleration = np.array([0.1, 0, 0.2, 0, 0.1, 0]), np.array([1.0, 5.0, 0.5, 3.0, 0.3, 4.0])
+    problem = pose_problem(dynamics, pose, acceleration=acceleration)
+    np.testing.assert_array_equal(problem.w[[1, 3, 5]], 0)
+    solution = solve(problem)
+    assert solution.feasible
+    found = dynamics.acceleration(pose, np.zeros(6), solution.tensions)
+    np.testing.assert_allclose(found, acceleration * robot.dof_mask, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["wang-flying", "ipanema-1"])
+def test_moving_faster_needs_more(name):
+    robot = load(name)
+    dynamics = Dynamics(robot)
+    still = solve(pose_problem(dynamics, robot.home))
+    up = solve(pose_problem(dynamics, robot.home, acceleration=[0, 0, 2, 0, 0, 0]))
+    assert up.cost > still.cost
