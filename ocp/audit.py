@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..solvers import Certificate, solve
+from ..solvers import Certificate, TensionProblem, certify, solve
 from ..workspace.pose import masked_problem
 from .path import Motion
 from .scenario import AUDIT_RATE, Deviation, Scenario
@@ -142,7 +142,8 @@ def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.nda
     worst: Certificate | None = None
     at: int | None = None
     for k in np.flatnonzero(~(inside & exact)):
-        solution = solve(masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k]))
+        problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
+        solution = solve(problem)
         certificate = solution.certificate
         tensions[k] = np.nan if solution.tensions is None else solution.tensions
         if solution.tensions is not None:
@@ -150,12 +151,21 @@ def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.nda
         elif certificate is None:
             violation[k] = np.inf
         else:
+            closest = certificate.closest
+            violation[k] = np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w)
             if certificate.singular and robot.m < len(robot.platform.dof):
-                tensions[k] = certificate.closest
-            violation[k] = certificate.shortfall
+                tensions[k] = closest
+                # What lies outside the range of A is expected of few cables; whether the rest is available is not told.
+                certificate = certify(_inside_range(problem)) or certificate
             if worst is None or certificate.shortfall > worst.shortfall:
                 worst, at = certificate, int(k)
     return _Verdict(tensions, violation, worst, at)
+
+
+def _inside_range(problem: TensionProblem) -> TensionProblem:
+    """The same problem with the part of w that lies in the range of A."""
+    w = problem.scaled_A @ np.linalg.lstsq(problem.scaled_A, problem.scaled_w, rcond=1e-9)[0] / problem.row_scale
+    return TensionProblem(problem.A, w, problem.t_min, problem.t_max, length=problem.length)
 
 
 def _refuse_zero_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion) -> None:

@@ -10,6 +10,7 @@ from scipy.optimize import linprog, lsq_linear
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
+from towline.models.statics import equilibria
 from towline.ocp import PlanStatus, Task, plan, read_task, spline
 from towline.ocp.audit import audit
 from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
@@ -218,6 +219,20 @@ def test_resting_mobile_robots_cannot_hold_the_load_level():
     found = plan(robot, {"path": {"kind": "rest", "pose": list(robot.home)}, "duration": 1, "steps": 10})
     assert found.status is PlanStatus.INFEASIBLE
     assert found.certificate["binding"] == []
+
+
+def test_a_load_too_heavy_for_three_cables_is_not_feasible():
+    """Nearly in the range of A, so that the equations are missed by little, but far beyond the limits."""
+    data = load("wang-ctmrts").model_dump(mode="json")
+    for cable in data["cables"]:
+        cable["t_max"] = 20
+    robot = Robot.model_validate(data)
+    rest = equilibria(robot, np.full(3, 1.25))[0].pose + np.array([0, 0, 1e-6, 0, 0, 0])
+    found = plan(robot, {"path": {"kind": "rest", "pose": list(rest)}, "duration": 0.1})
+    assert found.status is PlanStatus.INFEASIBLE
+    assert found.audit.summary()["worst_violation"] > 30
+    assert found.certificate["shortfall"] > 30
+    assert found.certificate["binding"] == [0, 1, 2]
 
 
 def test_circle_in_the_frame_of_a_moving_and_pitching_base():
