@@ -14,7 +14,7 @@ from ..errors import InputError
 
 def constant(times: np.ndarray, velocity: Sequence[float]) -> np.ndarray:
     """The same wind at all times, (n, 3) [m/s]."""
-    return np.tile(np.asarray(velocity, dtype=float), (len(times), 1))
+    return np.tile(_numbers("velocity", velocity, 3), (len(_numbers("times", times, None)), 1))
 
 
 def trapezoid(
@@ -38,13 +38,16 @@ def trapezoid(
     noise
         Half-width of the noise [m/s]; its standard deviation is a third of it, so that few samples are cut.
     """
-    times = np.asarray(times, dtype=float)
-    if list(corners) != sorted(corners) or len(corners) != 4:
+    times, places = _numbers("times", times, None), _numbers("corners", corners, 4, 0.0)
+    if (np.diff(places) < 0).any() or places[-1] > 1:
         raise InputError(f"corners: {corners!r}; accepted: four rising numbers in [0, 1]")
+    if (np.diff(times) < 0).any():
+        raise InputError("times: fall; accepted: rising times")
+    noise = float(_numbers("noise", [noise], 1, 0.0)[0])
     share = (times - times[0]) / max(times[-1] - times[0], 1e-12)
-    envelope = np.interp(share, corners, [0.0, 1.0, 1.0, 0.0])
+    envelope = np.interp(share, places, [0.0, 1.0, 1.0, 0.0])
     random = np.random.default_rng(seed).normal(scale=noise / 3 if noise else 1.0, size=(len(times), 3))
-    return envelope[:, None] * np.asarray(peak, dtype=float) + np.clip(random, -noise, noise)
+    return envelope[:, None] * _numbers("peak", peak, 3) + np.clip(random, -noise, noise)
 
 
 def dryden(
@@ -78,42 +81,64 @@ def dryden(
     InputError
         If the mean wind has no horizontal part, or the times do not rise in equal steps.
     """
-    times, mean_wind = np.asarray(times, dtype=float), np.asarray(mean, dtype=float)
+    times, mean_wind = _numbers("times", times, None), _numbers("mean", mean, 3)
+    sigmas, lengths = _numbers("intensity", intensity, 3, 0.0), _numbers("scale", scale, 3, 1e-9)
     speed = float(np.linalg.norm(mean_wind))
     if not np.linalg.norm(mean_wind[:2]) > 0:
         raise InputError(f"mean: {tuple(mean)!r} has no horizontal part; accepted: a wind along the ground [m/s]")
     steps = np.diff(times)
     if len(steps) and not (steps.min() > 0 and np.ptp(steps) < 1e-6 * steps.mean()):
         raise InputError("times: must rise in equal steps")
-    step = float(steps.mean()) if len(steps) else 1.0
     rng = np.random.default_rng(seed)
     gusts = np.empty((len(times), 3))
-    for axis, (sigma, length) in enumerate(zip(intensity, scale, strict=True)):
-        T = length / speed
-        if axis == 0:
-            A, b, c = np.array([[-1 / T]]), np.array([1.0]), sigma * np.sqrt(2 * T) / T * np.array([1.0])
-        else:
-            A, b = np.array([[0.0, 1.0], [-1 / T**2, -2 / T]]), np.array([0.0, 1.0])
-            c = sigma * np.sqrt(T) / T**2 * np.array([1.0, np.sqrt(3) * T])
-        gusts[:, axis] = _filtered_noise(A, b, c, step, len(times), rng)
+    for axis in range(3):
+        step = float(steps.mean()) * speed / lengths[axis] if len(steps) else 1.0  # in units of T
+        filtered = _along if axis == 0 else _across
+        gusts[:, axis] = sigmas[axis] * filtered(step, rng.normal(size=(len(times) + 1, 2)))
     along = np.append(mean_wind[:2], 0.0) / np.linalg.norm(mean_wind[:2])
     up = np.array([0.0, 0.0, 1.0])
     return mean_wind + gusts @ np.stack([along, np.cross(up, along), up])
 
 
-def _filtered_noise(
-    A: np.ndarray, b: np.ndarray, c: np.ndarray, step: float, count: int, rng: np.random.Generator
-) -> np.ndarray:
-    """Sample c . x at `count` times of dx = A x dt + b dW, in its stationary distribution."""
-    from scipy.linalg import expm, solve_continuous_lyapunov
-
-    stationary = solve_continuous_lyapunov(A, -np.outer(b, b))
-    transition = expm(A * step)
-    innovation = stationary - transition @ stationary @ transition.T
-    x = np.linalg.cholesky(stationary) @ rng.normal(size=len(b))
-    root = np.linalg.cholesky(innovation)
-    values = np.empty(count)
-    for k, kick in enumerate(rng.normal(size=(count, len(b)))):
-        values[k] = c @ x
-        x = transition @ x + root @ kick
+def _along(step: float, noise: np.ndarray) -> np.ndarray:
+    """Unit white noise through sqrt(2) / (1 + s), sampled every `step`, of variance one: an exact recursion."""
+    keep, kick = np.exp(-step), np.sqrt(-np.expm1(-2 * step))
+    values = np.empty(len(noise) - 1)
+    x = noise[0, 0]
+    for k in range(len(values)):
+        values[k] = x
+        x = keep * x + kick * noise[k + 1, 0]
     return values
+
+
+def _across(step: float, noise: np.ndarray) -> np.ndarray:
+    """Unit white noise through (1 + sqrt(3) s) / (1 + s)^2, sampled every `step`, of variance one.
+
+    The state (x, dx) of dx' = -x - 2 dx + noise answers a unit impulse with e^-s (s, 1 - s). Its covariance after a
+    step is the integral of that with itself, by quadrature: as a difference of large numbers rounding would eat it.
+    """
+    h = min(step, 40.0)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    s = h * (nodes + 1) / 2
+    impulse = np.exp(-s) * np.stack([s, 1 - s])
+    root = np.linalg.cholesky(h / 2 * (impulse * weights) @ impulse.T)
+    transition = np.exp(-h) * np.array([[1 + h, h], [-h, 1 - h]])
+    values = np.empty(len(noise) - 1)
+    x = noise[0] / 2  # in its stationary distribution both have variance 1/4
+    for k in range(len(values)):
+        values[k] = x[0] + np.sqrt(3) * x[1]
+        x = transition @ x + root @ noise[k + 1]
+    return values
+
+
+def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int | None, least: float = -np.inf) -> np.ndarray:
+    """`count` finite numbers (None: any), at least `least`."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.zeros((0, 0))
+    if array.ndim != 1 or not len(array) or (count and len(array) != count) or not np.isfinite(array).all():
+        raise InputError(f"{name}: {value!r}; accepted: {count or 'a row of'} finite numbers")
+    if (array < least).any():
+        raise InputError(f"{name}: {value!r}; accepted: numbers >= {least:g}")
+    return array

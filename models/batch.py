@@ -58,7 +58,7 @@ def call(
     """
     if any(is_symbolic(value) for value in arguments.values()):
         return function(**_as_symbols(function, arguments))
-    if threads is not None and threads < 1:
+    if threads is not None and (not isinstance(threads, int) or threads < 1):
         raise InputError(f"threads: is {threads}; accepted: 1 and more, or None")
     outputs = _evaluator(function)(arguments, threads)
     for name in matrices:
@@ -263,7 +263,10 @@ def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, A
 
 def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     try:
-        array = np.asarray(value, dtype=float)
+        given = np.asarray(value)
+        if given.dtype.kind == "c":
+            raise TypeError
+        array = given.astype(float, copy=False)
     except (TypeError, ValueError):
         raise InputError(
             f"{name}: {value!r} is not an array of numbers; accepted: shape (..., {_told(core)})"

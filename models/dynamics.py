@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from . import elasticity, forward, kinematics, rigid_body, wind
 from .batch import call
+from .cables.pulley import Exit
 from .relative_dynamics import Array, RelativeDynamics
 from .robot import QuadrotorCarrier, Robot
 
@@ -281,12 +282,12 @@ class Dynamics:
         symbols = _symbols(robot, names)
         pose, velocity, tensions, carriers, rates = symbols
         thrust, torque = ca.SX.sym("thrust", self._count), ca.SX.sym("torque", self._count, 3)
-        A = self.wrench_matrix(pose, carriers)
+        A, run = self.wrench_matrix(pose, carriers), _run(robot, pose, carriers)
         accelerations = []
         for index, carrier in enumerate(robot.carriers):
             if isinstance(carrier, QuadrotorCarrier):
                 at, rate = carriers[index, :].T, rates[index, :].T
-                pull = forward.pull_on_carrier(robot, index, A, at, tensions)
+                pull = forward.pull_on_carrier(robot, index, run, at, tensions)
                 inputs = (thrust[index], torque[index, :].T)
                 accelerations.append(
                     forward.quadrotor_acceleration(carrier, np.array(robot.gravity), at, rate, *inputs, pull).T
@@ -355,14 +356,19 @@ def _symbols(robot: Robot, names: list[str]) -> list[ca.SX]:
     return [ca.SX.sym(name, *shapes.get(name, (count, 6) if name.startswith("carrier") else (6, 1))) for name in names]
 
 
+def _run(robot: Robot, pose: ca.SX, carriers: ca.SX) -> Exit:
+    """How the cables run in {G}."""
+    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
+    axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, carriers)
+    return kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii)
+
+
 def _world_functions(robot: Robot) -> dict[str, ca.Function]:
     names = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
     motion = _symbols(robot, names)
     pose, velocity, acceleration, carriers = motion[:4]
     (tensions,) = _symbols(robot, ["tensions"])
-    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
-    axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, carriers)
-    run = kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii)
+    run = _run(robot, pose, carriers)
     A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, run.directions)
     w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
     forward_acceleration = forward.platform_acceleration(robot, pose, velocity, A @ tensions)

@@ -46,9 +46,10 @@ def tension_stiffness(robot: Robot, pose: Matrix, anchor_points: Matrix, axes: M
 
 
 def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) -> Matrix:
-    """sum_i k_i a_i a_i^T, (6, 6), in {G} about the CoM [N/m, N, N m]; every cable needs its `stiffness` E A."""
+    """Sum of k_i a_i a_i^T, (6, 6), in {G} about the CoM [N/m, N, N m], of the cables that pull."""
     EA = ca.DM([cable.stiffness or np.inf for cable in robot.cables])
-    k = (EA + tensions) / lengths  # E A / L0 with the unstrained length L0 = l / (1 + t / E A)
+    # E A / L0 with the unstrained length L0 = l / (1 + t / E A); a slack cable has no stiffness
+    k = ca.if_else(tensions > 0, (EA + tensions) / lengths, 0)
     return A @ ca.diag(k) @ A.T
 
 

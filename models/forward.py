@@ -4,10 +4,11 @@ The wrench that a motion needs is affine in the accelerations, w = M(q) ddq + h(
 
     platform   M ddq = A t + W_e - h
     quadrotor  m_Q (ddx_Q - g) = f R_Q e_z - sum_i t_i u_i
-               I_Q alpha_Q + omega_Q x I_Q omega_Q = tau - sum_i (a_i x R_Q^T u_i) t_i       (in its own axes)
+               I_Q alpha_Q + omega_Q x I_Q omega_Q = tau - sum_i (c_i x R_Q^T u_i) t_i       (in its own axes)
 
-for thrust f along its z axis, torque tau, and the cables i that it carries: what pulls the platform pulls the
-quadrotor back. Coordinates are (x, y, z, roll, pitch, yaw) and their derivatives. Source: Newton and Euler.
+for thrust f along its z axis, torque tau, and the cables i that it carries, which leave it at c_i: what pulls the
+platform pulls the quadrotor back. Coordinates are (x, y, z, roll, pitch, yaw) and their derivatives. Source: Newton
+and Euler.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from . import rigid_body
+from .cables.pulley import Exit
 from .robot import QuadrotorCarrier, Robot, inertia_matrix
 from .rotation import Matrix, inverse_rate_matrix, rate_matrix, rate_matrix_derivative, rotation
 
@@ -77,13 +79,13 @@ def quadrotor_acceleration(
     return ca.vertcat(acceleration, angular)
 
 
-def pull_on_carrier(robot: Robot, index: int, A: Matrix, carrier_pose: Matrix, tensions: Matrix) -> Matrix:
+def pull_on_carrier(robot: Robot, index: int, run: Exit, carrier_pose: Matrix, tensions: Matrix) -> Matrix:
     """What the cables of carrier `index` do to it, (6, 1): force in {G} [N], moment about its frame in its axes [N m].
 
     Parameters
     ----------
-    A
-        Wrench matrix, (6, m), whose first three rows are the directions u_i in {G}.
+    run
+        How the cables run in {G}: a cable over a pulley pulls along the line that leaves the sheave.
     carrier_pose
         (6, 1), of the carrier in {G}.
     """
@@ -91,7 +93,7 @@ def pull_on_carrier(robot: Robot, index: int, A: Matrix, carrier_pose: Matrix, t
     force, moment = ca.DM.zeros(3), ca.DM.zeros(3)
     for cable in np.flatnonzero(robot.carrier_of_cable == index):
         i = int(cable)
-        along = -tensions[i] * A[0:3, i]
+        along = -tensions[i] * run.directions[:, i]
         force = force + along
-        moment = moment + ca.cross(ca.DM(robot.anchors[i]), R.T @ along)
+        moment = moment + R.T @ ca.cross(run.points[:, i] - carrier_pose[0:3], along)
     return ca.vertcat(force, moment)

@@ -16,8 +16,12 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
+import numpy as np
+
 from ..errors import InputError
-from .robot import COORDINATES, QuadrotorCarrier, Robot
+from .robot import COORDINATES, QuadrotorCarrier, Robot, inertia_matrix
+
+SMALLEST_INERTIA = 1e-14  # [kg m^2], just above what MuJoCo refuses
 
 
 def to_mjcf(robot: Robot) -> str:
@@ -55,6 +59,20 @@ def _check(robot: Robot) -> None:
     for index, cable in enumerate(robot.cables):
         if cable.pulley is not None:
             raise InputError(f"cables[{index}].pulley: MuJoCo's tendons have no swivelling pulleys; accepted: null")
+    for index, carrier in enumerate(robot.carriers):
+        if carrier.name == "platform":
+            raise InputError(f"carriers[{index}].name: 'platform' is the platform's name in MuJoCo; accepted: another")
+    bodies = {"platform": robot.inertia} if robot.platform.inertia else {}
+    for index, carrier in enumerate(robot.carriers):
+        if isinstance(carrier, QuadrotorCarrier):
+            bodies[f"carriers[{index}]"] = inertia_matrix(carrier.inertia)
+    for name, inertia in bodies.items():
+        moments = np.linalg.eigvalsh(inertia)
+        if moments[2] > moments[0] + moments[1] + 1e-12 or moments[0] < SMALLEST_INERTIA:
+            raise InputError(
+                f"{name}.inertia: principal moments {moments.round(12).tolist()} kg m^2; accepted by MuJoCo: "
+                f"none above the sum of the others, none below {SMALLEST_INERTIA:g}"
+            )
     if len(robot.platform.dof) < 6 and any(robot.home[3:]):
         raise InputError(
             f"platform.home: {robot.home.tolist()} is turned, but not all six coordinates move; accepted: a level home"
@@ -71,14 +89,15 @@ def _add_carriers(robot: Robot, world: ET.Element, motors: ET.Element) -> None:
             body = _body(world, carrier.name, carrier.home)
             ET.SubElement(body, "freejoint", name=carrier.name)
             _add_inertia(body, (0.0, 0.0, 0.0), carrier.mass, carrier.inertia)
-            ET.SubElement(body, "site", name=carrier.name, size="0.02")
+            site = f"{carrier.name} centre"  # no part of a robot has a blank in its name
+            ET.SubElement(body, "site", name=site, size="0.02")
             limits = _text((carrier.thrust_min, carrier.thrust_max))
-            thrust = {"site": carrier.name, "gear": "0 0 1 0 0 0", "ctrlrange": limits}
+            thrust = {"site": site, "gear": "0 0 1 0 0 0", "ctrlrange": limits}
             ET.SubElement(motors, "motor", {"name": f"{carrier.name} thrust", **thrust})
             for axis, (letter, most) in enumerate(zip("xyz", carrier.torque_max, strict=True)):
                 gear = [0.0] * 6
                 gear[3 + axis] = 1.0
-                torque = {"site": carrier.name, "gear": _text(gear), "ctrlrange": _text((-most, most))}
+                torque = {"site": site, "gear": _text(gear), "ctrlrange": _text((-most, most))}
                 ET.SubElement(motors, "motor", {"name": f"{carrier.name} torque {letter}", **torque})
         else:
             body = _body(world, carrier.name, carrier.home)

@@ -93,6 +93,15 @@ def _check_positive_definite(inertia: Inertia) -> Inertia:
 BodyInertia = Annotated[Inertia, AfterValidator(_check_positive_definite)]
 Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+# Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
+# or with fewer axes, the reactions of what is locked would enter them.
+TURNING_DOF: tuple[tuple[Coordinate, ...], ...] = (
+    COORDINATES,
+    ("x", "z", "pitch"),
+    ("x", "y", "yaw"),
+    ("y", "z", "roll"),
+    ("x", "y", "z", "yaw"),
+)
 
 
 class Platform(Part):
@@ -121,7 +130,12 @@ class Platform(Part):
     def _in_order(cls, dof: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
         if len(set(dof)) != len(dof):
             raise ValueError("each coordinate may be there once")
-        return tuple(name for name in COORDINATES if name in dof)
+        ordered: tuple[Coordinate, ...] = tuple(name for name in COORDINATES if name in dof)
+        turning = [name for name in ordered if name in COORDINATES[3:]]
+        if turning and ordered not in TURNING_DOF:
+            sets = "; ".join(", ".join(names) for names in TURNING_DOF)
+            raise ValueError(f"accepted: any of x, y, z; or {sets}")
+        return ordered
 
     @model_validator(mode="after")
     def _turns_with_inertia(self) -> Self:
@@ -129,6 +143,9 @@ class Platform(Part):
             raise ValueError(
                 "inertia is missing; accepted: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2], or a dof without angles"
             )
+        locked = [name for name in COORDINATES[3:] if name not in self.dof]
+        if self.home and len(locked) < 3 and any(self.home[COORDINATES.index(name)] for name in locked):
+            raise ValueError(f"home: {', '.join(locked)} cannot move; accepted: 0 rad for them")
         return self
 
 
@@ -193,9 +210,11 @@ class QuadrotorCarrier(Carrier):
     thrust_min: NonNegative = Field(default=0.0, description="smallest total thrust [N]")
     thrust_max: Positive = Field(description="largest total thrust [N]")
     torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
-    tilt_max: Positive = Field(default=0.6, description="largest angle of its z axis to the vertical [rad]")
-    speed_max: Positive = Field(default=10.0, description="[m/s]")
-    acceleration_max: Positive = Field(default=10.0, description="[m/s^2]")
+    tilt_max: Positive = Field(
+        default=0.6, description="largest angle of its z axis to the vertical [rad]; for planners"
+    )
+    speed_max: Positive = Field(default=10.0, description="[m/s]; for planners")
+    acceleration_max: Positive = Field(default=10.0, description="[m/s^2]; for planners")
 
     @model_validator(mode="after")
     def _thrusts_in_order(self) -> Self:

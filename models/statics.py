@@ -13,16 +13,19 @@ Source: the energy form of the direct geometrico-static problem of Berti, Merlet
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from .dynamics import Dynamics
 from .robot import Robot
 from .rotation import rotation
 
+UNSTABLE = 1e-3  # [Hz]; slower than this counts as neutral
+DESCENTS = 4  # from a saddle, along its unstable motion
 SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length`, are one solution
 
 
@@ -42,6 +45,8 @@ class Equilibrium:
         Potential energy relative to the origin of {G} [J].
     residual
         |A t + m g| with moments over `Robot.length` [N].
+    neutral
+        Whether some motion neither returns nor runs away: then it is one of a family of poses.
     """
 
     pose: np.ndarray
@@ -49,6 +54,7 @@ class Equilibrium:
     lengths: np.ndarray
     energy: float
     residual: float
+    neutral: bool = False
 
     @property
     def slack(self) -> np.ndarray:
@@ -84,30 +90,62 @@ def equilibria(
     InputError
         If `lengths` or `carrier_pose` has a wrong shape or value, or the robot has no gravity.
     """
-    wanted = np.asarray(lengths, dtype=float)
+    if starts < 1:
+        raise InputError(f"starts: {starts}; accepted: 1 and more")
+    try:
+        wanted = np.asarray(lengths, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"lengths: {lengths!r}; accepted: {robot.m} finite numbers > 0 [m]") from None
     if wanted.shape != (robot.m,) or not (np.isfinite(wanted) & (wanted > 0)).all():
         raise InputError(f"lengths: {lengths!r}; accepted: {robot.m} finite numbers > 0 [m]")
     if robot.weight == 0:
         raise InputError(f"gravity: robot {robot.name!r} has none; accepted: a gravity that is not zero")
-    carriers = robot.carrier_home if carrier_pose is None else np.asarray(carrier_pose, dtype=float)
     dynamics = Dynamics(robot)
-    dynamics.cable_lengths(robot.home, carriers)  # checks the carriers' shape
+    carriers = robot.carrier_home if carrier_pose is None else carrier_pose
+    if dynamics.cable_lengths(robot.home, carriers).ndim != 1:  # checks shape and values too
+        raise InputError(f"carrier_pose: has shape {np.shape(carriers)}; accepted: {robot.carrier_home.shape}")
+    carriers = np.asarray(carriers, dtype=float)
     solver = _energy_program(robot, dynamics, carriers)
-    rows = np.flatnonzero(robot.dof_mask)
     found: list[Equilibrium] = []
     for start in _starts(robot, starts, seed):
+        candidate = _descend(robot, dynamics, solver, start, carriers, wanted)
+        if candidate is not None and not any(_same(robot, candidate, known) for known in found):
+            found.append(candidate)
+    return sorted(found, key=lambda equilibrium: equilibrium.energy)
+
+
+def _descend(
+    robot: Robot, dynamics: Dynamics, solver: ca.Function, start: np.ndarray, carriers: np.ndarray, wanted: np.ndarray
+) -> Equilibrium | None:
+    """The rest pose that is found from `start`, or None; a saddle is left along its unstable motion."""
+    rows = np.flatnonzero(robot.dof_mask)
+    for _ in range(DESCENTS):
         result = solver(x0=start[rows], lbg=-np.inf, ubg=wanted**2)
         if not solver.stats()["success"]:
-            continue
+            return None
         pose = robot.home.copy()
         pose[rows] = result["x"].full().ravel()
         pose[3:] = np.arctan2(np.sin(pose[3:]), np.cos(pose[3:]))
         # The constraint is on l^2, whose gradient is 2 l times that of l.
         tensions = np.maximum(result["lam_g"].full().ravel() * 2 * wanted, 0.0)
         candidate = _judge(robot, dynamics, pose, carriers, tensions)
-        if candidate.residual < 1e-6 * robot.weight and not any(_same(robot, candidate, known) for known in found):
-            found.append(candidate)
-    return sorted(found, key=lambda equilibrium: equilibrium.energy)
+        if candidate.residual > 1e-6 * robot.weight:
+            return None
+        frequencies, modes = dynamics.natural_frequencies(pose, tensions, carriers)
+        if not len(frequencies) or frequencies[0] > -UNSTABLE:
+            return replace(candidate, neutral=bool(len(frequencies)) and bool(np.abs(frequencies).min() < UNSTABLE))
+        turned = Rotation.from_rotvec(0.1 * _unit(modes[:, 0], robot.length)[3:]) * _orientation(pose)
+        start = np.concatenate([pose[:3] + 0.1 * _unit(modes[:, 0], robot.length)[:3], turned.as_euler("ZYX")[::-1]])
+    return None
+
+
+def _unit(mode: np.ndarray, length: float) -> np.ndarray:
+    """A mode scaled so that it moves the platform by about its own size, at most by a radian."""
+    return mode / max(np.linalg.norm(mode[:3]) / length, np.linalg.norm(mode[3:]))
+
+
+def _orientation(pose: np.ndarray) -> Rotation:
+    return Rotation.from_euler("ZYX", pose[5:2:-1])
 
 
 def _energy_program(robot: Robot, dynamics: Dynamics, carriers: np.ndarray) -> ca.Function:
@@ -147,6 +185,8 @@ def _judge(
 
 
 def _same(robot: Robot, one: Equilibrium, other: Equilibrium) -> bool:
+    if one.neutral and other.neutral and abs(one.energy - other.energy) < 1e-6 * robot.weight * robot.length:
+        return bool(np.abs(one.tensions - other.tensions).max() < 1e-4 * robot.weight)  # turned along a free motion
     turns = rotation(ca.DM(one.pose)[3:6]).full() - rotation(ca.DM(other.pose)[3:6]).full()
     apart = np.linalg.norm(one.pose[:3] - other.pose[:3])
     return bool(apart < SAME and np.abs(turns).max() * robot.length < SAME)

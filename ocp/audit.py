@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..models.robot import COORDINATES
 from ..solvers import Certificate, TensionProblem, certify, solve
 from ..workspace.pose import masked_problem
 from .path import Motion
@@ -94,7 +95,14 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
     w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.task.wind)
     verdict = _distribute(scenario, A, w, _wished_tensions(deviation, times, robot.m))
     off_path = scenario.off_path(times, motion, carriers)
-    excess = _carrier_excess(scenario, carriers) + _length_excess(scenario, motion, carriers)
+    excess = [
+        *_carrier_excess(scenario, carriers),
+        *_length_excess(scenario, motion, carriers),
+        *_path_excess(scenario, off_path),
+        *_end_excess(scenario, carriers),
+        *_locked_excess(scenario, motion),
+        *verdict.excess,
+    ]
     dof = len(robot.platform.dof)
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
@@ -104,9 +112,9 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         tensions=verdict.tensions,
         tensions_unlimited=(np.linalg.pinv(A, rcond=1e-9) @ w[..., None])[..., 0],
         violation=verdict.violation,
-        tolerance=TOLERANCE if robot.m >= dof else UNDERACTUATED_TOLERANCE * robot.force_scale,
+        tolerance=UNDERACTUATED_TOLERANCE * robot.force_scale if robot.m < dof and scenario.count else TOLERANCE,
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
-        excess=excess + _path_excess(scenario, off_path) + _end_excess(scenario, carriers),
+        excess=excess,
         certificate=verdict.certificate,
         certificate_time=None if verdict.at is None else float(times[verdict.at]),
     )
@@ -122,6 +130,7 @@ class _Verdict(NamedTuple):
     violation: np.ndarray  # (n,)
     certificate: Certificate | None
     at: int | None  # row of the certificate
+    excess: list[str]  # limits that are missed though what few cables cannot follow is tolerated
 
 
 def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.ndarray | None) -> _Verdict:
@@ -141,6 +150,7 @@ def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.nda
     exact = violation <= EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1))
     worst: Certificate | None = None
     at: int | None = None
+    beyond = 0.0
     for k in np.flatnonzero(~(inside & exact)):
         problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
         solution = solve(problem)
@@ -156,10 +166,13 @@ def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.nda
             if certificate.singular and robot.m < len(robot.platform.dof):
                 tensions[k] = closest
                 # What lies outside the range of A is expected of few cables; whether the rest is available is not told.
-                certificate = certify(_inside_range(problem)) or certificate
+                inside_range = certify(_inside_range(problem))
+                if inside_range is not None:
+                    certificate, beyond = inside_range, max(beyond, inside_range.shortfall)
             if worst is None or certificate.shortfall > worst.shortfall:
                 worst, at = certificate, int(k)
-    return _Verdict(tensions, violation, worst, at)
+    limits = [f"tensions: {beyond:.3g} N beyond their limits or margin"] if beyond > TOLERANCE else []
+    return _Verdict(tensions, violation, worst, at, limits)
 
 
 def _inside_range(problem: TensionProblem) -> TensionProblem:
@@ -177,6 +190,16 @@ def _refuse_zero_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, 
         f"task {scenario.task.name!r}: path: at t = {times[row]:.3f} s anchor and attachment of cable {cable + 1} "
         "coincide; accepted: paths on which every cable has a length"
     )
+
+
+def _locked_excess(scenario: Scenario, motion: Motion) -> list[str]:
+    """Which coordinates move that the platform does not have: they stay as at home."""
+    off = np.abs(motion.pose - scenario.robot.home).max(axis=0)
+    return [
+        f"platform: {name} moves by {off[i]:.3g}, but it is none of the platform's degrees of freedom"
+        for i, name in enumerate(COORDINATES)
+        if not scenario.robot.dof_mask[i] and off[i] > PATH_TOLERANCE
+    ]
 
 
 def _path_excess(scenario: Scenario, off_path: np.ndarray) -> list[str]:
@@ -245,6 +268,9 @@ def _carrier_excess(scenario: Scenario, carriers: Motion) -> list[str]:
         outside = np.maximum(limit.low - pose[:, :3], pose[:, :3] - limit.high).max()
         if outside > LIMIT_TOLERANCE:
             found.append(f"{name}: {outside:.3g} m outside its reach box")
+        stays = scenario.robot.drive == "variable-length" and limit.attitude is not None
+        if stays and max(np.abs(velocity).max(), np.abs(acceleration).max()) > LIMIT_TOLERANCE:
+            found.append(f"{name}: moves, but with the drive variable-length only winches do")
         if limit.attitude is not None and np.abs(pose[:, 3:] - limit.attitude).max() > LIMIT_TOLERANCE:
             found.append(f"{name}: turns, but a mobile carrier keeps its attitude")
     return found

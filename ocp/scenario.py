@@ -171,7 +171,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:
             raise InputError(
-                f"{where}: margin: {task.margin:g} N leaves nothing of the limits of cable {index}, {low:g} N to "
+                f"{where}: margin: {task.margin:g} N leaves nothing of the limits of cable {index + 1}, {low:g} N to "
                 f"{high:g} N; accepted: at most {(high - low) / 2:g} N"
             )
     if task.wind is not None and robot.platform.aero is None:

@@ -61,3 +61,41 @@ def test_wrong_winds_are_named():
         air.dryden(TIMES**2, [1, 0, 0])
     with pytest.raises(InputError, match="corners"):
         air.trapezoid(TIMES, corners=(0.5, 0.1, 0.7, 0.9))
+
+
+def test_dryden_at_small_steps_and_slow_winds():
+    """A millisecond in a slow wind of large scale: the innovation is tiny, not lost."""
+    times = np.arange(2000) * 1e-3
+    for mean, scale in (([0.3, 0, 0], (200, 200, 50)), ([1, 0, 0], (533, 533, 533))):
+        ensemble = np.stack([air.dryden(times, mean, scale=scale, seed=seed) - mean for seed in range(400)])
+        np.testing.assert_allclose(ensemble[:, [0, -1]].std(axis=0), [[1, 1, 0.5]] * 2, rtol=0.12)
+        assert np.abs(np.diff(ensemble, axis=1)).max() < 0.5  # smooth at that scale
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"scale": (0, 1, 1)}, "scale"),
+        ({"intensity": (1, 1)}, "intensity"),
+        ({"mean": (1, np.nan, 0)}, "mean"),
+        ({"mean": (1, 2)}, "mean"),
+        ({"times": "now"}, "times"),
+        ({"times": [np.nan, 1, 2]}, "times"),
+    ],
+)
+def test_wrong_arguments_of_dryden_are_named(arguments, field):
+    with pytest.raises(InputError, match=f"^{field}: "):
+        air.dryden(**{"times": TIMES, "mean": (1, 0, 0), **arguments})
+
+
+def test_wrong_arguments_of_the_others_are_named():
+    for function, arguments, field in (
+        (air.constant, (TIMES, (1, 2)), "velocity"),
+        (air.trapezoid, ([],), "times"),
+        (air.trapezoid, (TIMES[::-1],), "times"),
+        (air.trapezoid, (TIMES, (1, 2)), "peak"),
+        (air.trapezoid, (TIMES, (1, 2, 3), (0, 0.5, 1, 2)), "corners"),
+        (air.trapezoid, (TIMES, (1, 2, 3), (0, 0.2, 0.5, 1), -1), "noise"),
+    ):
+        with pytest.raises(InputError, match=f"^{field}: "):
+            function(*arguments)

@@ -248,3 +248,66 @@ def test_wrong_lengths_are_named():
             equilibria(robot, lengths)
     # Cables too short to meet: no equilibrium, and no exception.
     assert equilibria(robot, np.full(3, 0.2), starts=4) == []
+
+
+def test_a_top_heavy_platform_is_not_reported_upright():
+    """Saddles, which symmetric starts find first, are left; what is reported is stable."""
+    one = hanging([([0, 0, 1], [0, 0, -0.1])], com=[0, 0, 0.1], home=[0, 0, 0.1, 0, 0, 0])
+    for starts in (1, 8):
+        (rest,) = equilibria(one, [1.0], starts=starts)  # turned about the vertical it is the same rest
+        assert rest.neutral
+        # The CoM hangs straight below: 1 m of cable and 0.2 m from attachment to CoM under the anchor.
+        assert rest.energy == pytest.approx(2 * GRAVITY * (1 - 1 - 0.2), rel=1e-6)
+    two = hanging([([1, 0, 1], [0.1, 0, -0.1]), ([-1, 0, 1], [-0.1, 0, -0.1])], com=[0, 0, 0.2])
+    for rest in equilibria(two, [1.5, 1.5], starts=8):
+        f, _ = Dynamics(two).natural_frequencies(rest.pose, rest.tensions)
+        assert f[0] > -1e-3
+
+
+def test_slack_cables_have_no_stiffness():
+    robot = load("wang-flying")
+    dynamics = Dynamics(robot)
+    tensions = np.array([3.0, 3, 3, 3, 3, 0])
+    five = Dynamics(robot.model_copy(update={"cables": robot.cables[:5]}))
+    expected = five.stiffness(robot.home, tensions[:5])
+    np.testing.assert_allclose(dynamics.stiffness(robot.home, tensions), expected, rtol=1e-12, atol=1e-9)
+
+
+def test_pulleys_under_a_quadrotor_keep_the_angular_momentum():
+    """Inside forces make no moment: about any point the rates of angular momentum of both bodies cancel."""
+    data = load("multi-quadrotor-3").model_dump(mode="json")
+    data |= {"gravity": [0, 0, 0], "carriers": data["carriers"][:1]}
+    for index, cable in enumerate(data["cables"]):
+        cable |= {"carrier": data["carriers"][0]["name"], "pulley": {"radius": 0.03}}
+        cable["anchor"] = [0.1 * np.cos(2 * index), 0.1 * np.sin(2 * index), -0.05]
+    robot = Robot.model_validate(data)
+    dynamics, quad = Dynamics(robot), robot.carriers[0]
+    zero = np.zeros(6)
+    platform, carrier = dynamics.coupled_acceleration(
+        robot.home, zero, robot.carrier_home, np.zeros((1, 6)), [3.0, 4.0, 5.0], [0.0], np.zeros((1, 3))
+    )
+    moments = []
+    for pose, acceleration, mass, inertia in (
+        (robot.home, platform, robot.platform.mass, robot.inertia),
+        (robot.carrier_home[0], carrier[0], quad.mass, np.diag(quad.inertia[:3])),
+    ):
+        R = Rotation.from_euler("ZYX", pose[5:2:-1]).as_matrix()
+        roll, pitch = pose[3:5]
+        P = np.array(
+            [
+                [1, 0, -np.sin(pitch)],
+                [0, np.cos(roll), np.sin(roll) * np.cos(pitch)],
+                [0, -np.sin(roll), np.cos(roll) * np.cos(pitch)],
+            ]
+        )
+        moments.append(np.cross(pose[:3], mass * acceleration[:3]) + R @ inertia @ P @ acceleration[3:])
+    assert np.linalg.norm(moments[0]) > 0.1
+    np.testing.assert_allclose(sum(moments), 0, atol=1e-12)
+
+
+def test_only_dof_whose_equations_are_the_wrench_rows():
+    for dof in (["pitch"], ["x", "yaw"], ["roll", "pitch", "yaw"], ["x", "y", "z", "roll", "pitch"]):
+        with pytest.raises(InputError, match=r"platform\.dof: accepted: any of x, y, z; or"):
+            hanging([([0, 0, 1], [0.1, 0, 0])], dof=dof)
+    with pytest.raises(InputError, match="home: roll, yaw cannot move; accepted: 0 rad"):
+        hanging([([0, 0, 1], [0.1, 0, 0])], dof=["x", "z", "pitch"], home=[0, 0, 0, 0.1, 0, 0])

@@ -189,3 +189,16 @@ def test_what_mujoco_cannot_express_is_one_line():
     cable = robot.cables[0].model_copy(update={"pulley": Pulley(radius=0.05)})
     with pytest.raises(InputError, match=r"cables\[0\]\.pulley: MuJoCo's tendons have no swivelling pulleys"):
         to_mjcf(robot.model_copy(update={"cables": (cable, *robot.cables[1:])}))
+
+
+def test_what_mujoco_would_refuse_is_refused_with_a_reason():
+    robot = load("multi-quadrotor-3")
+    data = robot.model_dump(mode="json")
+    data["carriers"][0]["name"] = data["cables"][0]["carrier"] = "platform"
+    with pytest.raises(InputError, match=r"carriers\[0\]\.name: 'platform'"):
+        to_mjcf(Robot.model_validate(data))
+    data["carriers"][0]["name"] = data["cables"][0]["carrier"] = "anchor1"
+    mujoco.MjModel.from_xml_string(to_mjcf(Robot.model_validate(data)))
+    platform = robot.platform.model_copy(update={"inertia": (1.0, 1.0, 3.0, 0.0, 0.0, 0.0)})
+    with pytest.raises(InputError, match=r"platform\.inertia: .*none above the sum of the others"):
+        to_mjcf(robot.model_copy(update={"platform": platform}))

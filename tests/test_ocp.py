@@ -408,6 +408,53 @@ def test_without_gravity():
     assert not plan(flying, task).feasible
 
 
+def test_what_cannot_move_does_not_move():
+    """A planar robot is not sent out of its plane, nor a point mass turned."""
+    for name, end in (
+        ("planar-4", [0, 0.3, 0, 0, 0, 0]),
+        ("planar-4", [0, 0, 0, 0, 0, 0.5]),
+        ("point-mass-3", [0, 0, 0, 1, 0, 0]),
+    ):
+        robot = load(name)
+        path = {"kind": "line", "start": list(robot.home), "end": list(robot.home + np.array(end))}
+        found = plan(robot, {"path": path, "duration": 2})
+        assert not found.feasible
+        assert any("none of the platform's degrees of freedom" in sentence for sentence in found.audit.excess)
+    robot = load("planar-4")
+    path = {"kind": "line", "start": list(robot.home), "end": list(robot.home + np.array([0.1, 0, 0.1, 0, 0.05, 0]))}
+    assert plan(robot, {"path": path, "duration": 2}).feasible
+
+
+def test_few_cables_do_not_excuse_missed_limits():
+    """What three cables cannot follow is tolerated; a limit that is missed by a little is not."""
+    data = load("point-mass-3").model_dump(mode="json")
+    data["cables"] = data["cables"][:1]
+    data["cables"][0]["anchor"] = [0, 0, 2]
+    data["platform"]["home"] = [0, 0, 1, 0, 0, 0]
+    rest = {"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 0.5}
+    weight = load("point-mass-3").weight
+    for limits, feasible in (
+        ({"t_max": weight * (1 - 5e-4)}, False),
+        ({"t_min": weight * (1 + 5e-4)}, False),
+        ({}, True),
+    ):
+        data["cables"][0] |= {"t_min": 0, "t_max": 200, **limits}
+        assert plan(Robot.model_validate(data), rest).feasible is feasible
+    off = {**rest, "path": {"kind": "rest", "pose": [0.0009, 0, 1]}}
+    data["cables"][0] |= {"t_min": 0, "t_max": 200}
+    assert not plan(Robot.model_validate(data), off).feasible
+
+
+def test_variable_length_robots_stay():
+    data = load("wang-ctmrts-6").model_dump(mode="json")
+    robot = Robot.model_validate({**data, "drive": "variable-length"})
+    start = list(robot.carrier_home[0, :3])
+    moved = {robot.carriers[0].name: {"kind": "line", "start": start, "end": [start[0] + 0.02, *start[1:]]}}
+    path = {"kind": "rest", "pose": list(robot.home)}
+    found = plan(robot, {"path": path, "duration": 2, "base": {"kind": "given", "paths": moved}})
+    assert any("only winches do" in sentence for sentence in found.audit.excess)
+
+
 def test_saved_samples_are_audited_and_equally_spaced():
     path = {"kind": "line", "start": [0, 0, -1], "end": [0, 0, -1.1]}
     for rate, duration in ((100, 1.2345), (5000, 0.1), (30, 2)):
