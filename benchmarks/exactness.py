@@ -1,4 +1,4 @@
-"""Random problems of every awkward kind: is the status right, and are the tensions optimal?
+"""Random problems of every awkward kind, and whether each has the right status and the optimal tensions.
 
     python -m towline.benchmarks.exactness [--count 1000000] [--start 0]
 
@@ -21,7 +21,17 @@ from ..solvers import BatchSolution, Status, TensionProblem, certify, solve_batc
 
 Array = NDArray[np.float64]
 
-KINDS = ("plain", "geometric", "twins", "nearly parallel", "rank deficient", "fixed", "unlimited", "huge limits", "corner")
+KINDS = (
+    "plain",
+    "geometric",
+    "twins",
+    "nearly parallel",
+    "rank deficient",
+    "fixed",
+    "unlimited",
+    "huge limits",
+    "corner",
+)
 BOUNDARY = 1e-9
 BLOCK = 2000
 
@@ -87,7 +97,7 @@ def check(seeds: range) -> Report:
     return report
 
 
-def _compare(seed: int, data: tuple[Array, ...], answer: BatchSolution, row: int) -> Report:
+def _compare(seed: int, data: tuple[Array, Array, Array, Array], answer: BatchSolution, row: int) -> Report:
     """Hold one row against the references."""
     problem = TensionProblem(*data)
     status = str(answer.status[row])
@@ -96,8 +106,9 @@ def _compare(seed: int, data: tuple[Array, ...], answer: BatchSolution, row: int
         told = [] if error < 1e-7 else [Disagreement(seed, status, f"optimality missed by {error:.1e}", np.inf)]
         return Report(Counter(), told, error)
     certificate = certify(problem)
-    if status in (Status.INFEASIBLE, Status.SINGULAR) and certificate is not None and certificate.verify(problem):
-        if certificate.singular == (status == Status.SINGULAR) and answer.shortfall[row] > 0.0:
+    if certificate is not None and certificate.verify(problem) and answer.shortfall[row] > 0.0:
+        proven = Status.SINGULAR if certificate.singular else Status.INFEASIBLE
+        if status == proven:
             return Report(Counter(), [], 0.0)
     expected = linear_program_status(problem)
     distance = 0.0 if certificate is None else certificate.shortfall / (problem.tolerance(certificate.closest) / 1e-9)
@@ -136,19 +147,21 @@ def linear_program_status(problem: TensionProblem) -> str:
         equations = {"A_eq": problem.scaled_A / unit, "b_eq": problem.scaled_w / size}
         return linprog(np.zeros(problem.m), **equations, bounds=bounds, method="highs").status == 0
 
-    if available([(low * unit / size, high * unit / size) for low, high in zip(problem.t_min, problem.t_max, strict=True)]):
+    if available(
+        [(low * unit / size, high * unit / size) for low, high in zip(problem.t_min, problem.t_max, strict=True)]
+    ):
         return "optimal"
     return "infeasible" if available((None, None)) else "singular"
 
 
-def awkward_problem(seed: int) -> tuple[Array, Array, Array, Array]:
+def awkward_problem(seed: int, m: int | None = None, n: int | None = None) -> tuple[Array, Array, Array, Array]:
     """Return A, w, t_min, t_max of a random problem with m 1 to 12 cables and a rank from 1 to 6.
 
     Two kinds of trouble at a time, w inside, at a corner of, or outside the available wrench set, any units.
     """
     rng = np.random.default_rng(seed)
-    m = int(rng.integers(1, 13))
-    n = int(rng.integers(1, 7))
+    m = int(rng.integers(1, 13)) if m is None else m
+    n = int(rng.integers(1, 7)) if n is None else n
     kinds = set(rng.choice(KINDS, 2))
     A = rng.normal(size=(n, m))
     if "geometric" in kinds and n == 6:

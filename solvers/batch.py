@@ -26,6 +26,8 @@ _STATUSES = (Status.OPTIMAL, Status.INFEASIBLE, Status.SINGULAR, Status.INACCURA
 _CODES = {status: code for code, status in enumerate(_STATUSES)}
 _UNSURE = 3
 
+_LANES = 32  # threads take whole blocks of the kernel, so that a row meets the same company whoever solves it
+
 
 @dataclass(frozen=True, eq=False)
 class BatchSolution:
@@ -132,7 +134,9 @@ def solve_batch(
         raise InputError(f"threads: is {threads!r}; accepted: 1 and more, or None")
     matrix = _real("A", A)
     if matrix.ndim < 2 or 0 in matrix.shape[-2:]:
-        raise InputError(f"A: has shape {matrix.shape}; accepted: (..., n, m) with n >= 1 wrench rows and m >= 1 cables")
+        raise InputError(
+            f"A: has shape {matrix.shape}; accepted: (..., n, m) with n >= 1 wrench rows and m >= 1 cables"
+        )
     n, m = matrix.shape[-2:]
     given = {
         "A": matrix,
@@ -162,7 +166,7 @@ def solve_batch(
     code = np.full(rows, _UNSURE, np.int8)
     kernel = compiled.load()
     share = threads or min(os.cpu_count() or 1, max(1, rows // ROWS_WORTH_A_THREAD))
-    block = max(64, -(-rows // (64 * share)) * 64)
+    block = max(_LANES, -(-rows // (_LANES * share)) * _LANES)
 
     def work(first: int) -> None:
         stop = min(first + block, rows)
@@ -175,7 +179,9 @@ def solve_batch(
             list(pool.map(work, range(0, rows, block)))
 
     t, d, numbers = tensions.reshape(rows, m), direction.reshape(rows, n), info.reshape(rows, 3)
-    problem = {name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()}
+    problem = {
+        name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
+    }
     if code.any():
         t[code != 0] = np.nan
         proven = (code == 1) | (code == 2)
@@ -197,7 +203,13 @@ def solve_batch(
 
 
 def _one_by_one(
-    row: np.intp, lead: tuple[int, ...], problem: dict[str, Array], code: NDArray[np.int8], t: Array, d: Array, info: Array
+    row: np.intp,
+    lead: tuple[int, ...],
+    problem: dict[str, Array],
+    code: NDArray[np.int8],
+    t: Array,
+    d: Array,
+    info: Array,
 ) -> None:
     """Fill a row that the kernel left open, by `solve`."""
     solution = solve(_row(problem, tuple(int(i) for i in np.unravel_index(row, lead))))
@@ -222,7 +234,7 @@ def _real(name: str, value: ArrayLike) -> Array:
         raise InputError(f"{name}: is no array (rows of unequal length?); accepted: an array of real numbers") from None
     if array.dtype.kind not in "fiu":
         raise InputError(
-            f"{name}: has shape {array.shape} and entries of type {array.dtype.name}; accepted: an array of real numbers"
+            f"{name}: has shape {array.shape} and type {array.dtype.name}; accepted: an array of real numbers"
         )
     return np.asarray(array, dtype=np.float64)
 
@@ -246,6 +258,6 @@ def _leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
             lead = np.broadcast_shapes(lead, shape)
         except ValueError:
             raise InputError(
-                f"{name}: has leading dimensions {shape}; accepted: what broadcasts with {lead} of the arguments before it"
+                f"{name}: has leading dimensions {shape}; accepted: what broadcasts with {lead}, those before it"
             ) from None
     return lead

@@ -1,19 +1,20 @@
-r"""Bounded least norm in the null space of the wrench matrix, for Numba: the machine room of "active-set" and `solve_batch`.
+r"""Bounded least norm in the null space of the wrench matrix, for Numba: behind "active-set" and `solve_batch`.
 
 .. math::
 
     \min_s |s|^2 \quad \text{s.t.} \quad B s = b, \; lower \le s \le upper, \qquad s = s_0 + N z
 
-B is reduced by Householder reflections from the right with row pivoting (B = P^T L Q_1^T; Golub and Van Loan, 5.4), which
-gives the least-norm s_0, orthogonal to the orthonormal null-space basis N; what remains is the z of least norm inside
-slabs, one for each cable. In up to two dimensions the slabs are taken one after another (Seidel 1991): an optimum that
-the next slab forbids moves onto its edge, cut to an interval by the slabs before. Beyond two dimensions a dual active-set
-method (Goldfarb and Idnani 1983) adds the most violated limit and drops those whose multiplier would change sign.
+B is reduced by Householder reflections from the right with row pivoting (B = P^T L Q_1^T; Golub and Van Loan, 5.4).
+That gives the least-norm s_0, orthogonal to the orthonormal null-space basis N; what remains is the z of least norm
+inside slabs, one for each cable. In up to two dimensions the slabs are taken one after another (Seidel 1991): an
+optimum that the next slab forbids moves onto its edge, cut to an interval by the slabs before. Beyond two dimensions a
+dual active-set method (Goldfarb and Idnani 1983) adds the most violated limit and drops those whose multiplier would
+change sign.
 
-Nothing here is believed that the data do not confirm. Tensions count only if, inside their limits, their wrench error is
-below `TensionProblem.tolerance`, a direction only if its support value falls short of the demand by more than that. Near
-the boundary, near the rank cut, or if rounding makes the iteration lose its way, the answer is UNSURE and whoever asked
-goes to the robust path of `registry.py`.
+Nothing here is believed that the data do not confirm. Tensions count only if, inside their limits, their wrench error
+is below `TensionProblem.tolerance`; a direction only if its support value falls short of the demand by more than that.
+Near the boundary, near the rank cut, or if rounding makes the iteration lose its way, the answer is UNSURE and whoever
+asked goes to the robust path of `registry.py`.
 
 This file imports Numba: it is imported by `compiled.py` alone, where it is needed.
 """
@@ -126,7 +127,7 @@ def _reduce(B, n, mm, order, diag, tau, norms):
 
 @_jit()
 def _planar(N0, N1, s0, lower, upper, mm, slack, z, push):
-    """Find the z of least norm in up to two dimensions, slab by slab; False and multipliers `push` if there is none."""
+    """Find the z of least norm in up to two dimensions; False and multipliers `push` if there is none."""
     z0, z1 = 0.0, 0.0
     for i in range(mm):
         a, b = N0[i], N1[i]
@@ -187,7 +188,7 @@ def _planar(N0, N1, s0, lower, upper, mm, slack, z, push):
 def _dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
     """Move s (mm,) to the point of least norm in s + range N, by Goldfarb and Idnani with the identity as Hessian.
 
-    N holds the basis vectors one after another. Return 0 if found, 1 and multipliers `push` if there is none, 2 if lost.
+    N holds the basis vectors one after another. Return 0 if found, 1 and multipliers `push` if there is none, else 2.
     """
     J = work[: k * k]  # orthonormal, column by column; the first q span the active normals
     R = work[k * k : 2 * k * k]  # their triangle, column by column
@@ -304,9 +305,9 @@ def _dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
 
 @_jit()
 def _proves(A, w, lower, upper, ref, n, m, per_length, d, info):
-    """Whether the scaled direction d (n,), made unit and unscaled here, proves w out of reach; info: support, shortfall.
+    """Whether the scaled direction d (n,), made unit and unscaled here, proves w out of reach.
 
-    Return INFEASIBLE, SINGULAR if no cable pulls along it, or UNSURE.
+    Return INFEASIBLE, SINGULAR if no cable pulls along it, or UNSURE; info gets support and shortfall.
     """
     total = 0.0
     for i in range(n):
@@ -412,17 +413,17 @@ def _solve(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     at = 0
     B = work[at : at + n * m]
     at += n * m
-    b, diag, tau, norms, y = work[at : at + n], work[at + n :], work[at + 2 * n :], work[at + 3 * n :], work[at + 4 * n :]
-    at += 6 * n
-    low, high, s, s0, unit, push = (
-        work[at : at + m],
-        work[at + m : at + 2 * m],
-        work[at + 2 * m : at + 3 * m],
-        work[at + 3 * m : at + 4 * m],
-        work[at + 4 * m : at + 5 * m],
-        work[at + 5 * m : at + 6 * m],
+    b, diag, tau, norms, y = (
+        work[at : at + n],
+        work[at + n :],
+        work[at + 2 * n :],
+        work[at + 3 * n :],
+        work[at + 4 * n :],
     )
-    at += 6 * m
+    at += 6 * n
+    low, high, s = work[at : at + m], work[at + m : at + 2 * m], work[at + 2 * m : at + 3 * m]
+    unit, push = work[at + 3 * m : at + 4 * m], work[at + 4 * m : at + 5 * m]
+    at += 5 * m
     N = work[at : at + m * m + 2 * m]
     at += m * m + 2 * m
     rest = work[at:]
@@ -526,9 +527,8 @@ def _solve(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     if found == 2:
         return UNSURE
     # A part of w outside the range of A makes the problem singular, whatever else is wrong with it.
-    if rank < n:
-        if _outside_range(A, w, n, m, per_length, d, rest):
-            return SINGULAR if _proves(A, w, lower, upper, ref, n, m, per_length, d, info) == SINGULAR else UNSURE
+    if rank < n and _outside_range(A, w, n, m, per_length, d, rest):
+        return SINGULAR if _proves(A, w, lower, upper, ref, n, m, per_length, d, info) == SINGULAR else UNSURE
     if found == 0:
         return UNSURE
     # push = B^T d, and push is in the row space of B.
@@ -581,10 +581,10 @@ def solve_packed(data, n, m, t):
     )
 
 
-# Lanes: this many problems at once, number l of each row of scratch belonging to problem l. One array holds everything,
-# fixed rows first, then a block for each cable, one for each wrench row, and B: so LLVM sees that the rows of a loop do
-# not overlap, and makes vector instructions of it.
-_LANES = 64
+# Lanes: this many problems at once, number e of each row of scratch belonging to problem e. One array holds everything,
+# fixed rows first, then a block for each cable, one for each wrench row, and B: few checks for overlap are left to
+# LLVM, which then makes vector instructions of the loops.
+_LANES = 32
 _Z0, _Z1, _ALONG0, _ALONG1, _BASE0, _BASE1, _FIRST, _LAST, _GOOD, _MOVES = range(10)
 _SLACKS, _SIZE, _DOT0, _DOT1, _DOT2, _ASKED, _ROUNDING, _REQUIRED = range(10, 18)
 _FIXED = 18
@@ -596,26 +596,26 @@ _PER_WRENCH = 4
 
 @_jit()
 def _lanes(A, w, lower, upper, ref, weights, length, per, n, m, first, count, t, info, status, W):
-    """Solve the problems first to first + count if rank = n >= m - 2 and nothing is in doubt; mark the others UNSURE."""
+    """Solve the problems first to first + count if nothing is in doubt; mark the others UNSURE."""
     L = _LANES
-    cable0 = _FIXED * L
-    wrench0 = cable0 + m * _PER_CABLE * L
-    B0 = wrench0 + n * _PER_WRENCH * L
+    cable0 = _FIXED
+    wrench0 = cable0 + m * _PER_CABLE
+    B0 = wrench0 + n * _PER_WRENCH
     weighted = weights.shape[0] > 1
-    for l in range(count):
-        row = first + l
+    for e in range(count):
+        row = first + e
         per_length = 1.0 / length[row * per[6]]
         at_A, at_w, at_low, at_high, at_ref = row * per[0], row * per[1], row * per[2], row * per[3], row * per[4]
         for r in range(n):
             scale = per_length if n == 6 and r >= 3 else 1.0
-            W[wrench0 + (r * _PER_WRENCH + _W) * L + l] = scale * w[at_w + r]
+            W[wrench0 + (r * _PER_WRENCH + _W), e] = scale * w[at_w + r]
             for c in range(m):
-                W[B0 + (r * m + c) * L + l] = scale * A[at_A + r * m + c]
+                W[B0 + (r * m + c), e] = scale * A[at_A + r * m + c]
         for c in range(m):
-            block = cable0 + c * _PER_CABLE * L + l
-            W[block + _T_LOW * L] = lower[at_low + c]
-            W[block + _T_HIGH * L] = upper[at_high + c]
-            W[block + _REF * L] = ref[at_ref + c]
+            block = cable0 + c * _PER_CABLE
+            W[block + _T_LOW, e] = lower[at_low + c]
+            W[block + _T_HIGH, e] = upper[at_high + c]
+            W[block + _REF, e] = ref[at_ref + c]
         heaviest = 0.0
         if weighted:
             at = row * per[5]
@@ -623,164 +623,164 @@ def _lanes(A, w, lower, upper, ref, weights, length, per, n, m, first, count, t,
                 heaviest = max(heaviest, weights[at + c])
             for c in range(m):
                 omega = weights[at + c]
-                W[cable0 + (c * _PER_CABLE + _UNIT) * L + l] = math.sqrt(heaviest / omega) if omega > 0.0 else np.nan
-    for e in range(_FIXED + m * _PER_CABLE + n * (_PER_WRENCH + m)):
-        for l in range(count, L):
-            W[e * L + l] = W[e * L]
+                W[cable0 + (c * _PER_CABLE + _UNIT), e] = math.sqrt(heaviest / omega) if omega > 0.0 else np.nan
+    for x in range(_FIXED + m * _PER_CABLE + n * (_PER_WRENCH + m)):
+        for e in range(count, L):
+            W[x, e] = W[x, 0]
 
-    for l in range(L):
-        W[_ASKED * L + l] = 0.0
-        W[_ROUNDING * L + l] = 0.0
-        W[_REQUIRED * L + l] = 0.0
-        W[_SIZE * L + l] = 0.0
-        W[_GOOD * L + l] = 1.0
+    for e in range(L):
+        W[_ASKED, e] = 0.0
+        W[_ROUNDING, e] = 0.0
+        W[_REQUIRED, e] = 0.0
+        W[_SIZE, e] = 0.0
+        W[_GOOD, e] = 1.0
     for r in range(n):
-        row = wrench0 + r * _PER_WRENCH * L
-        for l in range(L):
-            x = W[row + _W * L + l]
-            W[_REQUIRED * L + l] += x * x
-            W[row + _Y * L + l] = x
-    for l in range(L):
-        W[_ASKED * L + l] = math.sqrt(W[_REQUIRED * L + l])
+        row = wrench0 + r * _PER_WRENCH
+        for e in range(L):
+            x = W[row + _W, e]
+            W[_REQUIRED, e] += x * x
+            W[row + _Y, e] = x
+    for e in range(L):
+        W[_ASKED, e] = math.sqrt(W[_REQUIRED, e])
     for c in range(m):
-        block = cable0 + c * _PER_CABLE * L
-        for l in range(L):
-            W[_DOT0 * L + l] = 0.0
+        block = cable0 + c * _PER_CABLE
+        for e in range(L):
+            W[_DOT0, e] = 0.0
         for r in range(n):
-            row, y = B0 + (r * m + c) * L, wrench0 + (r * _PER_WRENCH + _Y) * L
-            for l in range(L):
-                x = W[row + l]
-                W[_DOT0 * L + l] += x * x
-                W[y + l] -= x * W[block + _REF * L + l]
+            row, y = B0 + (r * m + c), wrench0 + (r * _PER_WRENCH + _Y)
+            for e in range(L):
+                x = W[row, e]
+                W[_DOT0, e] += x * x
+                W[y, e] -= x * W[block + _REF, e]
         if not weighted:
-            for l in range(L):
-                W[block + _UNIT * L + l] = 1.0
-        for l in range(L):
-            low, high, ref_c = W[block + _T_LOW * L + l], W[block + _T_HIGH * L + l], W[block + _REF * L + l]
-            norm = math.sqrt(W[_DOT0 * L + l])
+            for e in range(L):
+                W[block + _UNIT, e] = 1.0
+        for e in range(L):
+            low, high, ref_c = W[block + _T_LOW, e], W[block + _T_HIGH, e], W[block + _REF, e]
+            norm = math.sqrt(W[_DOT0, e])
             nearest = low if low > 0.0 else 0.0
             nearest = high if high < nearest else nearest
-            W[_ASKED * L + l] += norm * abs(nearest)
-            # Twice t_ref for now; the tensions are added below.
-            W[_ROUNDING * L + l] += norm * abs(ref_c)
-            W[block + _N0 * L + l] = norm
-            unit = W[block + _UNIT * L + l]
+            W[_ASKED, e] += norm * abs(nearest)
+            W[_ROUNDING, e] += norm * abs(ref_c)
+            W[block + _N0, e] = norm
+            unit = W[block + _UNIT, e]
             low = (low - ref_c) / unit
             high = (high - ref_c) / unit
-            W[block + _LOW * L + l] = low
-            W[block + _HIGH * L + l] = high
+            W[block + _LOW, e] = low
+            W[block + _HIGH, e] = high
             nearest = low if low > 0.0 else 0.0
             nearest = abs(high if high < nearest else nearest)
-            size = W[_SIZE * L + l]
-            W[_SIZE * L + l] = nearest if nearest > size else size
-            good = W[block + _T_LOW * L + l] <= W[block + _T_HIGH * L + l] and norm < 1e50
-            W[_GOOD * L + l] = W[_GOOD * L + l] if good else 0.0
-            W[block + _T * L + l] = norm
+            size = W[_SIZE, e]
+            W[_SIZE, e] = nearest if nearest > size else size
+            good = W[block + _T_LOW, e] <= W[block + _T_HIGH, e] and norm < 1e50
+            W[_GOOD, e] = W[_GOOD, e] if good else 0.0
+            W[block + _T, e] = norm
         if weighted:
             for r in range(n):
-                row = B0 + (r * m + c) * L
-                for l in range(L):
-                    W[row + l] *= W[block + _UNIT * L + l]
+                row = B0 + (r * m + c)
+                for e in range(L):
+                    W[row, e] *= W[block + _UNIT, e]
 
     for j in range(n):
-        own = wrench0 + j * _PER_WRENCH * L
-        for l in range(L):
-            W[_DOT0 * L + l] = 0.0
-            W[_DOT1 * L + l] = 0.0
+        own = wrench0 + j * _PER_WRENCH
+        for e in range(L):
+            W[_DOT0, e] = 0.0
+            W[_DOT1, e] = 0.0
         for c in range(j):
-            row = B0 + (j * m + c) * L
-            for l in range(L):
-                W[_DOT1 * L + l] += W[row + l] * W[row + l]
+            row = B0 + (j * m + c)
+            for e in range(L):
+                W[_DOT1, e] += W[row, e] * W[row, e]
         for c in range(j, m):
-            row = B0 + (j * m + c) * L
-            for l in range(L):
-                W[_DOT0 * L + l] += W[row + l] * W[row + l]
-        row = B0 + (j * m + j) * L
-        for l in range(L):
-            square, head = W[_DOT0 * L + l], W[row + l]
+            row = B0 + (j * m + c)
+            for e in range(L):
+                W[_DOT0, e] += W[row, e] * W[row, e]
+        row = B0 + (j * m + j)
+        for e in range(L):
+            square, head = W[_DOT0, e], W[row, e]
             if j == 0:
-                W[_DOT2 * L + l] = square
-            largest = W[_DOT2 * L + l]
-            good = square > 1e-10 * W[_DOT1 * L + l] and square > 1e-10 * largest and square < 1e10 * largest
-            W[_GOOD * L + l] = W[_GOOD * L + l] if good else 0.0
+                W[_DOT2, e] = square
+            largest = W[_DOT2, e]
+            good = square > 1e-10 * W[_DOT1, e] and square > 1e-10 * largest and square < 1e10 * largest
+            W[_GOOD, e] = W[_GOOD, e] if good else 0.0
             square = square if good else 1.0
             norm = math.sqrt(square)
             pivot = -norm if head > 0.0 else norm
-            W[own + _DIAG * L + l] = pivot
-            W[row + l] = head - pivot
-            W[own + _TAU * L + l] = -1.0 / (pivot * (head - pivot))
+            W[own + _DIAG, e] = pivot
+            W[row, e] = head - pivot
+            W[own + _TAU, e] = -1.0 / (pivot * (head - pivot))
         for i in range(j + 1, n):
-            for l in range(L):
-                W[_DOT0 * L + l] = 0.0
+            for e in range(L):
+                W[_DOT0, e] = 0.0
             for c in range(j, m):
-                v, x = B0 + (j * m + c) * L, B0 + (i * m + c) * L
-                for l in range(L):
-                    W[_DOT0 * L + l] += W[v + l] * W[x + l]
-            for l in range(L):
-                W[_DOT0 * L + l] *= W[own + _TAU * L + l]
+                v, x = B0 + (j * m + c), B0 + (i * m + c)
+                for e in range(L):
+                    W[_DOT0, e] += W[v, e] * W[x, e]
+            for e in range(L):
+                W[_DOT0, e] *= W[own + _TAU, e]
             for c in range(j, m):
-                v, x = B0 + (j * m + c) * L, B0 + (i * m + c) * L
-                for l in range(L):
-                    W[x + l] -= W[_DOT0 * L + l] * W[v + l]
-    for l in range(L):
-        W[_DOT0 * L + l] = 0.0
+                v, x = B0 + (j * m + c), B0 + (i * m + c)
+                for e in range(L):
+                    W[x, e] -= W[_DOT0, e] * W[v, e]
+    for e in range(L):
+        W[_DOT0, e] = 0.0
     for j in range(n):
-        own = wrench0 + j * _PER_WRENCH * L
+        own = wrench0 + j * _PER_WRENCH
         for i in range(j):
-            x, y = B0 + (j * m + i) * L, wrench0 + (i * _PER_WRENCH + _Y) * L
-            for l in range(L):
-                W[own + _Y * L + l] -= W[x + l] * W[y + l]
-        block = cable0 + j * _PER_CABLE * L
-        for l in range(L):
-            y = W[own + _Y * L + l] / W[own + _DIAG * L + l]
-            W[own + _Y * L + l] = y
-            W[_DOT0 * L + l] += y * y
-            W[block + _S * L + l] = y
-    for l in range(L):
-        size, other = W[_SIZE * L + l], math.sqrt(W[_DOT0 * L + l])
-        W[_SLACKS * L + l] = _SLACK * (size if size > other else other)
+            x, y = B0 + (j * m + i), wrench0 + (i * _PER_WRENCH + _Y)
+            for e in range(L):
+                W[own + _Y, e] -= W[x, e] * W[y, e]
+        block = cable0 + j * _PER_CABLE
+        for e in range(L):
+            y = W[own + _Y, e] / W[own + _DIAG, e]
+            W[own + _Y, e] = y
+            W[_DOT0, e] += y * y
+            W[block + _S, e] = y
+    for e in range(L):
+        size, other = W[_SIZE, e], math.sqrt(W[_DOT0, e])
+        W[_SLACKS, e] = _SLACK * (size if size > other else other)
     for c in range(m):
-        block = cable0 + c * _PER_CABLE * L
-        for l in range(L):
+        block = cable0 + c * _PER_CABLE
+        for e in range(L):
             if c >= n:
-                W[block + _S * L + l] = 0.0
-            W[block + _N0 * L + l] = 1.0 if c == n else 0.0
-            W[block + _N1 * L + l] = 1.0 if c == n + 1 else 0.0
+                W[block + _S, e] = 0.0
+            W[block + _N0, e] = 1.0 if c == n else 0.0
+            W[block + _N1, e] = 1.0 if c == n + 1 else 0.0
     for j in range(n - 1, -1, -1):
-        own = wrench0 + j * _PER_WRENCH * L
-        for l in range(L):
-            W[_DOT0 * L + l] = 0.0
-            W[_DOT1 * L + l] = 0.0
-            W[_DOT2 * L + l] = 0.0
+        own = wrench0 + j * _PER_WRENCH
+        for e in range(L):
+            W[_DOT0, e] = 0.0
+            W[_DOT1, e] = 0.0
+            W[_DOT2, e] = 0.0
         for c in range(j, m):
-            v, block = B0 + (j * m + c) * L, cable0 + c * _PER_CABLE * L
-            for l in range(L):
-                x = W[v + l]
-                W[_DOT0 * L + l] += x * W[block + _N0 * L + l]
-                W[_DOT1 * L + l] += x * W[block + _N1 * L + l]
-                W[_DOT2 * L + l] += x * W[block + _S * L + l]
-        for l in range(L):
-            tau = W[own + _TAU * L + l]
-            W[_DOT0 * L + l] *= tau
-            W[_DOT1 * L + l] *= tau
-            W[_DOT2 * L + l] *= tau
+            v, block = B0 + (j * m + c), cable0 + c * _PER_CABLE
+            for e in range(L):
+                x = W[v, e]
+                W[_DOT0, e] += x * W[block + _N0, e]
+                W[_DOT1, e] += x * W[block + _N1, e]
+                W[_DOT2, e] += x * W[block + _S, e]
+        for e in range(L):
+            tau = W[own + _TAU, e]
+            W[_DOT0, e] *= tau
+            W[_DOT1, e] *= tau
+            W[_DOT2, e] *= tau
         for c in range(j, m):
-            v, block = B0 + (j * m + c) * L, cable0 + c * _PER_CABLE * L
-            for l in range(L):
-                x = W[v + l]
-                W[block + _N0 * L + l] -= x * W[_DOT0 * L + l]
-                W[block + _N1 * L + l] -= x * W[_DOT1 * L + l]
-                W[block + _S * L + l] -= x * W[_DOT2 * L + l]
+            v, block = B0 + (j * m + c), cable0 + c * _PER_CABLE
+            for e in range(L):
+                W[block + _N0, e] -= W[v, e] * W[_DOT0, e]
+            for e in range(L):
+                W[block + _N1, e] -= W[v, e] * W[_DOT1, e]
+            for e in range(L):
+                W[block + _S, e] -= W[v, e] * W[_DOT2, e]
 
-    for l in range(L):
-        W[_Z0 * L + l] = 0.0
-        W[_Z1 * L + l] = 0.0
+    for e in range(L):
+        W[_Z0, e] = 0.0
+        W[_Z1, e] = 0.0
     for i in range(m):
-        own = cable0 + i * _PER_CABLE * L
-        for l in range(L):
-            a, b, s = W[own + _N0 * L + l], W[own + _N1 * L + l], W[own + _S * L + l]
-            low, high, slack = W[own + _LOW * L + l], W[own + _HIGH * L + l], W[_SLACKS * L + l]
-            value = s + a * W[_Z0 * L + l] + b * W[_Z1 * L + l]
+        own = cable0 + i * _PER_CABLE
+        for e in range(L):
+            a, b, s = W[own + _N0, e], W[own + _N1, e], W[own + _S, e]
+            low, high, slack = W[own + _LOW, e], W[own + _HIGH, e], W[_SLACKS, e]
+            value = s + a * W[_Z0, e] + b * W[_Z1, e]
             below = value < low - slack
             above = value > high + slack
             edge = (low if below else high) - s
@@ -789,25 +789,25 @@ def _lanes(A, w, lower, upper, ref, weights, length, per, n, m, first, count, t,
             square = square if cuts else 1.0
             inverse = 1.0 / square
             root = math.sqrt(inverse)
-            W[_MOVES * L + l] = 1.0 if below or above else 0.0
-            good = W[_GOOD * L + l]
+            W[_MOVES, e] = 1.0 if below or above else 0.0
+            good = W[_GOOD, e]
             good = good if cuts else 0.0
-            W[_GOOD * L + l] = good if below or above else W[_GOOD * L + l]
-            W[_ALONG0 * L + l] = -b * root
-            W[_ALONG1 * L + l] = a * root
-            W[_BASE0 * L + l] = a * edge * inverse
-            W[_BASE1 * L + l] = b * edge * inverse
-            W[_FIRST * L + l] = -np.inf
-            W[_LAST * L + l] = np.inf
+            W[_GOOD, e] = good if below or above else W[_GOOD, e]
+            W[_ALONG0, e] = -b * root
+            W[_ALONG1, e] = a * root
+            W[_BASE0, e] = a * edge * inverse
+            W[_BASE1, e] = b * edge * inverse
+            W[_FIRST, e] = -np.inf
+            W[_LAST, e] = np.inf
         for j in range(i):
-            block = cable0 + j * _PER_CABLE * L
-            for l in range(L):
-                a, b = W[block + _N0 * L + l], W[block + _N1 * L + l]
-                here = W[block + _S * L + l] + a * W[_BASE0 * L + l] + b * W[_BASE1 * L + l]
-                low, high = W[block + _LOW * L + l] - here, W[block + _HIGH * L + l] - here
-                den = a * W[_ALONG0 * L + l] + b * W[_ALONG1 * L + l]
+            block = cable0 + j * _PER_CABLE
+            for e in range(L):
+                a, b = W[block + _N0, e], W[block + _N1, e]
+                here = W[block + _S, e] + a * W[_BASE0, e] + b * W[_BASE1, e]
+                low, high = W[block + _LOW, e] - here, W[block + _HIGH, e] - here
+                den = a * W[_ALONG0, e] + b * W[_ALONG1, e]
                 parallel = abs(den) < _PARALLEL
-                slack = W[_SLACKS * L + l]
+                slack = W[_SLACKS, e]
                 inside = low <= slack and high >= -slack
                 inverse = 1.0 / (1.0 if parallel else den)
                 low *= inverse
@@ -816,44 +816,40 @@ def _lanes(A, w, lower, upper, ref, weights, length, per, n, m, first, count, t,
                 stop = low if den < 0.0 else high
                 start = (-np.inf if inside else np.inf) if parallel else start
                 stop = np.inf if parallel else stop
-                before, after = W[_FIRST * L + l], W[_LAST * L + l]
-                W[_FIRST * L + l] = start if start > before else before
-                W[_LAST * L + l] = stop if stop < after else after
-        for l in range(L):
-            start, stop = W[_FIRST * L + l], W[_LAST * L + l]
-            moves = W[_MOVES * L + l] > 0.0
-            good = W[_GOOD * L + l]
-            W[_GOOD * L + l] = 0.0 if moves and start - stop > W[_SLACKS * L + l] else good
+                before, after = W[_FIRST, e], W[_LAST, e]
+                W[_FIRST, e] = start if start > before else before
+                W[_LAST, e] = stop if stop < after else after
+        for e in range(L):
+            start, stop = W[_FIRST, e], W[_LAST, e]
+            moves = W[_MOVES, e] > 0.0
+            good = W[_GOOD, e]
+            W[_GOOD, e] = 0.0 if moves and start - stop > W[_SLACKS, e] else good
             shift = start if start > 0.0 else 0.0
             shift = stop if stop < shift else shift
             shift = 0.5 * (start + stop) if start > stop else shift
-            z0 = W[_BASE0 * L + l] + shift * W[_ALONG0 * L + l]
-            z1 = W[_BASE1 * L + l] + shift * W[_ALONG1 * L + l]
-            W[_Z0 * L + l] = z0 if moves else W[_Z0 * L + l]
-            W[_Z1 * L + l] = z1 if moves else W[_Z1 * L + l]
+            z0 = W[_BASE0, e] + shift * W[_ALONG0, e]
+            z1 = W[_BASE1, e] + shift * W[_ALONG1, e]
+            W[_Z0, e] = z0 if moves else W[_Z0, e]
+            W[_Z1, e] = z1 if moves else W[_Z1, e]
 
     for c in range(m):
-        block = cable0 + c * _PER_CABLE * L
-        for l in range(L):
-            s = (
-                W[block + _S * L + l]
-                + W[block + _N0 * L + l] * W[_Z0 * L + l]
-                + W[block + _N1 * L + l] * W[_Z1 * L + l]
-            )
-            x = W[block + _REF * L + l] + W[block + _UNIT * L + l] * s
-            low, high = W[block + _T_LOW * L + l], W[block + _T_HIGH * L + l]
+        block = cable0 + c * _PER_CABLE
+        for e in range(L):
+            s = W[block + _S, e] + W[block + _N0, e] * W[_Z0, e] + W[block + _N1, e] * W[_Z1, e]
+            x = W[block + _REF, e] + W[block + _UNIT, e] * s
+            low, high = W[block + _T_LOW, e], W[block + _T_HIGH, e]
             x = low if x < low else x
             x = high if x > high else x
-            W[_ROUNDING * L + l] += W[block + _T * L + l] * abs(x)
-            W[block + _T * L + l] = x
-    for l in range(count):
-        row = first + l
-        good = W[_GOOD * L + l] > 0.0 and W[_REQUIRED * L + l] < 1e100
+            W[_ROUNDING, e] += W[block + _T, e] * abs(x)
+            W[block + _T, e] = x
+    for e in range(count):
+        row = first + e
+        good = W[_GOOD, e] > 0.0 and W[_REQUIRED, e] < 1e100
         if good:
             per_length = 1.0 / length[row * per[6]]
             at_A = row * per[0]
             for c in range(m):
-                t[row * m + c] = W[cable0 + (c * _PER_CABLE + _T) * L + l]
+                t[row * m + c] = W[cable0 + (c * _PER_CABLE + _T), e]
             error = 0.0
             for r in range(n):
                 total = -w[row * per[1] + r]
@@ -862,7 +858,7 @@ def _lanes(A, w, lower, upper, ref, weights, length, per, n, m, first, count, t,
                 total *= per_length if n == 6 and r >= 3 else 1.0
                 error += total * total
             info[row * 3 + 2] = math.sqrt(error)
-            good = info[row * 3 + 2] <= FEASIBILITY * W[_ASKED * L + l] + ROUNDING * W[_ROUNDING * L + l]
+            good = info[row * 3 + 2] <= FEASIBILITY * W[_ASKED, e] + ROUNDING * W[_ROUNDING, e]
         status[row] = OPTIMAL if good else UNSURE
 
 
@@ -910,7 +906,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, n, m, start, stop,
     work = np.empty(work_size(n, m))
     planar = 0 <= m - n <= 2
     if planar:
-        W = np.empty((_FIXED + m * _PER_CABLE + n * (_PER_WRENCH + m)) * _LANES)
+        W = np.empty((_FIXED + m * _PER_CABLE + n * (_PER_WRENCH + m), _LANES))
         W[:] = 1.0
         for first in range(start, stop, _LANES):
             count = min(_LANES, stop - first)
