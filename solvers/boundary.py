@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from .active_set import bounded_least_norm
+from .direct_daqp import bounded_least_norm
 from .problem import TensionProblem
 from .projection import project
 from .standard_form import StandardForm

@@ -6,6 +6,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .problem import TensionProblem
+from .solution import Status
 from .standard_form import StandardForm
 
 __all__ = ["Method", "Proposal"]
@@ -51,6 +53,15 @@ class Method(ABC):
     def backends(self) -> list[str]:
         """Names of the installed back ends, the default first; empty for methods that have none."""
         return []
+
+    def attempt(self, problem: TensionProblem) -> tuple[Status, NDArray[np.float64] | None] | None:
+        """Answer on the spot, or return None: then `propose` is asked and judged.
+
+        What is returned here is not judged again. Tensions are inside the limits and give w within
+        `TensionProblem.tolerance`; "infeasible" and "singular" rest on a direction that proves it by several times as
+        much, so that `certify` finds the sharpest certificate when somebody asks for it.
+        """
+        return None
 
     @abstractmethod
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .active_set import bounded_least_norm
+from .direct_daqp import bounded_least_norm
 from .method import Method, Proposal
 from .standard_form import StandardForm
 

@@ -1,6 +1,6 @@
 """The tension-distribution problem: `TensionProblem`, checked on construction."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -63,6 +63,8 @@ class TensionProblem:
     t_ref: Array  # (m,)
     weights: Array  # (m,)
     length: float
+    packed: Array = field(repr=False)
+    """The whole problem in one array, in the order of the arguments; the others are views of it."""
 
     def __init__(
         self,
@@ -102,17 +104,16 @@ class TensionProblem:
         out_of_range = (omega < _LIGHTEST) | (omega > _HEAVIEST)
         _reject_at("weights", omega, out_of_range, f"numbers > 0, from {_LIGHTEST:g} to {_HEAVIEST:g}")
 
-        for name, value in (
-            ("A", matrix),
-            ("w", wrench),
-            ("t_min", lower),
-            ("t_max", upper),
-            ("t_ref", wish),
-            ("weights", omega),
-        ):
-            value.flags.writeable = False
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "length", _positive_length(length))
+        parts = (matrix.ravel(), wrench, lower, upper, wish, omega)
+        packed = np.concatenate((*parts, [_positive_length(length)]))
+        packed.flags.writeable = False
+        start = 0
+        for name, part in zip(("A", "w", "t_min", "t_max", "t_ref", "weights"), parts, strict=True):
+            view = packed[start : start + part.size]
+            object.__setattr__(self, name, view.reshape(n, m) if name == "A" else view)
+            start += part.size
+        object.__setattr__(self, "length", float(packed[-1]))
+        object.__setattr__(self, "packed", packed)
 
     @property
     def n(self) -> int:

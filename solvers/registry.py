@@ -10,6 +10,7 @@ from ..errors import InputError
 from .active_set import ActiveSet
 from .boundary import boundary_candidates
 from .certificate import Certificate, certify
+from .direct_daqp import Daqp
 from .method import Method, Proposal
 from .min_norm import MinNorm
 from .problem import TensionProblem
@@ -19,7 +20,8 @@ from .standard_form import StandardForm, standard_form
 
 __all__ = ["methods", "solve"]
 
-_METHODS: dict[str, Method] = {method.name: method for method in (ActiveSet(), QuadraticProgram(), MinNorm())}
+_ACTIVE_SET = ActiveSet()
+_METHODS: dict[str, Method] = {method.name: method for method in (_ACTIVE_SET, Daqp(), QuadraticProgram(), MinNorm())}
 
 
 def methods() -> dict[str, Method]:
@@ -52,6 +54,10 @@ def solve(
         If there is no such method, back end or option; the message lists those that there are.
     """
     start = time.perf_counter()
+    if method == "active-set" and backend is None and not options and type(problem) is TensionProblem:
+        answer = _ACTIVE_SET.attempt(problem)
+        if answer is not None:
+            return TensionSolution(problem, answer[1], answer[0], method, None, time.perf_counter() - start)
     chosen, used_backend = _lookup(method, backend, options)
     if not isinstance(problem, TensionProblem):
         raise InputError(f"problem: is a {type(problem).__name__}; accepted: a TensionProblem")

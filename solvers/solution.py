@@ -1,14 +1,12 @@
 """The answer: `TensionSolution`, which judges its own tensions, and its `Status`."""
 
-from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .certificate import Certificate
+from .certificate import Certificate, certify
 from .problem import TensionProblem
 
 __all__ = ["Status", "TensionSolution"]
@@ -32,11 +30,14 @@ class Status(StrEnum):
     """The tensions miss w by more than the tolerance, yet no certificate says that w is out of reach: read `residual`
     before using them."""
 
+    INVALID = "invalid"
+    """A row of a batch whose numbers are no problem: NaN, crossed limits, a weight that is not positive. A single
+    problem like that is an `InputError`."""
+
     FAILED = "failed"
     """A back end gave up, or called the problem infeasible and could not be believed; `detail` says what it said."""
 
 
-@dataclass(frozen=True, eq=False)
 class TensionSolution:
     """Tensions, or the proof that there are none.
 
@@ -53,31 +54,56 @@ class TensionSolution:
         Who solved it; `backend` is None for methods that have none.
     time :
         Wall time of the call [s].
-    certificate :
-        Why there are no tensions, exactly if `status` is infeasible or singular. Its `closest` holds the tensions
-        whose wrench is nearest.
     iterations :
         Iterations of the method, None if it does not count any.
     detail :
         What there is to say beyond the status, else empty.
     """
 
-    problem: TensionProblem
-    tensions: NDArray[np.float64] | None  # (m,)
-    status: Status
-    method: str
-    backend: str | None = None
-    time: float = 0.0
-    certificate: Certificate | None = None
-    iterations: int | None = None
-    detail: str = ""
+    __slots__ = ("_certificate", "backend", "detail", "iterations", "method", "problem", "status", "tensions", "time")
+
+    def __init__(
+        self,
+        problem: TensionProblem,
+        tensions: NDArray[np.float64] | None,
+        status: Status,
+        method: str,
+        backend: str | None = None,
+        time: float = 0.0,
+        certificate: Certificate | None = None,
+        iterations: int | None = None,
+        detail: str = "",
+    ) -> None:
+        self.problem = problem
+        self.tensions = tensions  # (m,)
+        self.status = status
+        self.method = method
+        self.backend = backend
+        self.time = time
+        self._certificate = certificate
+        self.iterations = iterations
+        self.detail = detail
+
+    def __repr__(self) -> str:
+        return f"TensionSolution(status={self.status.value!r}, tensions={self.tensions!r}, method={self.method!r})"
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """Why there are no tensions, exactly if `status` is infeasible or singular.
+
+        Its `closest` holds the tensions whose wrench is nearest. The method "active-set" proves its status by a
+        direction of its own; the sharpest certificate is then computed when it is first asked for.
+        """
+        if self._certificate is None and (self.status is Status.INFEASIBLE or self.status is Status.SINGULAR):
+            self._certificate = certify(self.problem)
+        return self._certificate
 
     @property
     def feasible(self) -> bool:
         """True if the tensions can be used as they are."""
         return self.status is Status.OPTIMAL
 
-    @cached_property
+    @property
     def residual(self) -> float:
         """Wrench error |S (A t - w)| [N], S dividing moments by the problem's length; nan without tensions."""
         if self.tensions is None:

@@ -334,7 +334,7 @@ def test_wrong_input_is_told_in_one_line(name):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"method": "magic"}, r"method: 'magic' is unknown; accepted: active-set, qp, min-norm"),
+        ({"method": "magic"}, r"method: 'magic' is unknown; accepted: active-set, daqp, qp, min-norm"),
         ({"method": None}, r"method: None is unknown"),
         ({"method": "qp", "backend": "magic"}, r"backend: 'magic' is not installed; accepted: clarabel, .*osqp"),
         ({"method": "min-norm", "backend": "osqp"}, r"backend: 'osqp' is not installed; accepted: None"),
@@ -394,7 +394,7 @@ def test_a_back_end_that_calls_a_feasible_problem_infeasible_is_not_believed(mon
 
 def test_methods_tell_about_themselves():
     listed = methods()
-    assert list(listed) == ["active-set", "qp", "min-norm"]
+    assert list(listed) == ["active-set", "daqp", "qp", "min-norm"]
     for name, method in listed.items():
         assert method.name == name
         assert method.guarantee

@@ -1,0 +1,263 @@
+"""Many problems in one call: `solve_batch`."""
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from . import compiled
+from .problem import TensionProblem
+from .registry import solve
+from .solution import Status, TensionSolution
+
+__all__ = ["BatchSolution", "solve_batch"]
+
+Array = NDArray[np.float64]
+
+ROWS_WORTH_A_THREAD = 2000  # about a millisecond
+
+# Codes of `kernel`; those it is unsure of never leave this module.
+_STATUSES = (Status.OPTIMAL, Status.INFEASIBLE, Status.SINGULAR, Status.INACCURATE, Status.INVALID, Status.FAILED)
+_CODES = {status: code for code, status in enumerate(_STATUSES)}
+_UNSURE = 3
+
+_LANES = 32  # threads take whole blocks of the kernel, so that a row meets the same company whoever solves it
+
+
+@dataclass(frozen=True, eq=False)
+class BatchSolution:
+    """The answers to a batch of problems, `...` being its leading dimensions.
+
+    Attributes
+    ----------
+    tensions :
+        Tensions [N], shape (..., m), inside the limits to the last bit; nan where there are none.
+    code :
+        Status of each row as a small integer, shape (...); `statuses[code]` is the `Status`.
+    residual :
+        Wrench error |S (A t - w)| [N], shape (...); nan without tensions.
+    direction :
+        Wrench direction that proves a row infeasible or singular, shape (..., n), scaled as that of a `Certificate`;
+        nan elsewhere. Every one was verified. It is a direction along which the shortfall is more than the tolerance,
+        not always the one along which it is largest: that is `solution(index).certificate`.
+    shortfall, support :
+        d . w - h(d) [N] and h(d) [N] along that direction, shape (...); nan elsewhere.
+    time :
+        Wall time of the call [s].
+    problem :
+        A, w, t_min, t_max, t_ref, weights and length, broadcast.
+    """
+
+    tensions: Array  # (..., m)
+    code: NDArray[np.int8]  # (...)
+    residual: Array  # (...)
+    direction: Array  # (..., n)
+    shortfall: Array  # (...)
+    support: Array  # (...)
+    time: float
+    problem: dict[str, Array]
+
+    statuses = _STATUSES
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Where the tensions can be used as they are, shape (...)."""
+        return self.code == 0
+
+    @cached_property
+    def status(self) -> NDArray[np.str_]:
+        """The status of each row as text, shape (...): "optimal", "infeasible", ..."""
+        return np.array([status.value for status in _STATUSES])[self.code]
+
+    def count(self) -> dict[Status, int]:
+        """How many rows have each status, for those that occur."""
+        numbers = np.bincount(self.code.ravel(), minlength=len(_STATUSES))
+        return {status: int(number) for status, number in zip(_STATUSES, numbers, strict=True) if number}
+
+    def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
+        """Solve one row again by itself, for its certificate and all that a `TensionSolution` can tell.
+
+        Raises
+        ------
+        InputError
+            If the row is invalid; the message says why.
+        """
+        return solve(_row(self.problem, index))
+
+
+def solve_batch(
+    A: ArrayLike,
+    w: ArrayLike,
+    t_min: ArrayLike,
+    t_max: ArrayLike,
+    t_ref: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    length: ArrayLike | None = None,
+    threads: int | None = None,
+) -> BatchSolution:
+    """Distribute the tensions of many problems, each as `solve` does with the method "active-set".
+
+    Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. A row whose numbers are no problem
+    (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved. What the
+    kernel is not sure of, near the boundary of the available wrench set or of the rank cut, goes through `solve`.
+
+    Parameters
+    ----------
+    A :
+        Wrench matrices, shape (..., n, m).
+    w :
+        Required wrenches, shape (..., n), [N] and [N m].
+    t_min, t_max :
+        Tension limits [N], shape (..., m) or one number.
+    t_ref :
+        Tensions to stay near [N], shape (..., m) or one number; None = 0.
+    weights :
+        Weights of the cables, shape (..., m) or one number; None = 1.
+    length :
+        Characteristic length [m], shape (...); None = 1 m.
+    threads :
+        How many threads share the rows; None = one for each 2000 rows, at most as many as there are processors. The
+        result does not depend on it.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or its shape does not fit the others.
+    """
+    start = time.perf_counter()
+    if threads is not None and (not isinstance(threads, int) or isinstance(threads, bool) or threads < 1):
+        raise InputError(f"threads: is {threads!r}; accepted: 1 and more, or None")
+    matrix = _real("A", A)
+    if matrix.ndim < 2 or 0 in matrix.shape[-2:]:
+        raise InputError(
+            f"A: has shape {matrix.shape}; accepted: (..., n, m) with n >= 1 wrench rows and m >= 1 cables"
+        )
+    n, m = matrix.shape[-2:]
+    given = {
+        "A": matrix,
+        "w": _ends("w", w, n),
+        "t_min": _ends("t_min", t_min, m, repeat=True),
+        "t_max": _ends("t_max", t_max, m, repeat=True),
+        "t_ref": _ends("t_ref", 0.0 if t_ref is None else t_ref, m, repeat=True),
+        "weights": _ends("weights", 1.0 if weights is None else weights, m, repeat=True),
+        "length": _real("length", 1.0 if length is None else length),
+    }
+    core = {name: {"A": 2, "length": 0}.get(name, 1) for name in given}
+    lead = _leading({name: value.shape[: value.ndim - core[name]] for name, value in given.items()})
+    rows = int(np.prod(lead, dtype=np.int64))
+
+    flat, per = [], np.zeros(7, np.int64)
+    for position, (name, value) in enumerate(given.items()):
+        if weights is None and name == "weights":
+            flat.append(np.ones(1))
+            continue
+        own, tail = value.shape[: value.ndim - core[name]], value.shape[value.ndim - core[name] :]
+        if np.prod(own, dtype=np.int64) != 1:
+            value = np.broadcast_to(value, lead + tail)
+            per[position] = np.prod(tail, dtype=np.int64)
+        flat.append(np.ascontiguousarray(value).reshape(-1))
+
+    tensions, direction, info = np.empty(rows * m), np.full(rows * n, np.nan), np.full(rows * 3, np.nan)
+    code = np.full(rows, _UNSURE, np.int8)
+    kernel = compiled.load()
+    share = threads or min(os.cpu_count() or 1, max(1, rows // ROWS_WORTH_A_THREAD))
+    block = max(_LANES, -(-rows // (_LANES * share)) * _LANES)
+
+    def work(first: int) -> None:
+        stop = min(first + block, rows)
+        kernel.solve_rows(*flat, per, n, m, first, stop, tensions, direction, info, code)
+
+    if share == 1:
+        work(0)
+    else:
+        with ThreadPoolExecutor(share) as pool:
+            list(pool.map(work, range(0, rows, block)))
+
+    t, d, numbers = tensions.reshape(rows, m), direction.reshape(rows, n), info.reshape(rows, 3)
+    problem = {
+        name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
+    }
+    if code.any():
+        t[code != 0] = np.nan
+        proven = (code == 1) | (code == 2)
+        d[~proven] = np.nan
+        numbers[~proven, :2] = np.nan
+        numbers[code != 0, 2] = np.nan
+        for row in np.flatnonzero(code == _UNSURE):
+            _one_by_one(row, lead, problem, code, t, d, numbers)
+    return BatchSolution(
+        t.reshape(*lead, m),
+        code.reshape(lead),
+        numbers[:, 2].reshape(lead),
+        d.reshape(*lead, n),
+        numbers[:, 1].reshape(lead),
+        numbers[:, 0].reshape(lead),
+        time.perf_counter() - start,
+        problem,
+    )
+
+
+def _one_by_one(
+    row: np.intp,
+    lead: tuple[int, ...],
+    problem: dict[str, Array],
+    code: NDArray[np.int8],
+    t: Array,
+    d: Array,
+    info: Array,
+) -> None:
+    """Fill a row that the kernel left open, by `solve`."""
+    solution = solve(_row(problem, tuple(int(i) for i in np.unravel_index(row, lead))))
+    code[row] = _CODES[solution.status]
+    if solution.tensions is not None:
+        t[row], info[row, 2] = solution.tensions, solution.residual
+    if (certificate := solution.certificate) is not None:
+        d[row], info[row, :2] = certificate.direction, (certificate.support, certificate.shortfall)
+
+
+def _row(problem: dict[str, Array], index: int | tuple[int, ...]) -> TensionProblem:
+    """State one row of a batch as a problem."""
+    taken = {name: value[index] for name, value in problem.items()}
+    return TensionProblem(**{**taken, "length": float(taken["length"])})
+
+
+def _real(name: str, value: ArrayLike) -> Array:
+    """Return `value` as float64, or raise InputError if it is not an array of real numbers."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):
+        raise InputError(f"{name}: is no array (rows of unequal length?); accepted: an array of real numbers") from None
+    if array.dtype.kind not in "fiu":
+        raise InputError(
+            f"{name}: has shape {array.shape} and type {array.dtype.name}; accepted: an array of real numbers"
+        )
+    return np.asarray(array, dtype=np.float64)
+
+
+def _ends(name: str, value: ArrayLike, size: int, repeat: bool = False) -> Array:
+    """Return `value` as (..., size); a single number may stand for all of them."""
+    array = _real(name, value)
+    if repeat and array.ndim == 0:
+        return np.full(size, array)
+    if array.ndim == 0 or array.shape[-1] != size:
+        also = " or a single number" if repeat else ""
+        raise InputError(f"{name}: has shape {array.shape}; accepted: (..., {size}), for this A{also}")
+    return array
+
+
+def _leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the common leading dimensions, or raise InputError naming the first argument that does not fit."""
+    lead: tuple[int, ...] = ()
+    for name, shape in shapes.items():
+        try:
+            lead = np.broadcast_shapes(lead, shape)
+        except ValueError:
+            raise InputError(
+                f"{name}: has leading dimensions {shape}; accepted: what broadcasts with {lead}, those before it"
+            ) from None
+    return lead

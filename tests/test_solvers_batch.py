@@ -1,0 +1,198 @@
+"""The kernel and `solve_batch`: exact on awkward problems, the same as `solve`, and nothing lost to a bad row."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from towline.benchmarks.exactness import BOUNDARY, awkward_problem, check
+from towline.errors import InputError
+from towline.solvers import Status, TensionProblem, compiled, solve, solve_batch
+
+from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
+from .references import linear_program_status, optimum_by_enumeration
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kernel():
+    return compiled.load()
+
+
+def stacked(problems):
+    return np.array([p.A for p in problems]), np.array([p.w for p in problems])
+
+
+def mixture(count, m):
+    rng = np.random.default_rng(m)
+    return [(random_feasible, random_infeasible)[k % 2](rng, m) for k in range(count)]
+
+
+def test_a_thousand_awkward_problems_are_right():
+    report = check(range(1000))
+    print(report.line())
+    assert set(report.statuses) == {"optimal", "infeasible", "singular"}
+    assert [d for d in report.disagreements if d.distance > BOUNDARY] == []
+    assert report.worst < 1e-8
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_awkward_tensions_are_those_of_enumeration(seed):
+    A, w, low, high = awkward_problem(10_000 + seed, m=1 + seed % 6)
+    problem = TensionProblem(A, w, low, high)
+    solution = solve(problem)
+    expected = optimum_by_enumeration(A, w, low, high)
+    if solution.feasible and expected is not None:
+        # The reference takes wrench errors up to 1e-9, which a nearly singular matrix makes visible in the tensions.
+        asked = problem.tolerance(solution.tensions) / 1e-9
+        if np.linalg.norm(A @ expected - w) <= 1e-13 * asked:
+            size = max(np.abs(expected).max(), np.abs(low[np.isfinite(low)]).max(initial=0.0))
+            np.testing.assert_allclose(solution.tensions, expected, rtol=0, atol=1e-8 * size)
+    elif solution.feasible != (expected is not None):
+        assert certificate_is_close(problem, solution)
+
+
+def certificate_is_close(problem, solution):
+    """Whether the two may differ: w is within 1e-9 of the boundary, relative to what is asked."""
+    if solution.certificate is None:
+        return linear_program_status(problem.A, problem.w, problem.t_min, problem.t_max) == "optimal" or solution.detail
+    return solution.certificate.shortfall < 1e3 * problem.tolerance(solution.certificate.closest)
+
+
+@pytest.mark.parametrize("m", [1, 4, 6, 7, 8, 9, 12])
+def test_a_batch_says_what_single_calls_say(m):
+    problems = mixture(200, m)
+    A, w = stacked(problems)
+    batch = solve_batch(A, w, T_MIN, T_MAX)
+    for row, problem in enumerate(problems):
+        for method in ("active-set", "daqp"):
+            single = solve(problem, method)
+            assert single.status == batch.status[row]
+            if single.feasible:
+                np.testing.assert_allclose(batch.tensions[row], single.tensions, rtol=0, atol=1e-9 * T_MAX)
+                assert (batch.tensions[row] >= T_MIN).all()
+                assert (batch.tensions[row] <= T_MAX).all()
+                assert batch.residual[row] <= problem.tolerance(batch.tensions[row])
+                assert np.isnan(batch.direction[row]).all()
+            else:
+                d = batch.direction[row]
+                reach = np.maximum(d @ problem.A * T_MIN, d @ problem.A * T_MAX).sum()
+                assert d @ problem.w - reach > 0
+                assert batch.shortfall[row] <= single.certificate.shortfall * (1 + 1e-9)
+                assert single.certificate.verify(problem)
+                assert np.isnan(batch.tensions[row]).all()
+    assert sum(batch.count().values()) == 200
+    assert batch.solution(1).status == batch.status[1]
+
+
+def test_the_zoo_in_batches_of_one():
+    for name, (problem, status) in ZOO.items():
+        given = (problem.A, problem.w, problem.t_min, problem.t_max, problem.t_ref, problem.weights, problem.length)
+        assert solve_batch(*given).status == status, name
+
+
+def test_mixed_ranks_wishes_and_weights_in_one_batch():
+    rng = np.random.default_rng(4)
+    A = np.array([geometric_matrix(rng, 8) for _ in range(90)])
+    A[::3, 3:] = 0.0
+    A[1::3, :, 1] = A[1::3, :, 0]
+    w = np.einsum("rij,rj->ri", A, rng.uniform(5, 40, (90, 8)))
+    wish, weights = rng.uniform(0, 30, (90, 8)), 10.0 ** rng.uniform(-2, 2, (90, 8))
+    batch = solve_batch(A, w, T_MIN, T_MAX, wish, weights)
+    assert batch.feasible.all()
+    for row in range(90):
+        expected = solve(TensionProblem(A[row], w[row], T_MIN, T_MAX, wish[row], weights[row]), "daqp").tensions
+        np.testing.assert_allclose(batch.tensions[row], expected, rtol=0, atol=1e-8 * T_MAX)
+
+
+@pytest.mark.parametrize("m", [5, 8, 11])
+def test_threads_change_no_bit(m):
+    A, w = stacked(mixture(333, m))
+    one, two = solve_batch(A, w, T_MIN, T_MAX, threads=1), solve_batch(A, w, T_MIN, T_MAX, threads=2)
+    for name in ("tensions", "code", "residual", "direction", "shortfall", "support"):
+        assert getattr(one, name).tobytes() == getattr(two, name).tobytes(), name
+
+
+def test_leading_dimensions_broadcast():
+    rng = np.random.default_rng(1)
+    A = geometric_matrix(rng, 8)
+    w = rng.uniform(5, 40, (3, 4, 8)) @ A.T
+    high = np.array([60.0, 100.0, 1e3, np.inf])[:, None] * np.ones(8)
+    shared = solve_batch(A, w, T_MIN, high)
+    own = solve_batch(np.broadcast_to(A, (3, 4, 6, 8)), w, np.full((4, 8), T_MIN), high, length=np.ones((3, 1)))
+    assert shared.tensions.shape == (3, 4, 8)
+    assert shared.feasible.shape == shared.status.shape == shared.residual.shape == (3, 4)
+    assert shared.direction.shape == (3, 4, 6)
+    assert shared.tensions.tobytes() == own.tensions.tobytes()
+    single = solve_batch(A, w[1, 2], T_MIN, 60)
+    assert single.tensions.shape == (8,)
+    assert single.feasible.shape == ()
+    empty = solve_batch(A, np.empty((0, 6)), T_MIN, 60)
+    assert empty.tensions.shape == (0, 8)
+
+
+def test_bad_rows_are_flagged_and_the_rest_solved():
+    A, w = stacked(mixture(20, 8))
+    low, high, weights, wish = np.full((20, 8), T_MIN), np.full((20, 8), T_MAX), np.ones((20, 8)), np.zeros((20, 8))
+    good = solve_batch(A, w, low, high, wish, weights)
+    A[1, 0, 0] = w[3, 2] = low[5, 1] = high[7, 0] = wish[8, 3] = weights[9, 4] = np.nan
+    A[10, 2, 2] = np.inf
+    low[11, 3] = 61.0
+    weights[12, 0], weights[13, 7], low[14, 0], high[15, 1] = -1.0, 0.0, np.inf, -np.inf
+    w[16, 0] = 1e60
+    bad = [1, 3, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]
+    batch = solve_batch(A, w, low, high, wish, weights)
+    assert (batch.status[bad] == Status.INVALID).all()
+    assert np.isnan(batch.tensions[bad]).all()
+    rest = np.setdiff1d(np.arange(20), bad)
+    assert (batch.code[rest] == good.code[rest]).all()
+    np.testing.assert_array_equal(batch.tensions[rest], good.tensions[rest])
+    with pytest.raises(InputError, match="A: is nan at index 0, 0"):
+        batch.solution(1)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"A": np.ones(6)}, r"A: has shape \(6,\); accepted: \(\.\.\., n, m\)"),
+        ({"A": np.ones((2, 6, 8)) + 1j}, r"A: has shape \(2, 6, 8\) and type complex128"),
+        ({"A": [[1.0, 2.0], [3.0]]}, "A: is no array"),
+        ({"w": np.ones((2, 5))}, r"w: has shape \(2, 5\); accepted: \(\.\.\., 6\)"),
+        (
+            {"w": np.ones((3, 6))},
+            r"w: has leading dimensions \(3,\); accepted: what broadcasts with \(2,\), those before it",
+        ),
+        ({"t_min": np.ones(6)}, r"t_min: has shape \(6,\); accepted: \(\.\.\., 8\)"),
+        ({"t_max": None}, r"t_max: has shape \(\) and type object"),
+        ({"threads": 0}, "threads: is 0; accepted: 1 and more"),
+    ],
+)
+def test_wrong_arguments_are_told(change, message):
+    given = {"A": np.ones((2, 6, 8)), "w": np.ones((2, 6)), "t_min": 0.0, "t_max": 1.0} | change
+    with pytest.raises(InputError, match=message):
+        solve_batch(**given)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_never_nan_never_outside_and_every_certificate_verifies(seed):
+    problem = TensionProblem(*awkward_problem(seed))
+    solution = solve(problem)
+    if solution.feasible:
+        assert np.isfinite(solution.tensions).all()
+        assert solution.bound_violation == 0.0
+        assert solution.residual <= problem.tolerance(solution.tensions)
+    else:
+        assert solution.status in (Status.INFEASIBLE, Status.SINGULAR)
+        assert solution.certificate.verify(problem)
+
+
+def test_a_process_that_solves_little_loads_no_numba():
+    code = (
+        "import sys; from towline.solvers import TensionProblem, solve;"
+        "print(solve(TensionProblem([[1, -1]], [3], 1, 60)).tensions, 'numba' in sys.modules)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert told.split() == ["[4.", "1.]", "False"]
