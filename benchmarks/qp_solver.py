@@ -1,7 +1,7 @@
 """towline as a solver of the qpsolvers package, so that qpbenchmark can run it among the others.
 
-qpsolvers has no hook for solvers of other packages: `register` writes into its tables. A bounded QP with a diagonal cost
-and equations is a tension problem,
+qpsolvers has no hook for solvers of other packages: `register` writes into its tables. A bounded QP with a diagonal
+cost and equations is a tension problem,
 
     min 1/2 x' P x + q' x   s.t.  A x = b,  lb <= x <= ub      (P diagonal: weights P_ii, t_ref = -q_i / P_ii)
 
@@ -153,7 +153,7 @@ def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upp
 
     found: list[tuple[float, Array, Array]] = []
     for cut in _CUTS:
-        y = np.linalg.lstsq(A[:, inside].T, -gradient[inside], rcond=cut)[0]
+        y = np.asarray(np.linalg.lstsq(A[:, inside].T, -gradient[inside], rcond=cut)[0], dtype=np.float64)
         z = signed(-(gradient + y @ A))
         found.append((error(y, z), y, z))
         if found[-1][0] <= _GOOD:
@@ -182,7 +182,7 @@ def as_qp(problem: TensionProblem) -> dict[str, Any]:
     if unit == 0.0:
         raise InputError("problem: has no finite limit other than 0; accepted: limits that give a unit")
     rows = np.flatnonzero(problem.scaled_A.any(axis=1) | (problem.scaled_w != 0.0))
-    relative = problem.weights / problem.weights.max()
+    relative = problem.weights / problem.weights.min()  # a gradient error is then no more than such a tension error
     return {
         "P": np.diag(relative),
         "q": -relative * problem.t_ref / unit,

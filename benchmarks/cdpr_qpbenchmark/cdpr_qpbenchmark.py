@@ -29,6 +29,8 @@ if find_spec("towline") is not None:
 class CdprQpbenchmark(qpbenchmark.ParquetTestSet):
     """Every QP of `data/cdpr.parquet`, in the order of the names."""
 
+    data = DATA
+
     @property
     def title(self) -> str:
         """Title of the report."""
@@ -48,7 +50,7 @@ class CdprQpbenchmark(qpbenchmark.ParquetTestSet):
         return False
 
     def __init__(self) -> None:
-        super().__init__(DATA)
+        super().__init__(self.data)
 
     def __iter__(self) -> Iterator[qpbenchmark.Problem]:
         """Yield the problems in the order of their names, which no file system changes."""
