@@ -162,8 +162,10 @@ def test_bench_prints_what_the_design_says(bench):
 
 
 def test_towline_is_right_in_the_bench(bench):
+    """Those that promise the optimum of the QP; a closed form may find none where there is one."""
+    exact = {f"towline {name}" for name in ("active-set", "qp", "min-norm", "solve_batch")}
     for row in bench[1]["rows"]:
-        if row["contender"].startswith("towline"):
+        if row["contender"] in exact:
             assert row["failures"] == 0, row
             assert not row["detail"], row
 
