@@ -150,6 +150,9 @@ class _Runner:
         """Solve every problem once; turn 0 is the one whose answers are kept and whose times are not."""
         try:
             call = self.contender.prepare(self.task)
+            if number == 0:
+                # Imports and compilation belong to no problem, and are no reason to be out.
+                call() if self.contender.batch else call(0)
             times, answers = self._batch(call) if self.contender.batch else self._singles(call)
         except Exception as error:  # a contender that breaks is a result, whatever it raises
             self.detail = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
@@ -159,12 +162,14 @@ class _Runner:
         if times:
             self.blocks[number] = times
 
-    def _batch(self, call: Callable[[], list[Array | None]]) -> tuple[list[float], list[Array | None]]:
+    def _batch(self, call: Callable[[], tuple[Array, NDArray[np.bool_]]]) -> tuple[list[float], list[Array | None]]:
         start = time.perf_counter_ns()
-        answers = call()
+        tensions, found = call()
         elapsed = time.perf_counter_ns() - start
         self._account(elapsed)
-        return [elapsed / 1e3 / len(answers)], answers
+        count = len(self.task.problems)
+        answers = [x if ok else None for x, ok in zip(tensions[:count], found[:count], strict=True)]
+        return [elapsed / 1e3 / len(tensions)], answers
 
     def _singles(self, call: Callable[[int], Array | None]) -> tuple[list[float], list[Array | None]]:
         times, answers = [], []

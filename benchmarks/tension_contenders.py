@@ -25,10 +25,11 @@ __all__ = ["REFERENCE", "Contender", "contenders"]
 
 Array = NDArray[np.float64]
 Single = Callable[[int], Array | None]
-Batch = Callable[[], list[Array | None]]
+Batch = Callable[[], tuple[Array, NDArray[np.bool_]]]
 
 REFERENCE = "daqp.solve"
 EPS = 1e-9
+BATCH = 10_000  # Problems of a batch, at least: the task's, over and over.
 
 _EQUALITY = 5  # DAQP's constraint type: always active
 
@@ -58,7 +59,7 @@ class Contender(NamedTuple):
         What it was asked for.
     prepare :
         From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, to a
-        function without arguments that returns a list of them.
+        function without arguments that returns x of all, shape (batch, variables), and which of them are answers.
     batch :
         True if it takes all problems at once.
     same_aim :
@@ -134,15 +135,20 @@ def _towline(method: str) -> Callable[[Task], Single]:
 def _towline_batch(task: Task) -> Batch:
     batch: Any = getattr(solvers, "solve_batch")  # noqa: B009
     A, w, t_min, t_max, weights = (
-        np.array([getattr(problem, name) for problem in task.problems])
+        _over_and_over(np.array([getattr(problem, name) for problem in task.problems]))
         for name in ("A", "w", "t_min", "t_max", "weights")
     )
 
-    def run() -> list[Array | None]:
+    def run() -> tuple[Array, NDArray[np.bool_]]:
         answer = batch(A, w, t_min, t_max, weights=weights, threads=1)
-        return [x if ok else None for x, ok in zip(answer.tensions, answer.feasible, strict=True)]
+        return answer.tensions, answer.feasible
 
     return run
+
+
+def _over_and_over(rows: Array) -> Array:
+    """Repeat the rows of an array until there are enough for a batch."""
+    return np.tile(rows, (-(-BATCH // len(rows)),) + (1,) * (rows.ndim - 1))
 
 
 def _daqp_arguments(task: Task) -> list[tuple[Array, ...]]:
@@ -398,13 +404,14 @@ def _moreau(task: Task) -> Single:
 def _moreau_batch(task: Task) -> Batch:
     import moreau
 
-    solver, P, A, q, b = _moreau_solver(task, len(task.qps))
+    size = len(_over_and_over(np.empty((len(task.qps), 0))))
+    solver, *values = _moreau_solver(task, size)
+    P, A, q, b = (_over_and_over(value) for value in values)
 
-    def run() -> list[Array | None]:
+    def run() -> tuple[Array, NDArray[np.bool_]]:
         solver.setup(P, A)
         answer = solver.solve(q, b)
-        solved = [status == moreau.SolverStatus.Solved for status in solver.info.status]
-        return [x if ok else None for x, ok in zip(answer.x, solved, strict=True)]
+        return answer.x, np.array([status == moreau.SolverStatus.Solved for status in solver.info.status])
 
     return run
 
