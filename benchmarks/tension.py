@@ -271,7 +271,7 @@ def markdown(report: Report) -> str:
         "# Tension distribution in a hot loop",
         "",
         f"Measured on {report.machine}.",
-        f"{report.count} random problems a task, {report.repeats} turns after one that is not counted, one thread.",
+        f"{report.count} random problems a task, {report.repeats} turns after one that is not counted.",
         f"Ratio: to `{REFERENCE}` in the same turn. Error: largest of a tension, in units of the largest tension; - if "
         "there is nothing to compare.",
         f"Failures: no answer, or off by more than {FAILED:g}; for infeasible problems, an answer.",
