@@ -33,5 +33,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[dev,mujoco]"
+	$(INSTALL) ".[bench,dev,mujoco]"
 	touch $@

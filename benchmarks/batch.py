@@ -11,20 +11,18 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from importlib.metadata import version
-from pathlib import Path
 from statistics import median
 
 import numpy as np
 
 from ..models import Dynamics, load
 from ..models import batch as models_batch
+from .machine import machine
 
 ROBOT = "wang-flying"
 
@@ -49,15 +47,6 @@ def main() -> None:
     print(machine())
     report_start()
     report_evaluation(options.poses, options.runs)
-
-
-def machine() -> str:
-    """Processor, cores and versions, in one line."""
-    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
-    models = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
-    processor = models[0] if models else platform.processor()
-    versions = ", ".join(f"{name} {version(name)}" for name in ("casadi", "numpy", "numba"))
-    return f"{processor}, {os.cpu_count()} cores, {platform.system()}; Python {platform.python_version()}, {versions}"
 
 
 def report_start() -> None:

@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TowlineError
-from . import demo, export, import_, plan, robots, tension
+from . import bench, demo, export, import_, plan, robots, tension
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -26,6 +26,7 @@ app.command("tension")(tension.tension)
 app.command("plan")(plan.plan)
 app.add_typer(import_.app, name="import")
 app.command("export")(export.export)
+app.add_typer(bench.app, name="bench")
 
 
 def _print_version(asked: bool) -> None:

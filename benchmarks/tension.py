@@ -1,0 +1,312 @@
+"""Tension distribution in a hot loop: towline against the solvers that are installed, in one run.
+
+    towline bench tension [--count 100] [--repeats 5] [--m 6,7,8,12] [--out FOLDER] [--json]
+
+qpbenchmark calls each solver once per problem, cold; a controller calls it every millisecond. Here each contender
+solves the problems of a task one after the other, in blocks that take turns, so that a machine that heats up or slows
+down does so for all. A ratio is the median over the turns of a block's median to that of `daqp.solve` in the same turn.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..figures import style
+from ..solvers import TensionProblem
+from ..writing import check_writable, whole_file
+from .machine import machine
+from .tension_contenders import REFERENCE, Contender, contenders
+from .tension_tasks import KINDS, Task, make_task
+
+__all__ = ["FAILED", "Report", "Row", "run", "write"]
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+# Tensions, or their wrench, this far off are a failure, in units of the largest tension: 1000 times what was asked.
+FAILED = 1e-6
+SOLVERS = ("daqp", "osqp", "clarabel", "piqp", "proxsuite", "quadprog", "highspy", "scs", "moreau")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One contender at one task.
+
+    Attributes
+    ----------
+    task, contender, tolerance :
+        Who, at what, and what accuracy it was asked for.
+    median_us, p99_us :
+        Time of a call [us]; for a batch, of a call divided by its problems: its p99 is one of calls, not of problems.
+    ratio :
+        To `daqp.solve`; above 1 is slower.
+    max_error :
+        Largest error of a tension among the answers that it gave, in units of the largest tension; None if the task is
+        infeasible, if it gave none or if it minimises something else.
+    failures :
+        Problems, of `problems`, that it got wrong: none, or tensions or a wrench off by more than `FAILED`, for a
+        feasible problem; tensions for an infeasible one.
+    problems :
+        How many it was given; fewer than asked if it ran out of time.
+    detail :
+        What went wrong beyond that, else empty.
+    """
+
+    task: str
+    contender: str
+    tolerance: str
+    median_us: float
+    p99_us: float
+    ratio: float
+    max_error: float | None
+    failures: int
+    problems: int
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Rows, and what they were measured on and with."""
+
+    rows: list[Row]
+    machine: str
+    count: int
+    repeats: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain lists and numbers, ready for JSON."""
+        rows = [asdict(row) for row in self.rows]
+        return {"rows": rows, "machine": self.machine, "count": self.count, "repeats": self.repeats}
+
+
+def run(
+    count: int = 100,
+    repeats: int = 5,
+    m: Sequence[int] = (6, 7, 8, 12),
+    limit: float = 5.0,
+    progress: Progress | None = None,
+) -> Report:
+    """Measure every contender at every task.
+
+    Parameters
+    ----------
+    count, repeats :
+        Problems of a task, and turns that each contender has at them after one that is not counted.
+    m :
+        Numbers of cables, each from 1 to 16.
+    limit :
+        Seconds that one contender may spend on one task. It is looked at between calls: whoever passes it is out, with
+        the times that it has.
+    progress :
+        Called with the task's name and how many of how many tasks are done.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    """
+    for name, value, least in (("count", count, 1), ("repeats", repeats, 1)):
+        if value < least:
+            raise InputError(f"{name}: is {value}; accepted: an integer from {least}")
+    if not m or not all(1 <= cables <= 16 for cables in m):
+        raise InputError(f"m: is {list(m)}; accepted: numbers of cables from 1 to 16")
+    if not limit > 0:
+        raise InputError(f"limit: is {limit:g}; accepted: a number > 0 [s]")
+    names = [(kind, cables) for cables in m for kind in KINDS]
+    rows: list[Row] = []
+    for done, (kind, cables) in enumerate(names):
+        if progress is not None:
+            progress(f"{kind}, m = {cables}", done, len(names))
+        rows += measure(make_task(kind, cables, count), contenders(), repeats, limit)
+    if progress is not None:
+        progress("done", len(names), len(names))
+    return Report(rows, machine((*SOLVERS, "qpsolvers", "numpy")), count, repeats)
+
+
+class _Runner:
+    """One contender at one task: its answers, its times, and whether it is still in."""
+
+    def __init__(self, contender: Contender, task: Task, limit: float) -> None:
+        self.contender, self.task, self.limit = contender, task, limit
+        self.blocks: dict[int, list[float]] = {}  # [us] by turn
+        self.answers: list[Array | None] = []
+        self.detail = ""
+        self.spent = 0.0
+
+    @property
+    def running(self) -> bool:
+        return not self.detail
+
+    def turn(self, number: int) -> None:
+        """Solve every problem once; turn 0 is the one whose answers are kept and whose times are not."""
+        try:
+            call = self.contender.prepare(self.task)
+            if number == 0:
+                # Imports and compilation belong to no problem, and are no reason to be out.
+                call() if self.contender.batch else call(0)
+            times, answers = self._batch(call) if self.contender.batch else self._singles(call)
+        except Exception as error:  # a contender that breaks is a result, whatever it raises
+            self.detail = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            return
+        if number == 0:
+            self.answers = answers
+        if times:
+            self.blocks[number] = times
+
+    def _batch(self, call: Callable[[], tuple[Array, NDArray[np.bool_]]]) -> tuple[list[float], list[Array | None]]:
+        start = time.perf_counter_ns()
+        tensions, found = call()
+        elapsed = time.perf_counter_ns() - start
+        self._account(elapsed)
+        count = len(self.task.problems)
+        answers = [x if ok else None for x, ok in zip(tensions[:count], found[:count], strict=True)]
+        return [elapsed / 1e3 / len(tensions)], answers
+
+    def _singles(self, call: Callable[[int], Array | None]) -> tuple[list[float], list[Array | None]]:
+        times, answers = [], []
+        for i in range(len(self.task.problems)):
+            start = time.perf_counter_ns()
+            answer = call(i)
+            elapsed = time.perf_counter_ns() - start
+            times.append(elapsed / 1e3)
+            answers.append(answer)
+            self._account(elapsed)
+            if not self.running:
+                break
+        return times, answers
+
+    def _account(self, nanoseconds: int) -> None:
+        self.spent += nanoseconds / 1e9
+        if self.spent > self.limit:
+            self.detail = f"out after {self.spent:.1f} s"
+
+    def counted(self) -> dict[int, list[float]]:
+        """Times [us] of the turns that count, by turn; of turn 0 if there is no other."""
+        return {turn: times for turn, times in self.blocks.items() if turn > 0} or self.blocks
+
+
+def measure(task: Task, who: Sequence[Contender], repeats: int, limit: float) -> list[Row]:
+    """Measure contenders at one task, in blocks that take turns; the reference is to be among them."""
+    runners = [_Runner(contender, task, limit) for contender in who]
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        for turn in range(repeats + 1):
+            # Nobody is always the one who runs after the same neighbour.
+            first = turn % len(runners)
+            for runner in runners[first:] + runners[:first]:
+                if runner.running:
+                    runner.turn(turn)
+            gc.collect()
+    finally:
+        if collecting:
+            gc.enable()
+    reference = next(runner for runner in runners if runner.contender.name == REFERENCE)
+    return [_row(runner, reference.counted()) for runner in runners]
+
+
+def _row(runner: _Runner, reference: dict[int, list[float]]) -> Row:
+    blocks = runner.counted()
+    times = [microseconds for block in blocks.values() for microseconds in block]
+    common = np.median(np.concatenate(list(reference.values()))) if reference else np.nan
+    ratios = [np.median(block) / np.median(reference.get(turn, [common])) for turn, block in blocks.items()]
+    error, failures = _judge(runner.contender, runner.task, runner.answers)
+    return Row(
+        task=runner.task.name,
+        contender=runner.contender.name,
+        tolerance=runner.contender.tolerance,
+        median_us=float(np.median(times)) if times else float("nan"),
+        p99_us=float(np.percentile(times, 99)) if times else float("nan"),
+        ratio=float(np.median(ratios)) if ratios else float("nan"),
+        max_error=error,
+        failures=failures,
+        problems=len(runner.answers),
+        detail=runner.detail,
+    )
+
+
+def _judge(contender: Contender, task: Task, answers: list[Array | None]) -> tuple[float | None, int]:
+    """Largest tension error, and how many answers are wrong."""
+    if task.optima is None:
+        return None, sum(answer is not None for answer in answers)
+    errors, failures = [], 0
+    for i, answer in enumerate(answers):
+        if answer is None or not np.isfinite(answer).all():
+            failures += 1
+        elif contender.same_aim:
+            errors.append(float(np.abs(answer - task.optima[i])[: task.m].max()))
+            failures += errors[-1] > FAILED
+        else:
+            failures += _violation(task.problems[i], answer) > FAILED
+    return max(errors, default=None), failures
+
+
+def _violation(problem: TensionProblem, x: Array) -> float:
+    """Largest error of the wrench or of a limit."""
+    return float(max(np.abs(problem.A @ x - problem.w).max(), (problem.t_min - x).max(), (x - problem.t_max).max()))
+
+
+def write(report: Report, folder: Path) -> list[Path]:
+    """Write `tension.md` and `tension.png` into a folder."""
+    text, picture = folder / "tension.md", folder / "tension.png"
+    for path in (text, picture):
+        check_writable(path)
+    with whole_file(text) as temporary:
+        temporary.write_text(markdown(report), encoding="utf-8")
+    return [text, _picture(report, picture)]
+
+
+def markdown(report: Report) -> str:
+    """The report as a page: one table for each task, the fastest first."""
+    lines = [
+        "# Tension distribution in a hot loop",
+        "",
+        f"Measured on {report.machine}.",
+        f"{report.count} random problems a task, {report.repeats} turns after one that is not counted.",
+        f"Ratio: to `{REFERENCE}` in the same turn. Error: largest of a tension, in units of the largest tension; - if "
+        "there is nothing to compare.",
+        f"Failures: no answer, or off by more than {FAILED:g}; for infeasible problems, an answer.",
+    ]
+    for task in dict.fromkeys(row.task for row in report.rows):
+        lines += ["", f"## {task}", "", "| contender | asked for | median us | p99 us | ratio | error | failures |"]
+        lines += ["|---|---|---:|---:|---:|---:|---:|"]
+        rows = [row for row in report.rows if row.task == task]
+        for row in sorted(rows, key=lambda row: (np.isnan(row.ratio), row.ratio)):
+            error = "-" if row.max_error is None else f"{row.max_error:.0e}"
+            name = f"{row.contender} ({row.detail})" if row.detail else row.contender
+            lines.append(
+                f"| {name} | {row.tolerance} | {row.median_us:.1f} | {row.p99_us:.1f} | {row.ratio:.2f} | {error} | "
+                f"{row.failures} of {row.problems} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _picture(report: Report, path: Path) -> Path:
+    """Ratios of every contender, one mark for each kind of task, at the number of cables nearest to eight."""
+    sizes = {int(row.task.split("= ")[1]) for row in report.rows}
+    m = min(sizes, key=lambda size: abs(size - 8))
+    names = list(dict.fromkeys(row.contender for row in report.rows))[::-1]
+    canvas = style.figure(6.0, 1.0 + 0.22 * len(names))
+    ax = style.axes(canvas, f"time, as a ratio to {REFERENCE}", "")
+    for index, kind in enumerate(KINDS):
+        here = {row.contender: row for row in report.rows if row.task == f"{kind}, m = {m}"}
+        shown = [name for name in names if name in here and np.isfinite(here[name].ratio)]
+        ratios = [here[name].ratio for name in shown]
+        failed = ["none" if here[name].failures else style.colour(index) for name in shown]
+        y = [names.index(name) for name in shown]
+        ax.scatter(ratios, y, marker="os^D"[index], s=22, c=failed, edgecolors=style.colour(index), label=kind)
+    ax.axvline(1.0, **style.LIMIT)
+    ax.set_xscale("log")
+    ax.set_yticks(range(len(names)), names)
+    ax.set_title(f"m = {m}; hollow: some answers wrong", fontsize="medium")
+    ax.legend(fontsize="small")
+    return style.save(canvas, path)

@@ -1,0 +1,439 @@
+"""Who takes part in the hot-loop benchmark: each a name, a tolerance in words, and a way to prepare for a task.
+
+What is prepared is not timed: arrays in the layout that a solver wants, and for solvers that keep their memory between
+problems (native, reuse) one instance. What is timed begins with such arrays, a new wrench matrix included, and ends
+with the tensions. All are asked for 1e-9 absolute, nothing relative, and are bounded in iterations, since some loop for
+ever on infeasible problems.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import solvers
+from ..solvers import TensionProblem, methods, solve
+from .tension_tasks import Task
+
+__all__ = ["REFERENCE", "Contender", "contenders"]
+
+Array = NDArray[np.float64]
+Single = Callable[[int], Array | None]
+Batch = Callable[[], tuple[Array, NDArray[np.bool_]]]
+
+REFERENCE = "daqp.solve"
+EPS = 1e-9
+BATCH = 10_000  # Problems of a batch, at least: the task's, over and over.
+
+_EQUALITY = 5  # DAQP's constraint type: always active
+
+# Methods that end at the least norm, as the QP does; the others are right to answer something else.
+_LEAST_NORM = {"active-set", "qp", "min-norm", "dykstra"}
+
+_QPSOLVERS: dict[str, dict[str, Any]] = {
+    "clarabel": {"tol_gap_abs": EPS, "tol_gap_rel": 0.0, "tol_feas": EPS},
+    "daqp": {"primal_tol": EPS, "dual_tol": EPS},
+    "highs": {"primal_feasibility_tolerance": EPS, "dual_feasibility_tolerance": EPS, "time_limit": 0.1},
+    "osqp": {"eps_abs": EPS, "eps_rel": 0.0, "max_iter": 4000},
+    "piqp": {"eps_abs": EPS, "eps_rel": 0.0, "max_iter": 250},
+    "proxqp": {"eps_abs": EPS, "eps_rel": 0.0, "max_iter": 100},
+    "quadprog": {},
+    "scs": {"eps_abs": EPS, "eps_rel": 0.0, "max_iters": 10_000},
+}
+
+
+class Contender(NamedTuple):
+    """A solver as it takes part.
+
+    Attributes
+    ----------
+    name :
+        For tables.
+    tolerance :
+        What it was asked for.
+    prepare :
+        From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, to a
+        function without arguments that returns x of all, shape (batch, variables), and which of them are answers.
+    batch :
+        True if it takes all problems at once.
+    same_aim :
+        False if it minimises something else than the QP, so that its tensions may differ.
+    """
+
+    name: str
+    tolerance: str
+    prepare: Callable[[Task], Any]
+    batch: bool = False
+    same_aim: bool = True
+
+
+def contenders() -> list[Contender]:
+    """Everyone who is installed, the reference first."""
+    asked = f"{EPS:g} absolute"
+    found = [Contender(REFERENCE, asked, _daqp)]
+    for name in methods():
+        found.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
+    if getattr(solvers, "solve_batch", None) is not None:
+        found.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
+    native = {
+        "daqp": ("daqp Model, reuse", _daqp_model),
+        "osqp": ("osqp, reuse", _osqp),
+        "clarabel": ("clarabel, reuse", _clarabel),
+        "piqp": ("piqp, reuse", _piqp),
+        "proxsuite": ("proxqp, reuse", _proxqp),
+        "quadprog": ("quadprog, native", _quadprog),
+        "highspy": ("highs, reuse", _highs),
+        "scs": ("scs, native", _scs),
+        "moreau": ("moreau, reuse", _moreau),
+    }
+    for module, (name, prepare) in native.items():
+        if find_spec(module) is not None:
+            found.append(Contender(name, "exact" if module == "quadprog" else asked, prepare))
+    if find_spec("moreau") is not None:
+        found.append(Contender("moreau batch", asked, _moreau_batch, batch=True))
+    import qpsolvers
+
+    for name in sorted(set(_QPSOLVERS) & set(qpsolvers.available_solvers)):
+        tolerance = "exact" if name == "quadprog" else asked
+        found.append(Contender(f"qpsolvers {name}", tolerance, _through_qpsolvers(name)))
+    return found
+
+
+def _stacked(qp: dict[str, Any]) -> tuple[Array, Array, Array]:
+    """Rows, lower and upper limits of lower <= C x <= upper: the equations, then x itself."""
+    n = qp["q"].size
+    return np.vstack([qp["A"], np.eye(n)]), np.r_[qp["b"], qp["lb"]], np.r_[qp["b"], qp["ub"]]
+
+
+def _one_sided(qp: dict[str, Any]) -> tuple[Array, Array]:
+    """C and d of C x <= d, the equations first, then the finite limits."""
+    n = qp["q"].size
+    up, low = np.isfinite(qp["ub"]), np.isfinite(qp["lb"])
+    return np.vstack([qp["A"], np.eye(n)[up], -np.eye(n)[low]]), np.r_[qp["b"], qp["ub"][up], -qp["lb"][low]]
+
+
+def _towline(method: str) -> Callable[[Task], Single]:
+    def prepare(task: Task) -> Single:
+        # Problems remember what was computed from them: each run gets new ones, as in a control loop.
+        problems = [TensionProblem(p.A, p.w, p.t_min, p.t_max, p.t_ref, p.weights, p.length) for p in task.problems]
+
+        def run(i: int) -> Array | None:
+            answer = solve(problems[i], method=method)
+            return answer.tensions if answer.feasible else None
+
+        return run
+
+    return prepare
+
+
+def _towline_batch(task: Task) -> Batch:
+    batch: Any = getattr(solvers, "solve_batch")  # noqa: B009
+    A, w, t_min, t_max, weights = (
+        _over_and_over(np.array([getattr(problem, name) for problem in task.problems]))
+        for name in ("A", "w", "t_min", "t_max", "weights")
+    )
+
+    def run() -> tuple[Array, NDArray[np.bool_]]:
+        answer = batch(A, w, t_min, t_max, weights=weights, threads=1)
+        return answer.tensions, answer.feasible
+
+    return run
+
+
+def _over_and_over(rows: Array) -> Array:
+    """Repeat the rows of an array until there are enough for a batch."""
+    return np.tile(rows, (-(-BATCH // len(rows)),) + (1,) * (rows.ndim - 1))
+
+
+def _daqp_arguments(task: Task) -> list[tuple[Array, ...]]:
+    arguments = []
+    for qp in task.qps:
+        sense = np.zeros(qp["q"].size + qp["b"].size, dtype=np.int32)
+        sense[qp["q"].size :] = _EQUALITY
+        upper, lower = np.r_[qp["ub"], qp["b"]], np.r_[qp["lb"], qp["b"]]
+        arguments.append((qp["P"], qp["q"], np.ascontiguousarray(qp["A"]), upper, lower, sense))
+    return arguments
+
+
+def _daqp(task: Task) -> Single:
+    import daqp
+
+    arguments = _daqp_arguments(task)
+
+    def run(i: int) -> Array | None:
+        x, _, flag, _ = daqp.solve(*arguments[i], primal_tol=EPS)
+        return x if flag > 0 else None
+
+    return run
+
+
+def _daqp_model(task: Task) -> Single:
+    import daqp
+
+    arguments = _daqp_arguments(task)
+    model = daqp.Model()
+    model.settings = {"primal_tol": EPS}
+    model.setup(*arguments[0])
+
+    def run(i: int) -> Array | None:
+        _, _, A, upper, lower, sense = arguments[i]
+        model.update(A=A, bupper=upper, blower=lower, sense=sense)
+        x, _, flag, _ = model.solve()
+        return x if flag > 0 else None
+
+    return run
+
+
+def _osqp(task: Task) -> Single:
+    import osqp
+    from scipy.sparse import csc_matrix
+
+    rows = [_stacked(qp) for qp in task.qps]
+    full = csc_matrix(np.vstack([np.ones_like(task.qps[0]["A"]), np.eye(rows[0][0].shape[1])]))  # pattern of all
+    places = full.nonzero()
+    order = np.lexsort((places[0], places[1]))
+    values = [C[places[0][order], places[1][order]] for C, _, _ in rows]
+    solver = osqp.OSQP()
+    first = csc_matrix((values[0], full.indices, full.indptr), shape=full.shape)
+    P = csc_matrix(task.qps[0]["P"])
+    settings = {"eps_abs": EPS, "eps_rel": 0.0, "max_iter": 4000, "verbose": False}
+    solver.setup(P, task.qps[0]["q"], first, rows[0][1], rows[0][2], **settings)
+
+    def run(i: int) -> Array | None:
+        solver.update(Ax=values[i], l=rows[i][1], u=rows[i][2])
+        answer = solver.solve(raise_error=False)
+        return answer.x if answer.info.status == "solved" else None
+
+    return run
+
+
+def _clarabel(task: Task) -> Single:
+    from scipy.sparse import csc_matrix
+
+    clarabel: Any = import_module("clarabel")  # a compiled module without types
+
+    stacked = [_one_sided(qp) for qp in task.qps]
+    equations, n = task.qps[0]["b"].size, task.qps[0]["q"].size
+    pattern = csc_matrix(np.vstack([np.ones((equations, n)), stacked[0][0][equations:]]))
+    places = pattern.nonzero()
+    order = np.lexsort((places[0], places[1]))
+    values = [C[places[0][order], places[1][order]] for C, _ in stacked]
+    cones = [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(stacked[0][1].size - equations)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = settings.presolve_enable = False  # without presolve the data can be changed
+    settings.tol_gap_abs = settings.tol_feas = EPS
+    settings.tol_gap_rel = 0.0
+    first = csc_matrix((values[0], pattern.indices, pattern.indptr), shape=pattern.shape)
+    P = csc_matrix(task.qps[0]["P"])
+    solver = clarabel.DefaultSolver(P, task.qps[0]["q"], first, stacked[0][1], cones, settings)
+
+    def run(i: int) -> Array | None:
+        solver.update(A=values[i], b=stacked[i][1])
+        answer = solver.solve()
+        return np.array(answer.x) if answer.status == clarabel.SolverStatus.Solved else None
+
+    return run
+
+
+def _piqp(task: Task) -> Single:
+    import piqp
+
+    first = task.qps[0]
+    matrices = [np.asfortranarray(qp["A"]) for qp in task.qps]
+    solver = piqp.DenseSolver()
+    solver.settings.eps_abs, solver.settings.eps_rel = EPS, 0.0
+    solver.settings.verbose = False
+    P = np.asfortranarray(first["P"])
+    solver.setup(P, first["q"], matrices[0], first["b"], x_l=first["lb"], x_u=first["ub"])
+
+    def run(i: int) -> Array | None:
+        qp = task.qps[i]
+        solver.update(A=matrices[i], b=qp["b"], x_l=qp["lb"], x_u=qp["ub"])
+        return solver.result.x.copy() if solver.solve() == piqp.PIQP_SOLVED else None
+
+    return run
+
+
+def _proxqp(task: Task) -> Single:
+    from proxsuite import proxqp
+
+    first = task.qps[0]
+    n, equations = first["q"].size, first["b"].size
+    limits = [(np.maximum(qp["lb"], -1e20), np.minimum(qp["ub"], 1e20)) for qp in task.qps]
+    solver = proxqp.dense.QP(n, equations, 0, True)
+    solver.settings.eps_abs, solver.settings.eps_rel = EPS, 0.0
+    solver.settings.max_iter = solver.settings.max_iter_in = 100
+    # Warm started, or with the preconditioner of another matrix, it is faster and wrong for some of 100 problems.
+    solver.settings.initial_guess = proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
+    low, high = limits[0]
+    solver.init(first["P"], first["q"], first["A"], first["b"], None, None, None, low, high)
+
+    def run(i: int) -> Array | None:
+        qp = task.qps[i]
+        low, high = limits[i]
+        solver.update(A=qp["A"], b=qp["b"], l_box=low, u_box=high, update_preconditioner=True)
+        solver.solve()
+        solved = solver.results.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED
+        return solver.results.x.copy() if solved else None
+
+    return run
+
+
+def _quadprog(task: Task) -> Single:
+    import quadprog
+
+    stacked = [_one_sided(qp) for qp in task.qps]
+    arguments = [
+        (qp["P"], -qp["q"], np.ascontiguousarray(-C.T), -d) for qp, (C, d) in zip(task.qps, stacked, strict=True)
+    ]
+    equations = task.qps[0]["b"].size
+
+    def run(i: int) -> Array | None:
+        try:
+            return quadprog.solve_qp(*arguments[i], equations)[0]
+        except ValueError:  # its way to say that the constraints are inconsistent
+            return None
+
+    return run
+
+
+def _highs(task: Task) -> Single:
+    import highspy
+
+    rows = task.qps[0]["b"].size
+    n = task.qps[0]["q"].size
+    models = []
+    for qp in task.qps:
+        model = highspy.HighsModel()
+        lp = model.lp_
+        lp.num_col_, lp.num_row_ = n, rows
+        lp.col_cost_, lp.col_lower_, lp.col_upper_ = qp["q"], qp["lb"], qp["ub"]
+        lp.row_lower_ = lp.row_upper_ = qp["b"]
+        lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+        lp.a_matrix_.start_ = np.arange(n + 1, dtype=np.int32) * rows
+        lp.a_matrix_.index_ = np.tile(np.arange(rows, dtype=np.int32), n)
+        lp.a_matrix_.value_ = qp["A"].T.ravel()
+        model.hessian_.dim_ = n
+        model.hessian_.start_ = np.arange(n + 1, dtype=np.int32)
+        model.hessian_.index_ = np.arange(n, dtype=np.int32)
+        model.hessian_.value_ = np.diagonal(qp["P"]).copy()
+        models.append(model)
+    solver = highspy.Highs()
+    solver.setOptionValue("output_flag", False)
+    for name, value in _QPSOLVERS["highs"].items():
+        solver.setOptionValue(name, value)
+
+    def run(i: int) -> Array | None:
+        solver.passModel(models[i])
+        solver.run()
+        optimal = solver.getModelStatus() == highspy.HighsModelStatus.kOptimal
+        return np.array(solver.getSolution().col_value) if optimal else None
+
+    return run
+
+
+def _scs(task: Task) -> Single:
+    import scs
+    from scipy.sparse import csc_matrix
+
+    equations = task.qps[0]["b"].size
+    data = []
+    for qp in task.qps:
+        C, d = _one_sided(qp)
+        data.append({"P": csc_matrix(qp["P"]), "c": qp["q"], "A": csc_matrix(C), "b": d})
+    cone = {"z": equations, "l": data[0]["b"].size - equations}
+    settings = {"eps_abs": EPS, "eps_rel": 0.0, "max_iters": 10_000, "verbose": False}
+
+    def run(i: int) -> Array | None:
+        answer = scs.SCS(data[i], cone, **settings).solve()  # a new A cannot be given to an instance
+        return answer["x"] if answer["info"]["status_val"] == 1 else None
+
+    return run
+
+
+def _moreau_solver(task: Task, size: int) -> tuple[Any, Array, Array, Array, Array]:
+    """A compiled solver for `size` problems at once, and the values of P, A, q and b of all."""
+    import moreau
+
+    stacked = [_one_sided(qp) for qp in task.qps]
+    equations, n = task.qps[0]["b"].size, task.qps[0]["q"].size
+    pattern = stacked[0][0] != 0.0
+    pattern[:equations] = True
+    places = np.nonzero(pattern)
+    offsets = np.r_[0, np.cumsum(pattern.sum(axis=1))]
+    settings = moreau.Settings(
+        device="cpu",
+        solver="active_set",
+        batch_size=size,
+        active_set_settings=moreau.ActiveSetSettings(primal_tol=EPS),
+    )
+    solver = moreau.CompiledSolver(
+        n=n,
+        m=pattern.shape[0],
+        P_row_offsets=np.arange(n + 1),
+        P_col_indices=np.arange(n),
+        A_row_offsets=offsets,
+        A_col_indices=places[1],
+        cones=moreau.Cones(num_zero_cones=equations, num_nonneg_cones=pattern.shape[0] - equations),
+        settings=settings,
+    )
+    P = np.array([np.diagonal(qp["P"]) for qp in task.qps])
+    A = np.array([C[places] for C, _ in stacked])
+    return solver, P, A, np.array([qp["q"] for qp in task.qps]), np.array([d for _, d in stacked])
+
+
+def _moreau(task: Task) -> Single:
+    import moreau
+
+    solver, P, A, q, b = _moreau_solver(task, 1)
+
+    def run(i: int) -> Array | None:
+        solver.setup(P[i : i + 1], A[i : i + 1])
+        answer = solver.solve(q[i : i + 1], b[i : i + 1])
+        return answer.x[0] if solver.info.status[0] == moreau.SolverStatus.Solved else None
+
+    return run
+
+
+def _moreau_batch(task: Task) -> Batch:
+    import moreau
+
+    size = len(_over_and_over(np.empty((len(task.qps), 0))))
+    solver, *values = _moreau_solver(task, size)
+    P, A, q, b = (_over_and_over(value) for value in values)
+
+    def run() -> tuple[Array, NDArray[np.bool_]]:
+        solver.setup(P, A)
+        answer = solver.solve(q, b)
+        return answer.x, np.array([status == moreau.SolverStatus.Solved for status in solver.info.status])
+
+    return run
+
+
+def _through_qpsolvers(name: str) -> Callable[[Task], Single]:
+    def prepare(task: Task) -> Single:
+        import qpsolvers
+        from scipy.sparse import csc_matrix
+
+        dense = name in qpsolvers.dense_solvers
+        problems = []
+        for qp in task.qps:
+            P, A = (qp["P"], qp["A"]) if dense else (csc_matrix(qp["P"]), csc_matrix(qp["A"]))
+            problems.append(qpsolvers.Problem(P, qp["q"], A=A, b=qp["b"], lb=qp["lb"], ub=qp["ub"]))
+        settings = _QPSOLVERS[name]
+
+        def run(i: int) -> Array | None:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                answer = qpsolvers.solve_problem(problems[i], solver=name, **settings)
+            return answer.x if answer.found else None
+
+        return run
+
+    return prepare

@@ -1,0 +1,56 @@
+"""`towline bench`: towline against its peers, here and now."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import JsonOption, print_json
+
+app = typer.Typer(help="Measure towline against its peers on this machine.", no_args_is_help=True)
+
+
+@app.callback()
+def _bench() -> None:
+    """Measure towline against its peers on this machine."""
+
+
+@app.command("tension")
+def tension(
+    count: Annotated[int, typer.Option(help="Random problems of each task.")] = 100,
+    repeats: Annotated[int, typer.Option(help="Turns of each contender at each task.")] = 5,
+    m: Annotated[str, typer.Option("--m", help="Numbers of cables.")] = "6,7,8,12",
+    limit: Annotated[float, typer.Option(help="Seconds that one contender may spend on one task.")] = 5.0,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for tension.md and tension.png.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Time every solver that is installed at tension distribution in a hot loop, with its accuracy and failures."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from ..benchmarks import tension as benchmark
+    from ..errors import InputError
+    from ..writing import check_writable
+
+    try:
+        cables = [int(word) for word in m.replace(",", " ").split()]
+    except ValueError:
+        raise InputError(f"--m: {m!r} is not a list of integers; accepted: numbers of cables from 1 to 16") from None
+    if out is not None:
+        check_writable(out / "tension.md")
+    with Progress(console=Console(stderr=True)) as bar:
+        shown = bar.add_task("tension distribution", total=None)
+
+        def progress(task: str, done: int, total: int) -> None:
+            bar.update(shown, description=task, completed=done, total=total)
+
+        report = benchmark.run(count, repeats, cables, limit, progress)
+    written = [str(path) for path in benchmark.write(report, out)] if out is not None else []
+    if as_json:
+        print_json({**report.as_dict(), "files": written})
+    else:
+        typer.echo(benchmark.markdown(report), nl=False)
+        for name in written:
+            typer.echo(name)

@@ -1,0 +1,206 @@
+"""The benchmarks run, say what they promise, and their references and our answers are right."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from towline.benchmarks import tension
+from towline.benchmarks.qp_solver import multipliers, register, solve_problem
+from towline.benchmarks.tension_contenders import REFERENCE, Contender, contenders
+from towline.benchmarks.tension_tasks import KINDS, make_task
+from towline.errors import InputError
+from towline.solvers import certify
+
+from .references import optimum_by_enumeration
+
+FOLDER = Path(__file__).parent.parent / "benchmarks" / "cdpr_qpbenchmark"
+TOWLINE = Path(sys.executable).with_name("towline")
+
+
+def module(path):
+    """A file that is in no package, as a module."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    found = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def test_set():
+    return module(FOLDER / "cdpr_qpbenchmark.py").CdprQpbenchmark()
+
+
+def test_the_class_is_as_qpbenchmark_wants_it(test_set):
+    names = [problem.name for problem in test_set]
+    assert names == sorted(names)
+    assert {name.rstrip("0123456789") for name in names} == {"STATIC", "TRAJ", "SINGULAR", "DEGEN", "SOFT"}
+    assert "towline" in test_set.solvers
+    assert test_set.tolerances["high_accuracy"].primal == 1e-9
+    assert {tolerance.runtime for tolerance in test_set.tolerances.values()} == {0.01}
+    for problem in test_set:
+        limits = np.abs(np.r_[problem.lb, problem.ub])
+        assert limits[np.isfinite(limits)].max() == 1.0, problem.name
+    assert (FOLDER / "data" / "cdpr.parquet").stat().st_size < 150_000
+
+
+@pytest.mark.parametrize("accuracy", [1e-9, 1e-6])
+def test_towline_solves_every_problem_at_its_accuracy(test_set, accuracy):
+    """By qpsolvers' own residuals, on all of them: the near-singular ones are there to be failed."""
+    missed = [p.name for p in test_set if not solve_problem(p, eps_abs=accuracy).is_optimal(accuracy)]
+    assert missed == []
+
+
+def test_qpbenchmark_runs_it_from_its_own_command_line(tmp_path):
+    """A subset, from a copy, so that no result of the repository is touched."""
+    copy = tmp_path / "set"
+    (copy / "data").mkdir(parents=True)
+    (copy / "results").mkdir()
+    (copy / "cdpr_qpbenchmark.py").write_bytes((FOLDER / "cdpr_qpbenchmark.py").read_bytes())
+    (copy / "data" / "cdpr.parquet").write_bytes((FOLDER / "data" / "cdpr.parquet").read_bytes())
+    command = [sys.executable, "cdpr_qpbenchmark.py", "run", "--author", "test", "--problem", "STATIC000"]
+    for solver in ("towline", "daqp"):
+        subprocess.run([*command, "--solver", solver], cwd=copy, check=True, capture_output=True, timeout=60)
+    report = (copy / "results" / "cdpr_qpbenchmark.md").read_text()
+    assert "## Results by settings" in report
+    rows = (copy / "results" / "qpbenchmark_results.csv").read_text().splitlines()
+    assert sum(row.startswith("STATIC000,towline,") and ",True," in row for row in rows) == 4
+
+
+def test_the_data_are_what_the_generator_makes(tmp_path, test_set):
+    subprocess.run([sys.executable, FOLDER / "generate" / "generate.py", tmp_path], check=True, timeout=60)
+    made = module(FOLDER / "cdpr_qpbenchmark.py").CdprQpbenchmark
+    for name in ("cdpr.parquet", "cdpr_infeasible.parquet"):
+        made.data = FOLDER / "data" / name
+        kept = list(made())
+        made.data = tmp_path / name
+        again = list(made())
+        assert [p.name for p in again] == [p.name for p in kept]
+        for one, other in zip(kept, again, strict=True):
+            for key in ("P", "q", "A", "b", "lb", "ub"):
+                np.testing.assert_allclose(getattr(one, key), getattr(other, key), rtol=1e-9, atol=1e-12)
+
+
+def test_no_infeasible_problem_is_solved():
+    made = module(FOLDER / "cdpr_qpbenchmark.py").CdprQpbenchmark
+    made.data = FOLDER / "data" / "cdpr_infeasible.parquet"
+    for problem in made():
+        answer = solve_problem(problem)
+        assert not answer.found, problem.name
+        assert answer.extras["status"] == "infeasible", problem.name
+
+
+def test_multipliers_at_a_vertex():
+    """Every variable at a limit: nobody is between to determine y, and least squares alone has the signs wrong."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        A = rng.normal(size=(3, 6))
+        y = rng.normal(size=3)
+        x = np.where(A.T @ y > 0, 0.0, 1.0)
+        gradient = x
+        z = -(gradient + A.T @ y)  # negative at 0 and positive at 1, or x would not be optimal
+        if ((x == 0) & (z > 0) | (x == 1) & (z < 0)).any():
+            continue
+        y, z = multipliers(gradient, A, A @ x, x, np.zeros(6), np.ones(6))
+        assert np.abs(gradient + A.T @ y + z).max() < 1e-9
+        assert (z[x == 0] <= 0).all()
+        assert (z[x == 1] >= 0).all()
+
+
+def test_only_what_is_a_tension_problem_is_accepted():
+    import qpsolvers
+
+    one = np.ones((1, 2))
+    full = np.array([[2.0, 1.0], [1.0, 2.0]])
+    with pytest.raises(InputError, match="diagonal P"):
+        solve_problem(qpsolvers.Problem(full, np.zeros(2), A=one, b=np.ones(1)))
+    register()
+    register()
+    assert qpsolvers.available_solvers.count("towline") == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tasks_are_what_they_are_called(kind):
+    task = make_task(kind, 7, 6)
+    ranks = {np.linalg.matrix_rank(p.A, tol=1e-9) for p in task.problems}
+    assert ranks == {5 if kind == "rank-deficient" else 6}
+    if task.optima is None:
+        assert all(certify(p) is not None for p in task.problems)
+    elif kind != "soft":
+        for p, optimum in zip(task.problems, task.optima, strict=True):
+            expected = optimum_by_enumeration(p.A, p.w, p.t_min, p.t_max)
+            np.testing.assert_allclose(optimum, expected, atol=1e-8)
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench")
+    command = [TOWLINE, "bench", "tension", "--count", "3", "--repeats", "1", "--m", "8", "--json", "--out", folder]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_bench_prints_what_the_design_says(bench):
+    folder, printed = bench
+    assert {row["task"] for row in printed["rows"]} == {f"{kind}, m = 8" for kind in KINDS}
+    for row in printed["rows"]:
+        assert {"task", "contender", "median_us", "p99_us", "ratio", "max_error", "failures"} <= set(row)
+        assert row["tolerance"]
+        assert 0 < row["median_us"] <= row["p99_us"]
+        if row["contender"] == REFERENCE:
+            assert row["ratio"] == 1.0
+            assert row["failures"] == 0
+    assert [Path(name).name for name in printed["files"]] == ["tension.md", "tension.png"]
+    assert (folder / "tension.png").read_bytes().startswith(b"\x89PNG")
+    assert "| daqp.solve | 1e-09 absolute |" in (folder / "tension.md").read_text()
+
+
+def test_towline_is_right_in_the_bench(bench):
+    """Those that promise the optimum of the QP; a closed form may find none where there is one."""
+    exact = {f"towline {name}" for name in ("active-set", "qp", "min-norm", "solve_batch")}
+    for row in bench[1]["rows"]:
+        if row["contender"] in exact:
+            assert row["failures"] == 0, row
+            assert not row["detail"], row
+
+
+def test_who_hangs_or_breaks_is_out_and_the_others_go_on():
+    import time
+
+    def slow(task):
+        return lambda i: time.sleep(0.05)
+
+    def broken(task):
+        raise RuntimeError("no licence")
+
+    def wrong(task):
+        return lambda i: task.optima[i] + 1e-3
+
+    task = make_task("feasible", 8, 4)
+    reference = contenders()[0]
+    who = [reference, Contender("slow", "", slow), Contender("broken", "", broken), Contender("wrong", "", wrong)]
+    rows = {row.contender: row for row in tension.measure(task, who, repeats=2, limit=0.08)}
+    assert rows["slow"].detail.startswith("out after")
+    assert rows["slow"].problems == 2
+    assert rows["broken"].detail == "RuntimeError: no licence"
+    assert rows["wrong"].failures == 4
+    assert rows["wrong"].max_error == pytest.approx(1e-3)
+    assert rows[REFERENCE].failures == 0
+    assert "broken (RuntimeError: no licence)" in tension.markdown(tension.Report(list(rows.values()), "here", 4, 2))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [(["--count", "0"], "count: is 0"), (["--m", "8,x"], "--m: '8,x'"), (["--m", "99"], "m: is [99]")],
+)
+def test_bench_refuses_in_one_line(arguments, told):
+    done = subprocess.run([TOWLINE, "bench", "tension", *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr
