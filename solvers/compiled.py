@@ -1,16 +1,19 @@
 """When the Numba kernels are loaded: not before they pay.
 
 `import numba` takes 0.2 s to 0.5 s and the machine code 0.3 s from the disk; the first time on a machine it is compiled
-in some ten seconds. A process that solves a handful of problems is better off without.
+in some 20 s. A call without the kernels costs about 0.07 ms more: a process that solves a handful of problems is better
+off without them, and one that would have to compile them needs many more before that pays.
 """
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
-__all__ = ["CALLS_WORTH_LOADING", "count_a_call", "load", "solve_packed"]
+__all__ = ["CALLS_WORTH_COMPILING", "CALLS_WORTH_LOADING", "count_a_call", "load", "solve_packed"]
 
 CALLS_WORTH_LOADING = 5000
+CALLS_WORTH_COMPILING = 300_000
 
 solve_packed: Callable[..., int] | None = None
 """`kernel.solve_packed` once it is loaded."""
@@ -33,6 +36,11 @@ def count_a_call() -> Callable[..., int] | None:
     """Count a call that had to do without the kernel, and load it if there have been enough of them."""
     global _calls
     _calls += 1
-    if _calls >= CALLS_WORTH_LOADING:
+    if _calls >= CALLS_WORTH_COMPILING or (_calls == CALLS_WORTH_LOADING and _on_disk()):
         load()
     return solve_packed
+
+
+def _on_disk() -> bool:
+    """Whether Numba left the kernels' machine code beside their source, where it keeps it if it may write there."""
+    return any((Path(__file__).parent / "__pycache__").glob("kernel.*.nbi"))
