@@ -8,18 +8,48 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .active_set import ActiveSet
+from .analytic_centre import AnalyticCentre
 from .boundary import boundary_candidates
+from .centroid import Centroid
 from .certificate import Certificate, certify
+from .closed_form import ClosedForm
+from .dykstra import Dykstra
+from .improved_closed_form import ImprovedClosedForm
+from .linear_programs import LargestMargin, LeastSum, MinMax
+from .log_barrier import LogBarrier
 from .method import Method, Proposal
 from .min_norm import MinNorm
+from .p_norm import PNorm
+from .polygon_norms import OneNorm, TwoNorm
 from .problem import TensionProblem
 from .qp import QuadraticProgram
+from .soft_wrench import SoftWrench
 from .solution import Status, TensionSolution
 from .standard_form import StandardForm, standard_form
 
 __all__ = ["methods", "solve"]
 
-_METHODS: dict[str, Method] = {method.name: method for method in (ActiveSet(), QuadraticProgram(), MinNorm())}
+_METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        ActiveSet(),
+        QuadraticProgram(),
+        MinNorm(),
+        ClosedForm(),
+        ImprovedClosedForm(),
+        Centroid(),
+        OneNorm(),
+        TwoNorm(),
+        Dykstra(),
+        LeastSum(),
+        LargestMargin(),
+        MinMax(),
+        LogBarrier(),
+        AnalyticCentre(),
+        PNorm(),
+        SoftWrench(),
+    )
+}
 
 
 def methods() -> dict[str, Method]:
@@ -58,7 +88,7 @@ def solve(
     form = standard_form(problem)
     nothing_to_find = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
     at_origin = Proposal(np.zeros(form.moving.size))
-    proposal = at_origin if nothing_to_find else chosen.propose(form, used_backend, **options)
+    proposal = at_origin if nothing_to_find and chosen.seeks_reference else chosen.propose(form, used_backend, **options)
     verdict = _judge(problem, form, chosen, proposal)
     return TensionSolution(
         problem,
@@ -86,6 +116,8 @@ def _judge(problem: TensionProblem, form: StandardForm, method: Method, proposal
     if tensions is not None and _gives_wrench(problem, tensions):
         return _Verdict(Status.OPTIMAL, tensions)
     certificate = certify(problem)
+    if certificate is not None and method.always_answers and tensions is not None:
+        return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
         return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     for s in boundary_candidates(problem, form) if method.exact else ():

@@ -29,11 +29,12 @@ class Status(StrEnum):
     if w is in its range the problem may well be optimal."""
 
     INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance, yet no certificate says that w is out of reach: read `residual`
-    before using them."""
+    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate says that
+    w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
 
     FAILED = "failed"
-    """A back end gave up, or called the problem infeasible and could not be believed; `detail` says what it said."""
+    """A back end gave up, or called the problem infeasible and could not be believed, or the method has no answer here
+    although other methods may have one; `detail` says what it said."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +55,8 @@ class TensionSolution:
     time :
         Wall time of the call [s].
     certificate :
-        Why there are no tensions, exactly if `status` is infeasible or singular. Its `closest` holds the tensions
-        whose wrench is nearest.
+        Why there are no tensions that give w: always if `status` is infeasible or singular, and with a method that
+        answers all the same if it is inaccurate. Its `closest` holds the tensions whose wrench is nearest.
     iterations :
         Iterations of the method, None if it does not count any.
     detail :
