@@ -36,5 +36,5 @@ class AnalyticCentre(Method):
         """Minimise the logarithms alone."""
         start = start_in_form(form, options.get("start"))
         if (np.isinf(form.lower) & np.isinf(form.upper)).any():
-            return Proposal(None, detail="a cable without limits has no centre")
+            return Proposal(None, detail="a cable without limits has no centre", declined=True)
         return barrier_point(form, 0.0, 1.0, start)

@@ -56,8 +56,9 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
     if s is None:
         return Proposal(None, used, "the feasible tensions have no interior")
     found, more = _damped(form, square, mu, s)
-    detail = "" if found is not None else "the feasible tensions are unbounded, or next to no interior is left"
-    return Proposal(found, used + more, detail)
+    if found is None:
+        return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", declined=True)
+    return Proposal(found, used + more)
 
 
 def _pulled_inside(form: StandardForm, start: Array | None) -> Array:

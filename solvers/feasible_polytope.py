@@ -33,12 +33,13 @@ _FAR = 1e8
 def corners(form: StandardForm) -> Array | None:
     """Return the corners of the feasible tensions in the null space, shape (corners, m - rank).
 
-    Polygons come in order around their middle; corners may be repeated. No rows if nothing is feasible.
+    Polygons come in order around their middle; corners may be repeated. No rows if nothing is feasible, or if m - rank > 2
+    and the feasible tensions have no interior: then w is on the very boundary of the available wrench set.
 
     Returns
     -------
     :
-        The corners, or None if the feasible tensions are unbounded, or if m - rank > 2 and they have no interior.
+        The corners, or None if the feasible tensions are unbounded.
     """
     freedom = form.N.shape[0]
     base = form.b @ form.Q
@@ -47,8 +48,6 @@ def corners(form: StandardForm) -> Array | None:
     far = _FAR * (1.0 + largest)
     low, high = np.where(open_low, -far, form.lower) - base, np.where(open_high, far, form.upper) - base
     found = _by_qhull(form.N, low, high) if freedom > 2 else meet(form.N, low, high)
-    if found is None:
-        return None
     s = base + found @ form.N
     if ((s < -0.1 * far) & open_low).any() or ((s > 0.1 * far) & open_high).any():
         return None
@@ -126,8 +125,8 @@ def inside(s: Array, low: Array, high: Array) -> NDArray[np.bool_]:
     return ((s >= low - slack) & (s <= high + slack)).all(axis=1)
 
 
-def _by_qhull(N: Array, low: Array, high: Array) -> Array | None:
-    """Return the corners of a polytope with an interior, else None."""
+def _by_qhull(N: Array, low: Array, high: Array) -> Array:
+    """Return the corners of a polytope with an interior, else none."""
     from scipy.optimize import linprog
     from scipy.spatial import HalfspaceIntersection, QhullError
 
@@ -147,4 +146,4 @@ def _by_qhull(N: Array, low: Array, high: Array) -> Array | None:
     try:
         return HalfspaceIntersection(np.column_stack([rows, -limits]), ball.x[:-1]).intersections
     except QhullError:
-        return None
+        return np.zeros((0, N.shape[0]))

@@ -36,7 +36,7 @@ class ImprovedClosedForm(Method):
             left = form.b - form.Q @ s
             s[free] += np.linalg.pinv(form.Q[:, free], rcond=RANK) @ left
             error = form.b - form.Q @ s
-            if np.sqrt(error @ error) > FEASIBILITY * (1.0 + np.abs(s).max()):
+            if np.sqrt(error @ error) > FEASIBILITY * (1.0 + np.abs(s).max(initial=0.0)):
                 return Proposal(None, reduction + 1, f"no redundancy left after {reduction} cables were held")
             if not outside(form, s):
                 # What is but rounding away from a limit is at it: a problem that asks for nothing has no tolerance.

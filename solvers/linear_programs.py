@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 # HiGHS is content with 1e-7; what is left after 1e-10, its least, `_nearest` takes away.
 _OPTIONS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
+# HiGHS's status: unbounded, or presolve cannot say whether unbounded or infeasible. A certificate says.
+_UNBOUNDED = (3, 4)
+
 # By how much the optimum may be missed in the choice among equally good tensions, relative to its size.
 _TIE = 1e-10
 
@@ -155,7 +158,7 @@ def optimise(
         **inequalities,
     )
     if answer.x is None or answer.status != 0:
-        return Proposal(None, detail=f"highs: {answer.message}")
+        return Proposal(None, detail=f"highs: {answer.message}", declined=answer.status in _UNBOUNDED)
     return Proposal(_on_the_equations(form, answer.x[:k]), int(answer.nit))
 
 

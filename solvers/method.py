@@ -22,11 +22,14 @@ class Proposal(NamedTuple):
         How many it took, None if not counted.
     detail :
         The reason in words when `s` is None.
+    declined :
+        True if the method has no answer to this problem even if it is feasible, say to unbounded feasible tensions.
     """
 
     s: NDArray[np.float64] | None
     iterations: int | None = None
     detail: str = ""
+    declined: bool = False
 
 
 class Method(ABC):

@@ -58,7 +58,7 @@ def methods() -> dict[str, Method]:
 
 
 def solve(
-    problem: TensionProblem, method: str = "active-set", backend: str | None = None, **options: Any
+    problem: TensionProblem, method: str | Method = "active-set", backend: str | None = None, **options: Any
 ) -> TensionSolution:
     """Distribute the tensions of one problem.
 
@@ -70,7 +70,7 @@ def solve(
     problem :
         The problem.
     method :
-        One of `methods()`.
+        One of `methods()`, or a method of your own (docs/adding-a-method.md).
     backend :
         For "qp", the name of an installed QP solver; None = "clarabel".
     **options :
@@ -94,7 +94,7 @@ def solve(
         problem,
         verdict.tensions,
         verdict.status,
-        method,
+        chosen.name,
         used_backend,
         time.perf_counter() - start,
         verdict.certificate,
@@ -120,7 +120,7 @@ def _judge(problem: TensionProblem, form: StandardForm, method: Method, proposal
         return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
         return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
-    for s in boundary_candidates(problem, form) if method.exact else ():
+    for s in boundary_candidates(problem, form) if method.exact and not proposal.declined else ():
         tensions = form.tensions(problem, s)
         if _gives_wrench(problem, tensions):
             return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
@@ -132,20 +132,23 @@ def _gives_wrench(problem: TensionProblem, tensions: NDArray[np.float64]) -> boo
     return bool(np.sqrt(error @ error) <= problem.tolerance(tensions))
 
 
-def _lookup(name: str, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
+def _lookup(name: str | Method, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
     """Return the method and the back end it will use, or raise InputError listing what there is."""
-    if not isinstance(name, str) or name not in _METHODS:
+    if isinstance(name, Method):
+        method = name
+    elif isinstance(name, str) and name in _METHODS:
+        method = _METHODS[name]
+    else:
         raise InputError(f"method: {name!r} is unknown; accepted: {', '.join(_METHODS)}")
-    method = _METHODS[name]
     available = method.backends()
     if backend is None:
         backend = next(iter(available), None)
     elif backend not in available:
-        accepted = ", ".join(available) or f"None, since method {name} has no back ends"
+        accepted = ", ".join(available) or f"None, since method {method.name} has no back ends"
         raise InputError(f"backend: {backend!r} is not installed; accepted: {accepted}")
     if method.options is not None:
         unknown = [key for key in options if key not in method.options]
         if unknown:
-            accepted = ", ".join(method.options) or f"none, method {name} has no options"
+            accepted = ", ".join(method.options) or f"none, method {method.name} has no options"
             raise InputError(f"options: {unknown[0]!r} is unknown; accepted: {accepted}")
     return method, backend
