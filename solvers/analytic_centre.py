@@ -15,10 +15,10 @@ __all__ = ["AnalyticCentre"]
 class AnalyticCentre(Method):
     """Analytic centre of the feasible tensions.
 
-    Existence: wherever the feasible tensions have an interior and are bounded; where they have no interior (w on the very
-    boundary), the nearest to t_ref; failed if they are unbounded. A smooth function of A (of constant rank), w and the
-    limits; t_ref and weights play no part. Like "centroid" without its geometry: any m - rank costs the same, tens of
-    Newton steps, few from the last answer (`start`). Outside the feasible set: a certificate.
+    Existence: wherever the feasible tensions have an interior and are bounded; where they have no interior (w on the
+    very boundary), the nearest to t_ref; failed if they are unbounded. A smooth function of A (of constant rank), w and
+    the limits; t_ref and weights play no part. Like "centroid" without its geometry: any m - rank costs the same, tens
+    of Newton steps, few from the last answer (`start`). Outside the feasible set: a certificate.
     """
 
     name: ClassVar[str] = "analytic-centre"
@@ -36,5 +36,5 @@ class AnalyticCentre(Method):
         """Minimise the logarithms alone."""
         start = start_in_form(form, options.get("start"))
         if (np.isinf(form.lower) & np.isinf(form.upper)).any():
-            return Proposal(None, detail="a cable without limits has no centre", declined=True)
+            return Proposal(None, detail="a cable without limits has no centre", final=True)
         return barrier_point(form, 0.0, 1.0, start)

@@ -5,8 +5,8 @@ r"""Newton's method for a point inside the limits: least of a square and logarit
     \min_s \; \frac{c}{2} |s|^2 - \mu \sum_i \big( \log (s_i - lower_i) + \log (upper_i - s_i) \big)
     \quad \text{s.t.} \quad Q s = b
 
-The infeasible-start Newton method (Boyd and Vandenberghe 2004, section 10.3) needs no point that gives w to begin with, so
-the last answer along a motion will do. Should it get stuck, a linear program finds a point to start from, from where
+The infeasible-start Newton method (Boyd and Vandenberghe 2004, section 10.3) needs no point that gives w to begin with,
+so the last answer along a motion will do. Should it get stuck, a linear program finds a point to start from, from where
 damped steps cannot fail: the function is self-concordant.
 """
 
@@ -57,7 +57,7 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
         return Proposal(None, used, "the feasible tensions have no interior")
     found, more = _damped(form, square, mu, s)
     if found is None:
-        return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", declined=True)
+        return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", final=True)
     return Proposal(found, used + more)
 
 
@@ -90,7 +90,7 @@ def _newton_step(form: StandardForm, gradient: Array, hessian: Array, error: Arr
     y = np.linalg.solve(triangle.T, error) if error.size else error
     along = orthogonal @ (y + orthogonal.T @ scaled)
     multipliers = -np.linalg.solve(triangle, y + orthogonal.T @ scaled) if error.size else error
-    return root * (along - scaled), multipliers
+    return root * (along - scaled), np.asarray(multipliers, dtype=np.float64)
 
 
 def _infeasible_start(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array | None, int]:
@@ -107,7 +107,7 @@ def _infeasible_start(form: StandardForm, square: float, mu: float, s: Array) ->
         left = form.b - form.Q @ s
         step, target = _newton_step(form, gradient, hessian, left)
         if step @ (hessian * step) <= _CONVERGED * mu and left @ left <= _ON_PLANE**2:
-            return s, iteration
+            return s + step, iteration
         length = min(1.0, _FRACTION * _way_to_limits(form, s, step))
         now = error_at(s, multipliers)
         for _ in range(40):
@@ -118,7 +118,7 @@ def _infeasible_start(form: StandardForm, square: float, mu: float, s: Array) ->
         else:
             # Rounding is all that is left, or nothing leads on from here.
             done = step @ (hessian * step) <= 1e-16 * mu and left @ left <= 1e-24
-            return (s if done else None), iteration
+            return (s + step if done else None), iteration
         s, multipliers = ahead
     return None, _STEPS
 
@@ -131,7 +131,8 @@ def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Arr
         step, _ = _newton_step(form, gradient, hessian, left)
         decrement = float(np.sqrt(step @ (hessian * step) / mu))
         if decrement**2 <= max(_CONVERGED, 1e-18):
-            return s, iteration
+            # One step more costs nothing and squares the error.
+            return s + step, iteration
         length = 1.0 if decrement < 0.25 else 1.0 / (1.0 + decrement)
         s = s + min(length, _FRACTION * _way_to_limits(form, s, step)) * step
     return None, _DAMPED_STEPS

@@ -3,6 +3,7 @@
 CasADi is imported here and nowhere else in this room.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,14 +34,14 @@ def casadi_function(
 ) -> "casadi.Function":
     """Return the bounded quadratic program as a CasADi Function (A, w, t_min, t_max) -> t, with its derivative.
 
-    The tensions are those of method "soft-wrench" without rho: the optimum of "active-set" where w is available, else the
-    tensions of the nearest available wrench, so that an iterate of a nonlinear program always gets numbers. They do give w
-    only if `A @ t` is `w`: make that a constraint if it matters. Derivatives with respect to all four inputs are exact; at
-    kinks they are one-sided, see `sensitivity`. There are no second derivatives: give IPOPT
+    The tensions are those of method "soft-wrench" without rho: the optimum of "active-set" where w is available, else
+    the tensions of the nearest available wrench, so that an iterate of a nonlinear program always gets numbers. They do
+    give w only if `A @ t` is `w`: make that a constraint if it matters. Derivatives with respect to all four inputs are
+    exact; at kinks they are one-sided, see `sensitivity`. There are no second derivatives: give IPOPT
     `{"ipopt.hessian_approximation": "limited-memory"}`.
 
-    It is a Python callback: it costs a `solve` per evaluation, cannot be turned into C code, and must be kept in a variable
-    as long as anything that calls it.
+    It is a Python callback: it costs a `solve` per evaluation, cannot be turned into C code, and must be kept in a
+    variable as long as anything that calls it.
 
     Parameters
     ----------
@@ -54,8 +55,8 @@ def casadi_function(
     Returns
     -------
     :
-        Function with inputs A (n, m), w (n), t_min (m), t_max (m) and output t (m) [N]. Crossed limits or entries that are
-        not finite numbers give nan.
+        Function with inputs A (n, m), w (n), t_min (m), t_max (m) and output t (m) [N]. Crossed limits or entries that
+        are not finite numbers give nan.
 
     Raises
     ------
@@ -76,7 +77,7 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
 
     shapes = [(n, m), (n, 1), (m, 1), (m, 1)]
 
-    def problem_of(arguments: list[Any]) -> TensionProblem | None:
+    def problem_of(arguments: Sequence[Any]) -> TensionProblem | None:
         A, w, low, high = (argument.full() for argument in arguments[:4])
         try:
             return TensionProblem(A.reshape(n, m), w.ravel(), low.ravel(), high.ravel(), **constants)
@@ -90,10 +91,10 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
     class Jacobian(ca.Callback):
         """Blocks dt / d(A, w, t_min, t_max), each (m, entries)."""
 
-        def __init__(self, name: str, inputs: list[str], outputs: list[str], options: dict[str, Any]) -> None:
+        def __init__(self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]):
             ca.Callback.__init__(self)
             self._inputs, self._outputs = inputs, outputs
-            self.construct(name, options)
+            self.construct(name, dict(options))
 
         def get_n_in(self) -> int:
             return 5
@@ -114,7 +115,7 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
         def get_sparsity_out(self, i: int) -> ca.Sparsity:
             return ca.Sparsity.dense(m, shapes[i][0] * shapes[i][1])
 
-        def eval(self, arguments: list[Any]) -> list[Array]:
+        def eval(self, arguments: Sequence[Any]) -> list[Array]:
             problem = problem_of(arguments)
             tensions = tensions_of(problem)
             if problem is None or np.isnan(tensions).any():
@@ -149,13 +150,15 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
         def get_sparsity_out(self, i: int) -> ca.Sparsity:
             return ca.Sparsity.dense(m, 1)
 
-        def eval(self, arguments: list[Any]) -> list[Array]:
+        def eval(self, arguments: Sequence[Any]) -> list[Array]:
             return [tensions_of(problem_of(arguments))]
 
         def has_jacobian(self, *_: Any) -> bool:
             return True
 
-        def get_jacobian(self, name: str, inames: list[str], onames: list[str], opts: dict[str, Any]) -> ca.Function:
+        def get_jacobian(
+            self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
+        ) -> ca.Function:
             jacobian = Jacobian(name, inames, onames, opts)
             self._jacobians.append(jacobian)
             return jacobian

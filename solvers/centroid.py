@@ -13,10 +13,11 @@ class Centroid(Method):
     """Barycentre of the feasible polygon; of the interval for m - rank = 1, of the polytope beyond 2.
 
     Existence: wherever the problem is feasible and the feasible tensions are bounded; failed if they are unbounded (a
-    missing limit). With w on the very boundary and m - rank > 2 it is the nearest to t_ref instead. Continuous while the feasible tensions have an
-    interior, and where they shrink to a point. Far from the limits: the safest choice against slack, at the price of
-    high tensions. Cost: pairs of lines for a polygon; Qhull and a linear program beyond m - rank = 2, which is slow.
-    Outside the feasible set: a certificate. The centroid is that of the tensions themselves whatever t_ref and weights.
+    missing limit). With w on the very boundary and m - rank > 2 it is the nearest to t_ref instead. Continuous while
+    the feasible tensions have an interior, and where they shrink to a point. Far from the limits: the safest choice
+    against slack, at the price of high tensions. Cost: pairs of lines for a polygon; Qhull and a linear program beyond
+    m - rank = 2, which is slow. Outside the feasible set: a certificate. The centroid is that of the tensions
+    themselves whatever t_ref and weights.
     """
 
     name: ClassVar[str] = "centroid"
@@ -33,7 +34,7 @@ class Centroid(Method):
         """Take the centroid of the corners in the null space."""
         points = corners(form)
         if points is None:
-            return Proposal(None, detail="the feasible tensions have no centroid: unbounded", declined=True)
+            return Proposal(None, detail="the feasible tensions have no centroid: unbounded", final=True)
         if points.shape[0] == 0:
             return Proposal(None, detail="the limits enclose nothing")
         return Proposal(form.b @ form.Q + simplex_centroid(points) @ form.N, points.shape[0])

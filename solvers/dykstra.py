@@ -44,7 +44,9 @@ class Dykstra(Method):
     exact: ClassVar[bool] = False
     continuous: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
-    options: ClassVar[dict[str, str] | None] = {"max_iter": "iterations at most, a number from 1 up; 50000 if not given"}
+    options: ClassVar[dict[str, str] | None] = {
+        "max_iter": "iterations at most, a number from 1 up; 50000 if not given"
+    }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Project in turn from s = 0."""

@@ -33,8 +33,8 @@ _FAR = 1e8
 def corners(form: StandardForm) -> Array | None:
     """Return the corners of the feasible tensions in the null space, shape (corners, m - rank).
 
-    Polygons come in order around their middle; corners may be repeated. No rows if nothing is feasible, or if m - rank > 2
-    and the feasible tensions have no interior: then w is on the very boundary of the available wrench set.
+    Polygons come in order around their middle; corners may be repeated. No rows if nothing is feasible, or if m - rank
+    > 2 and the feasible tensions have no interior: then w is on the very boundary of the available wrench set.
 
     Returns
     -------

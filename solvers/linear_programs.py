@@ -1,8 +1,8 @@
 r"""Methods "least-sum", "largest-margin" and "min-max": linear programs, by HiGHS.
 
-A linear program often has many solutions and a solver returns any of them. Here the one nearest to t_ref is taken, which
-makes the answer unique and, for a fixed wrench matrix, continuous in w. It is not continuous as the cables turn: where an
-edge of the feasible tensions turns past the cost's direction, all linear programs jump.
+A linear program often has many solutions and a solver returns any of them. Here the one nearest to t_ref is taken,
+which makes the answer unique and, for a fixed wrench matrix, continuous in w. It is not continuous as the cables turn:
+where an edge of the feasible tensions turns past the cost's direction, all linear programs jump.
 """
 
 from typing import Any, ClassVar
@@ -39,7 +39,8 @@ class LeastSum(Method):
     name: ClassVar[str] = "least-sum"
     guarantee: ClassVar[str] = "the least sum of tensions, of these the nearest to t_ref; may jump as cables turn"
     source: ClassVar[str] = (
-        "S. Fang et al., IEEE/ASME Trans. Mechatronics 9(2), 2004; HiGHS: Q. Huangfu, J. Hall, Math. Prog. Comp. 10, 2018"
+        "S. Fang et al., IEEE/ASME Trans. Mechatronics 9(2), 2004; "
+        "HiGHS: Q. Huangfu, J. Hall, Math. Prog. Comp. 10, 2018"
     )
     exact: ClassVar[bool] = True
 
@@ -58,9 +59,9 @@ class LargestMargin(Method):
     """As far from all limits as possible, in newtons ("optimally safe").
 
     Maximises the smallest distance of a tension to its limits. Existence: wherever the problem is feasible; failed if
-    nothing limits the margin (infinite limits). The largest margin itself is continuous; the tensions are unique, by the
-    distance to t_ref, continuous in w for a fixed wrench matrix, and may jump as cables turn. Cables with equal limits
-    do not count. Cost: one linear program and one quadratic one. Outside the feasible set: a certificate.
+    nothing limits the margin (infinite limits). The largest margin itself is continuous; the tensions are unique, by
+    the distance to t_ref, continuous in w for a fixed wrench matrix, and may jump as cables turn. Cables with equal
+    limits do not count. Cost: one linear program and one quadratic one. Outside the feasible set: a certificate.
     """
 
     name: ClassVar[str] = "largest-margin"
@@ -68,7 +69,8 @@ class LargestMargin(Method):
         "the largest distance to the limits, of these the nearest to t_ref; certificate if there are none"
     )
     source: ClassVar[str] = (
-        "P. Borgstrom et al., IEEE Trans. Robotics 25(6), 2009, 'Rapid computation of optimally safe tension distributions'"
+        "P. Borgstrom et al., 'Rapid computation of optimally safe tension distributions', "
+        "IEEE Trans. Robotics 25(6), 2009"
     )
     exact: ClassVar[bool] = True
 
@@ -158,7 +160,7 @@ def optimise(
         **inequalities,
     )
     if answer.x is None or answer.status != 0:
-        return Proposal(None, detail=f"highs: {answer.message}", declined=answer.status in _UNBOUNDED)
+        return Proposal(None, detail=f"highs: {answer.message}", final=answer.status in _UNBOUNDED)
     return Proposal(_on_the_equations(form, answer.x[:k]), int(answer.nit))
 
 

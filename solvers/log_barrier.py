@@ -22,18 +22,21 @@ __all__ = ["LogBarrier", "start_in_form"]
 class LogBarrier(Method):
     """Continuously differentiable distribution, strictly inside the limits.
 
-    Existence: wherever the feasible tensions have an interior; where they have none (w on the very boundary), the nearest
-    to t_ref. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where a cable
-    comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance of about
-    mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: tens of Newton steps
-    from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set: a certificate.
+    Existence: wherever the feasible tensions have an interior; where they have none (w on the very boundary), the
+    nearest to t_ref. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where
+    a cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance
+    of about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: tens of
+    Newton steps from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set: a
+    certificate.
     """
 
     name: ClassVar[str] = "log-barrier"
     guarantee: ClassVar[str] = (
         "unique, strictly inside the limits, continuously differentiable; certificate if there are none"
     )
-    source: ClassVar[str] = "in the spirit of E. Ueland, T. Sauder, R. Skjetne, IEEE Access 9, 2021; Boyd, Vandenberghe 2004"
+    source: ClassVar[str] = (
+        "in the spirit of E. Ueland, T. Sauder, R. Skjetne, IEEE Access 9, 2021; Boyd, Vandenberghe 2004"
+    )
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
     options: ClassVar[dict[str, str] | None] = {

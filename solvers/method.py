@@ -22,14 +22,15 @@ class Proposal(NamedTuple):
         How many it took, None if not counted.
     detail :
         The reason in words when `s` is None.
-    declined :
-        True if the method has no answer to this problem even if it is feasible, say to unbounded feasible tensions.
+    final :
+        True if this stands even if the problem is feasible, say because the feasible tensions are unbounded: `solve`
+        does not look in `boundary.py` for what rounding may have lost.
     """
 
     s: NDArray[np.float64] | None
     iterations: int | None = None
     detail: str = ""
-    declined: bool = False
+    final: bool = False
 
 
 class Method(ABC):
@@ -49,8 +50,8 @@ class Method(ABC):
     boundary of the available wrench set, `solve` finds it in `boundary.py`."""
 
     continuous: ClassVar[bool] = False
-    """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior, that
-    is, can all be off their limits at once."""
+    """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior,
+    that is, can all be off their limits at once."""
 
     seeks_reference: ClassVar[bool] = False
     """True if s = 0, tensions at t_ref, is the method's answer wherever it is a feasible one."""

@@ -26,8 +26,8 @@ class OneNorm(Method):
     """Least sum of absolute tensions, by comparing the corners of the feasible polygon.
 
     Existence: wherever the problem is feasible. Not continuous: as the cables turn, the best corner changes; of equally
-    good corners it takes the mean. Cost: pairs of lines for m - rank <= 2, a linear program beyond. Outside the feasible
-    set: a certificate. t_ref and weights play no part. Without negative limits it agrees with "least-sum".
+    good corners it takes the mean. Cost: pairs of lines for m - rank <= 2, a linear program beyond. Outside the
+    feasible set: a certificate. t_ref and weights play no part. Without negative limits it agrees with "least-sum".
     """
 
     name: ClassVar[str] = "1-norm"
@@ -54,7 +54,7 @@ class OneNorm(Method):
 
 
 class TwoNorm(Method):
-    """Nearest to t_ref, by comparing the corners of the feasible polygon and the feet of the perpendiculars on its edges.
+    """Nearest to t_ref, by comparing the corners of the feasible polygon with the nearest points of its edges.
 
     The same tensions as "active-set" and "min-norm", from a fixed number of steps. Existence, continuity and what
     happens outside the feasible set are theirs. Cost: pairs of lines for m - rank <= 2; beyond, the active set.

@@ -88,7 +88,9 @@ def solve(
     form = standard_form(problem)
     nothing_to_find = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
     at_origin = Proposal(np.zeros(form.moving.size))
-    proposal = at_origin if nothing_to_find and chosen.seeks_reference else chosen.propose(form, used_backend, **options)
+    proposal = (
+        at_origin if nothing_to_find and chosen.seeks_reference else chosen.propose(form, used_backend, **options)
+    )
     verdict = _judge(problem, form, chosen, proposal)
     return TensionSolution(
         problem,
@@ -120,7 +122,7 @@ def _judge(problem: TensionProblem, form: StandardForm, method: Method, proposal
         return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
         return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
-    for s in boundary_candidates(problem, form) if method.exact and not proposal.declined else ():
+    for s in boundary_candidates(problem, form) if method.exact and not proposal.final else ():
         tensions = form.tensions(problem, s)
         if _gives_wrench(problem, tensions):
             return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")

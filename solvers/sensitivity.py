@@ -39,7 +39,8 @@ class Derivatives(NamedTuple):
     w :
         dt / dw, shape (m, n).
     t_min, t_max :
-        dt / dt_min and dt / dt_max, shape (m, m): columns of free cables are 0. Cables with equal limits count for t_min.
+        dt / dt_min and dt / dt_max, shape (m, m): columns of free cables are 0. Cables with equal limits count for
+        t_min.
     A :
         dt / dA, shape (m, n, m).
     """
@@ -58,15 +59,16 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     problem :
         The problem.
     solution :
-        Its solution by a method that solves the quadratic program ("active-set", "min-norm", "qp", "2-norm", "dykstra").
+        Its solution by a method that solves the quadratic program ("active-set", "min-norm", "qp", "2-norm",
+        "dykstra").
 
     Returns
     -------
     :
-        dt_i / dw_j, shape (m, n) [N per N, N per N m]. The tensions are piecewise linear in w. Where pieces meet (a cable
-        is at its limit but nothing holds it there) the result is one-sided: that of the piece on which such cables are
-        free. In directions of w that the free cables cannot give, the optimum changes its active set at once (w at an edge
-        of the pieces) or there is none (w on the boundary): there it is 0.
+        dt_i / dw_j, shape (m, n) [N per N, N per N m]. The tensions are piecewise linear in w. Where pieces meet (a
+        cable is at its limit but nothing holds it there) the result is one-sided: that of the piece on which such
+        cables are free. In directions of w that the free cables cannot give, the optimum changes its active set at once
+        (w at an edge of the pieces) or there is none (w on the boundary): there it is 0.
 
     Raises
     ------
@@ -79,7 +81,8 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
 def derivatives(problem: TensionProblem, tensions: Array) -> Derivatives:
     """Return the derivatives of the optimum with respect to wrench, limits and wrench matrix.
 
-    What `sensitivity` says of kinks holds for all. The tensions may also be those of "soft-wrench" for a w out of reach.
+    What `sensitivity` says of kinks holds for all. The tensions may also be those of "soft-wrench" for a w out of
+    reach.
 
     Parameters
     ----------
@@ -111,7 +114,8 @@ def derivatives(problem: TensionProblem, tensions: Array) -> Derivatives:
     curvature = root[:, None] * (inverse @ inverse.T)  # (f, f)
     by_A = np.zeros((m, n, m))
     by_A[free] = -P[:, :, None] * tensions
-    spread = (along * root)[:, None, :] * (scale * y)[:, None] - (curvature * root)[:, None, :] * (scale * error)[:, None]
+    in_range, off_range = (along * root)[:, None, :], (curvature * root)[:, None, :]  # (f, 1, f)
+    spread = in_range * (scale * y)[:, None] - off_range * (scale * error)[:, None]
     by_A[np.ix_(free, np.ones(n, dtype=bool), free)] += spread
     return Derivatives(by_w, by_min, by_max, by_A)
 
@@ -123,8 +127,8 @@ def _active_set(problem: TensionProblem, tensions: Array) -> tuple[NDArray[np.bo
     at_low, at_high = tensions - problem.t_min <= near, problem.t_max - tensions <= near
     pull = problem.weights * (tensions - problem.t_ref)
     inside = ~(at_low | at_high)
-    # Multipliers: what the wrench's price y leaves of the cost's gradient. With few free cables y is not unique, and the
-    # largest set of cables that some y would release is one-sided in the sense of `sensitivity`.
+    # Multipliers: what the wrench's price y leaves of the cost's gradient. With few free cables y is not unique, and
+    # the largest set of cables that some y would release is one-sided in the sense of `sensitivity`.
     price = np.linalg.lstsq(problem.scaled_A[:, inside].T, pull[inside], rcond=_RANK)[0]
     error = problem.scaled_A @ tensions - problem.scaled_w
     rest = pull - problem.scaled_A.T @ price

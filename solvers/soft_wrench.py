@@ -5,8 +5,8 @@ r"""Method "soft-wrench": tensions for any wrench whatever, the required one if 
     \min_t \; \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2 + \rho |S (A t - w)|^2
     \quad \text{s.t.} \quad t_{min} \le t \le t_{max}
 
-For :math:`\rho \to \infty` this is: project w on the available wrench set, then take the least squares to t_ref that give
-the projection.
+For :math:`\rho \to \infty` this is: project w on the available wrench set, then take the least squares to t_ref that
+give the projection.
 """
 
 from typing import Any, ClassVar
@@ -34,21 +34,21 @@ class SoftWrench(Method):
     optimal; elsewhere their wrench is the available one nearest to w (moments divided by the problem's length), the
     status is inaccurate, `residual` is the distance and the certificate is there. Lipschitz in w everywhere, across the
     boundary too: a projection is, and so is least squares inside limits. With `rho` the wrench gives way before the
-    limits force it to, by about the cost's gradient / rho: smoother, and the status is inaccurate nearly everywhere, with
-    a certificate only where w is out of reach. Lipschitz in w, and in the wrench matrix too. Cost: two active-set
+    limits force it to, by about the cost's gradient / rho: smoother, and the status is inaccurate nearly everywhere,
+    with a certificate only where w is out of reach. Lipschitz in w, and in the wrench matrix too. Cost: two active-set
     solves, one with `rho`.
     """
 
     name: ClassVar[str] = "soft-wrench"
     guarantee: ClassVar[str] = (
-        "always tensions, Lipschitz in w: the optimum if w is available, else inaccurate: nearest wrench and certificate"
+        "always tensions, Lipschitz in w: the optimum if w is available, else the nearest wrench and a certificate"
     )
     source: ClassVar[str] = "A. F. Côté, P. Cardou, C. Gosselin, Mechatronics 2016, slack form"
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
     always_answers: ClassVar[bool] = True
     options: ClassVar[dict[str, str] | None] = {
-        "rho": "weight of the squared wrench error beside the squared tensions, from 1e-12 to 1e12; infinite if not given"
+        "rho": "weight of the squared wrench error beside the squared tensions, 1e-12 to 1e12; infinite if not given"
     }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
@@ -63,7 +63,7 @@ class SoftWrench(Method):
         s, _ = box_least_squares(
             np.vstack([root[:, None] * form.Q, np.eye(k)]), np.r_[root * form.b, np.zeros(k)], form.lower, form.upper
         )
-        return Proposal(s)
+        return Proposal(s, final=True)
 
 
 def _nearest_wrench(form: StandardForm) -> Proposal:

@@ -29,8 +29,8 @@ class Status(StrEnum):
     if w is in its range the problem may well be optimal."""
 
     INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate says that
-    w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
+    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate says
+    that w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
 
     FAILED = "failed"
     """A back end gave up, or called the problem infeasible and could not be believed, or the method has no answer here
