@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import solvers
-from ..solvers import TensionProblem, methods, solve
+from ..solvers import TensionProblem, methods, solve, solve_batch
 from .tension_tasks import Task
 
 __all__ = ["REFERENCE", "Contender", "contenders"]
@@ -79,8 +78,7 @@ def contenders() -> list[Contender]:
     found = [Contender(REFERENCE, asked, _daqp)]
     for name in methods():
         found.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
-    if getattr(solvers, "solve_batch", None) is not None:
-        found.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
+    found.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
     native = {
         "daqp": ("daqp Model, reuse", _daqp_model),
         "osqp": ("osqp, reuse", _osqp),
@@ -133,14 +131,13 @@ def _towline(method: str) -> Callable[[Task], Single]:
 
 
 def _towline_batch(task: Task) -> Batch:
-    batch: Any = getattr(solvers, "solve_batch")  # noqa: B009
     A, w, t_min, t_max, weights = (
         _over_and_over(np.array([getattr(problem, name) for problem in task.problems]))
         for name in ("A", "w", "t_min", "t_max", "weights")
     )
 
     def run() -> tuple[Array, NDArray[np.bool_]]:
-        answer = batch(A, w, t_min, t_max, weights=weights, threads=1)
+        answer = solve_batch(A, w, t_min, t_max, weights=weights, threads=1)
         return answer.tensions, answer.feasible
 
     return run

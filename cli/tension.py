@@ -75,12 +75,16 @@ def _show(robot: Robot, at: dict[str, Any], answer: TensionSolution, methods: di
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("cable", "t_min [N]", *(f"{name} [N]" for name in methods), "t_max [N]", box=None, pad_edge=False)
-    for i in range(robot.m):
-        found = [f"{m.tensions[i]:.4f}" if m.tensions is not None else "-" for m in methods.values()]
-        table.add_row(str(i + 1), f"{robot.t_min[i]:g}", *found, f"{robot.t_max[i]:g}")
-    table.add_row("status", "", *(m.status.value for m in methods.values()), "")
-    table.add_row("time [ms]", "", *(f"{1e3 * m.time:.2f}" for m in methods.values()), "")
+    # One row a method: there are more of them than cables.
+    table = Table(box=None, pad_edge=False)
+    table.add_column("tensions [N]", no_wrap=True)
+    for heading in (*(str(i + 1) for i in range(robot.m)), "status", "ms"):
+        table.add_column(heading)
+    table.add_row("t_min", *(f"{limit:g}" for limit in robot.t_min), "", "")
+    for name, found in methods.items():
+        tensions = ["-"] * robot.m if found.tensions is None else [f"{t:.3f}" for t in found.tensions]
+        table.add_row(name, *tensions, found.status.value, f"{1e3 * found.time:.2f}")
+    table.add_row("t_max", *(f"{limit:g}" for limit in robot.t_max), "", "")
     pose = ", ".join(f"{value:g}" for value in at["pose"])
     typer.echo(f"{robot.name} at ({pose}): {answer.status.value.upper()}")
     Console().print(table)

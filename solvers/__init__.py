@@ -5,19 +5,33 @@ Plain NumPy arrays in and out; this room knows no robot. State a `TensionProblem
 """
 
 from .batch import BatchSolution, solve_batch
+from .casadi_form import casadi_function
 from .certificate import Certificate, certify
+from .margin import Margin, capacity_margin
+from .method import Method, Proposal
 from .problem import TensionProblem
+from .rate import limit_rate
 from .registry import methods, solve
+from .sensitivity import sensitivity
 from .solution import Status, TensionSolution
+from .standard_form import StandardForm
 
 __all__ = [
     "BatchSolution",
     "Certificate",
+    "Margin",
+    "Method",
+    "Proposal",
+    "StandardForm",
     "Status",
     "TensionProblem",
     "TensionSolution",
+    "capacity_margin",
+    "casadi_function",
     "certify",
+    "limit_rate",
     "methods",
+    "sensitivity",
     "solve",
     "solve_batch",
 ]

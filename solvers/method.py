@@ -24,11 +24,15 @@ class Proposal(NamedTuple):
         How many it took, None if not counted.
     detail :
         The reason in words when `s` is None.
+    final :
+        True if this stands even if the problem is feasible, say because the feasible tensions are unbounded: `solve`
+        does not look in `boundary.py` for what rounding may have lost.
     """
 
     s: NDArray[np.float64] | None
     iterations: int | None = None
     detail: str = ""
+    final: bool = False
 
 
 class Method(ABC):
@@ -46,6 +50,16 @@ class Method(ABC):
     exact: ClassVar[bool]
     """True if the method ends at the optimum itself. Where rounding alone makes such a method lose a point on the very
     boundary of the available wrench set, `solve` finds it in `boundary.py`."""
+
+    continuous: ClassVar[bool] = False
+    """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior,
+    that is, can all be off their limits at once."""
+
+    seeks_reference: ClassVar[bool] = False
+    """True if s = 0, tensions at t_ref, is the method's answer wherever it is a feasible one."""
+
+    always_answers: ClassVar[bool] = False
+    """True if the tensions are worth having even if w is out of reach: then they come with the certificate."""
 
     options: ClassVar[dict[str, str] | None] = {}
     """Keyword arguments of `propose` and what they mean; None = whatever the back end takes."""

@@ -8,20 +8,51 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .active_set import ActiveSet
+from .analytic_centre import AnalyticCentre
 from .boundary import boundary_candidates
+from .centroid import Centroid
 from .certificate import Certificate, certify
+from .closed_form import ClosedForm
 from .direct_daqp import Daqp
+from .dykstra import Dykstra
+from .improved_closed_form import ImprovedClosedForm
+from .linear_programs import LargestMargin, LeastSum, MinMax
+from .log_barrier import LogBarrier
 from .method import Method, Proposal
 from .min_norm import MinNorm
+from .p_norm import PNorm
+from .polygon_norms import OneNorm, TwoNorm
 from .problem import TensionProblem
 from .qp import QuadraticProgram
+from .soft_wrench import SoftWrench
 from .solution import Status, TensionSolution
 from .standard_form import StandardForm, standard_form
 
 __all__ = ["methods", "solve"]
 
 _ACTIVE_SET = ActiveSet()
-_METHODS: dict[str, Method] = {method.name: method for method in (_ACTIVE_SET, Daqp(), QuadraticProgram(), MinNorm())}
+_METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        _ACTIVE_SET,
+        Daqp(),
+        QuadraticProgram(),
+        MinNorm(),
+        ClosedForm(),
+        ImprovedClosedForm(),
+        Centroid(),
+        OneNorm(),
+        TwoNorm(),
+        Dykstra(),
+        LeastSum(),
+        LargestMargin(),
+        MinMax(),
+        LogBarrier(),
+        AnalyticCentre(),
+        PNorm(),
+        SoftWrench(),
+    )
+}
 
 
 def methods() -> dict[str, Method]:
@@ -30,7 +61,7 @@ def methods() -> dict[str, Method]:
 
 
 def solve(
-    problem: TensionProblem, method: str = "active-set", backend: str | None = None, **options: Any
+    problem: TensionProblem, method: str | Method = "active-set", backend: str | None = None, **options: Any
 ) -> TensionSolution:
     """Distribute the tensions of one problem.
 
@@ -42,7 +73,7 @@ def solve(
     problem :
         The problem.
     method :
-        One of `methods()`.
+        One of `methods()`, or a method of your own (docs/adding-a-method.md).
     backend :
         For "qp", the name of an installed QP solver; None = "clarabel".
     **options :
@@ -57,20 +88,22 @@ def solve(
     if method == "active-set" and backend is None and not options and type(problem) is TensionProblem:
         answer = _ACTIVE_SET.attempt(problem)
         if answer is not None:
-            return TensionSolution(problem, answer[1], answer[0], method, None, time.perf_counter() - start)
+            return TensionSolution(problem, answer[1], answer[0], "active-set", None, time.perf_counter() - start)
     chosen, used_backend = _lookup(method, backend, options)
     if not isinstance(problem, TensionProblem):
         raise InputError(f"problem: is a {type(problem).__name__}; accepted: a TensionProblem")
     form = standard_form(problem)
     nothing_to_find = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
     at_origin = Proposal(np.zeros(form.moving.size))
-    proposal = at_origin if nothing_to_find else chosen.propose(form, used_backend, **options)
+    proposal = (
+        at_origin if nothing_to_find and chosen.seeks_reference else chosen.propose(form, used_backend, **options)
+    )
     verdict = _judge(problem, form, chosen, proposal)
     return TensionSolution(
         problem,
         verdict.tensions,
         verdict.status,
-        method,
+        chosen.name,
         used_backend,
         time.perf_counter() - start,
         verdict.certificate,
@@ -92,9 +125,11 @@ def _judge(problem: TensionProblem, form: StandardForm, method: Method, proposal
     if tensions is not None and _gives_wrench(problem, tensions):
         return _Verdict(Status.OPTIMAL, tensions)
     certificate = certify(problem)
+    if certificate is not None and method.always_answers and tensions is not None:
+        return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
         return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
-    for s in boundary_candidates(problem, form) if method.exact else ():
+    for s in boundary_candidates(problem, form) if method.exact and not proposal.final else ():
         tensions = form.tensions(problem, s)
         if _gives_wrench(problem, tensions):
             return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
@@ -106,20 +141,23 @@ def _gives_wrench(problem: TensionProblem, tensions: NDArray[np.float64]) -> boo
     return bool(np.sqrt(error @ error) <= problem.tolerance(tensions))
 
 
-def _lookup(name: str, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
+def _lookup(name: str | Method, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
     """Return the method and the back end it will use, or raise InputError listing what there is."""
-    if not isinstance(name, str) or name not in _METHODS:
+    if isinstance(name, Method):
+        method = name
+    elif isinstance(name, str) and name in _METHODS:
+        method = _METHODS[name]
+    else:
         raise InputError(f"method: {name!r} is unknown; accepted: {', '.join(_METHODS)}")
-    method = _METHODS[name]
     available = method.backends()
     if backend is None:
         backend = next(iter(available), None)
     elif backend not in available:
-        accepted = ", ".join(available) or f"None, since method {name} has no back ends"
+        accepted = ", ".join(available) or f"None, since method {method.name} has no back ends"
         raise InputError(f"backend: {backend!r} is not installed; accepted: {accepted}")
     if method.options is not None:
         unknown = [key for key in options if key not in method.options]
         if unknown:
-            accepted = ", ".join(method.options) or f"none, method {name} has no options"
+            accepted = ", ".join(method.options) or f"none, method {method.name} has no options"
             raise InputError(f"options: {unknown[0]!r} is unknown; accepted: {accepted}")
     return method, backend

@@ -27,15 +27,16 @@ class Status(StrEnum):
     if w is in its range the problem may well be optimal."""
 
     INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance, yet no certificate says that w is out of reach: read `residual`
-    before using them."""
+    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate says
+    that w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
 
     INVALID = "invalid"
     """A row of a batch whose numbers are no problem: NaN, crossed limits, a weight that is not positive. A single
     problem like that is an `InputError`."""
 
     FAILED = "failed"
-    """A back end gave up, or called the problem infeasible and could not be believed; `detail` says what it said."""
+    """A back end gave up, or called the problem infeasible and could not be believed, or the method has no answer here
+    although other methods may have one; `detail` says what it said."""
 
 
 class TensionSolution:

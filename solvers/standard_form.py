@@ -41,6 +41,8 @@ class StandardForm(NamedTuple):
         Newtons per unit of s, (k,): smaller for larger weights.
     moving :
         Indices of the cables with a choice, (k,).
+    sigma :
+        What each row of Q s - b counts as a wrench error in newtons, up to one common factor, (r,).
     """
 
     Q: Array
@@ -51,6 +53,7 @@ class StandardForm(NamedTuple):
     origin: Array
     unit: Array
     moving: NDArray[np.intp]
+    sigma: Array
 
     def tensions(self, problem: TensionProblem, s: Array) -> Array:
         """Return the tensions [N] of s, shape (m,), moved inside the limits if rounding put them outside."""
@@ -87,4 +90,5 @@ def standard_form(problem: TensionProblem) -> StandardForm:
         origin=origin,
         unit=unit * scale,
         moving=moving,
+        sigma=sigma[:rank],
     )

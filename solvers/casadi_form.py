@@ -1,0 +1,166 @@
+"""Tension distribution inside a CasADi expression: `casadi_function`.
+
+CasADi is imported here and nowhere else in this room.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .problem import TensionProblem
+from .registry import solve
+from .sensitivity import derivatives
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["casadi_function"]
+
+Array = NDArray[np.float64]
+
+_INPUTS = ("A", "w", "t_min", "t_max")
+
+
+def casadi_function(
+    m: int,
+    n: int = 6,
+    t_ref: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    length: float | None = None,
+    name: str = "tensions",
+) -> "casadi.Function":
+    """Return the bounded quadratic program as a CasADi Function (A, w, t_min, t_max) -> t, with its derivative.
+
+    The tensions are those of method "soft-wrench" without rho: the optimum of "active-set" where w is available, else
+    the tensions of the nearest available wrench, so that an iterate of a nonlinear program always gets numbers. They do
+    give w only if `A @ t` is `w`: make that a constraint if it matters. Derivatives with respect to all four inputs are
+    exact; at kinks they are one-sided, see `sensitivity`. There are no second derivatives: give IPOPT
+    `{"ipopt.hessian_approximation": "limited-memory"}`.
+
+    It is a Python callback: it costs a `solve` per evaluation, cannot be turned into C code, and must be kept in a
+    variable as long as anything that calls it.
+
+    Parameters
+    ----------
+    m, n :
+        Numbers of cables and of wrench rows.
+    t_ref, weights, length :
+        As in `TensionProblem`.
+    name :
+        Name of the Function.
+
+    Returns
+    -------
+    :
+        Function with inputs A (n, m), w (n), t_min (m), t_max (m) and output t (m) [N]. Crossed limits or entries that
+        are not finite numbers give nan.
+
+    Raises
+    ------
+    InputError
+        If an argument is not what `TensionProblem` accepts.
+    """
+    for label, value in (("m", m), ("n", n)):
+        if not isinstance(value, int) or value < 1:
+            raise InputError(f"{label}: is {value!r}; accepted: a whole number from 1 up")
+    constants = {"t_ref": t_ref, "weights": weights, "length": length}
+    TensionProblem(np.zeros((n, m)), np.zeros(n), 0.0, 1.0, **constants)
+    return _callback(name, m, n, constants)
+
+
+def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.Function":
+    """Make the callback; its classes live here so that CasADi is imported on use only."""
+    import casadi as ca
+
+    shapes = [(n, m), (n, 1), (m, 1), (m, 1)]
+
+    def problem_of(arguments: Sequence[Any]) -> TensionProblem | None:
+        A, w, low, high = (argument.full() for argument in arguments[:4])
+        try:
+            return TensionProblem(A.reshape(n, m), w.ravel(), low.ravel(), high.ravel(), **constants)
+        except InputError:
+            return None
+
+    def tensions_of(problem: TensionProblem | None) -> Array:
+        tensions = None if problem is None else solve(problem, "soft-wrench").tensions
+        return np.full(m, np.nan) if tensions is None else tensions
+
+    class Jacobian(ca.Callback):
+        """Blocks dt / d(A, w, t_min, t_max), each (m, entries)."""
+
+        def __init__(self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]):
+            ca.Callback.__init__(self)
+            self._inputs, self._outputs = inputs, outputs
+            self.construct(name, dict(options))
+
+        def get_n_in(self) -> int:
+            return 5
+
+        def get_n_out(self) -> int:
+            return 4
+
+        def get_name_in(self, i: int) -> str:
+            return self._inputs[i]
+
+        def get_name_out(self, i: int) -> str:
+            return self._outputs[i]
+
+        def get_sparsity_in(self, i: int) -> ca.Sparsity:
+            # The fifth is the nominal output, which is computed again: it may be a stand-in without entries.
+            return ca.Sparsity.dense(*shapes[i]) if i < 4 else ca.Sparsity.dense(m, 1)
+
+        def get_sparsity_out(self, i: int) -> ca.Sparsity:
+            return ca.Sparsity.dense(m, shapes[i][0] * shapes[i][1])
+
+        def eval(self, arguments: Sequence[Any]) -> list[Array]:
+            problem = problem_of(arguments)
+            tensions = tensions_of(problem)
+            if problem is None or np.isnan(tensions).any():
+                return [np.full((m, rows * columns), np.nan) for rows, columns in shapes]
+            by = derivatives(problem, tensions)
+            # CasADi counts the entries of A down its columns.
+            return [by.A.transpose(0, 2, 1).reshape(m, n * m), by.w, by.t_min, by.t_max]
+
+    class Tensions(ca.Callback):
+        """The distribution."""
+
+        def __init__(self) -> None:
+            ca.Callback.__init__(self)
+            self._jacobians: list[Jacobian] = []
+            self.construct(name, {})
+
+        def get_n_in(self) -> int:
+            return 4
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_name_in(self, i: int) -> str:
+            return _INPUTS[i]
+
+        def get_name_out(self, i: int) -> str:
+            return "t"
+
+        def get_sparsity_in(self, i: int) -> ca.Sparsity:
+            return ca.Sparsity.dense(*shapes[i])
+
+        def get_sparsity_out(self, i: int) -> ca.Sparsity:
+            return ca.Sparsity.dense(m, 1)
+
+        def eval(self, arguments: Sequence[Any]) -> list[Array]:
+            return [tensions_of(problem_of(arguments))]
+
+        def has_jacobian(self, *_: Any) -> bool:
+            return True
+
+        def get_jacobian(
+            self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
+        ) -> ca.Function:
+            jacobian = Jacobian(name, inames, onames, opts)
+            self._jacobians.append(jacobian)
+            return jacobian
+
+    return Tensions()

@@ -1,0 +1,77 @@
+r"""Method "dykstra": alternating projections on the equations and on the limits.
+
+.. math::
+
+    y = x + Q^T (b - Q x), \qquad x^+ = P_{box}(y + p), \qquad p^+ = y + p - x^+
+
+Without the correction p the iterates reach some feasible point; with it, the one nearest to where they start.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .method import Method, Proposal
+from .standard_form import StandardForm
+
+__all__ = ["Dykstra"]
+
+# Stop when the projection on the equations moves s, of order one, by no more than this: then x is in both sets, and
+# stays. The change of p is that same distance (Birgin and Raydan 2005), so a standstill of x alone does not stop it.
+_STEP = 1e-11
+
+# How often to ask whether the gap between the two sets has become a proof that they do not meet.
+_CHECK = 50
+
+
+class Dykstra(Method):
+    """Projection of t_ref on the feasible tensions by alternating projections.
+
+    Existence: wherever the problem is feasible, in the limit. Converges to the same unique tensions as "active-set",
+    hence continuous; linearly once the cables at their limits are found, but it may stand still for long before. Stops
+    when the two projections agree to 1e-11 of the size of the tensions, when they prove that there is nothing, or after
+    `max_iter`: then the status is inaccurate and `residual` says how far it came. Cost: two matrix products an
+    iteration, tens to thousands of iterations. Outside the feasible set: a certificate.
+    """
+
+    name: ClassVar[str] = "dykstra"
+    guarantee: ClassVar[str] = (
+        "converges to the unique optimum, at no stated speed: inaccurate after max_iter; certificate if there are none"
+    )
+    source: ClassVar[str] = "M. Hassan, A. Khajepour, IEEE Trans. Robotics 24(3), 2008; R. Dykstra, JASA 78, 1983"
+    exact: ClassVar[bool] = False
+    continuous: ClassVar[bool] = True
+    seeks_reference: ClassVar[bool] = True
+    options: ClassVar[dict[str, str] | None] = {
+        "max_iter": "iterations at most, a number from 1 up; 50000 if not given"
+    }
+
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Project in turn from s = 0."""
+        max_iter = options.get("max_iter", 50_000)
+        if not isinstance(max_iter, int) or max_iter < 1:
+            raise InputError(f"max_iter: is {max_iter!r}; accepted: a whole number from 1 up")
+        Q, b, lower, upper = form.Q, form.b, form.lower, form.upper
+        x = np.minimum(np.maximum(lower, 0.0), upper)
+        p = -x
+        for iteration in range(1, max_iter + 1):
+            error = b - Q @ x
+            step = error @ Q
+            if step @ step <= _STEP**2:
+                return Proposal(x, iteration)
+            if iteration % _CHECK == 0 and _apart(form, error):
+                return Proposal(None, iteration, "the limits and the equations do not meet")
+            p += x + step
+            x = np.minimum(np.maximum(p, lower), upper)
+            p -= x
+        return Proposal(x, max_iter, f"not converged in {max_iter} iterations")
+
+
+def _apart(form: StandardForm, direction: NDArray[np.float64]) -> bool:
+    """Say if no s inside the limits reaches b along a direction, shape (r,)."""
+    pull = direction @ form.Q
+    pulling = np.abs(pull) > 1e-11 * np.abs(pull).max()
+    far = np.where(pull > 0.0, form.upper, form.lower)[pulling] @ pull[pulling]
+    return bool(direction @ form.b - far > 1e-8 * np.sqrt(direction @ direction))

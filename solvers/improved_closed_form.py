@@ -1,0 +1,51 @@
+"""Method "improved-closed-form": the closed form, repeated with the worst cable held at its limit."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .closed_form import middle, outside
+from .method import Method, Proposal
+from .standard_form import StandardForm
+from .tolerances import FEASIBILITY, RANK, ROUNDING
+
+__all__ = ["ImprovedClosedForm"]
+
+
+class ImprovedClosedForm(Method):
+    """Closed form in which cables beyond their limits are held there, one after the other.
+
+    Existence: better than the closed form, still not guaranteed: a cable that was held is never released (status failed
+    then, `detail` says where it stopped). Continuous as long as the same cables are held; where the choice of the worst
+    cable changes it may jump. Cost: at most m - rank + 1 pseudo-inverses. Outside the feasible set: a certificate. With
+    weights the worst cable is the one with the largest weighted excess.
+    """
+
+    name: ClassVar[str] = "improved-closed-form"
+    guarantee: ClassVar[str] = (
+        "at most m - rank + 1 pseudo-inverses; finds most but not all feasible distributions: failed on the others"
+    )
+    source: ClassVar[str] = "A. Pott, Advances in Robot Kinematics 2014, 'An improved force distribution algorithm'"
+    exact: ClassVar[bool] = False
+
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Hold the cable farthest outside its limits and distribute the rest again, until all are inside."""
+        s = middle(form)
+        free = np.ones(s.size, dtype=bool)
+        for reduction in range(s.size + 1):
+            left = form.b - form.Q @ s
+            s[free] += np.linalg.pinv(form.Q[:, free], rcond=RANK) @ left
+            error = form.b - form.Q @ s
+            if np.sqrt(error @ error) > FEASIBILITY * (1.0 + np.abs(s).max(initial=0.0)):
+                return Proposal(None, reduction + 1, f"no redundancy left after {reduction} cables were held")
+            if not outside(form, s):
+                # What is but rounding away from a limit is at it: a problem that asks for nothing has no tolerance.
+                s = np.where(np.abs(s - form.lower) < ROUNDING, form.lower, s)
+                return Proposal(np.where(np.abs(s - form.upper) < ROUNDING, form.upper, s), reduction + 1)
+            beyond = np.where(free, np.maximum(form.lower - s, s - form.upper), -np.inf)
+            worst = int(np.argmax(beyond))
+            s[worst] = form.lower[worst] if s[worst] < form.lower[worst] else form.upper[worst]
+            free[worst] = False
+            # The others start again from their middle, of which the next pseudo-inverse keeps nearest.
+            s = np.where(free, middle(form), s)
+        return Proposal(None, s.size, "every cable is held at a limit")

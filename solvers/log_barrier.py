@@ -1,0 +1,67 @@
+r"""Method "log-barrier": least squares to t_ref plus logarithms that keep the tensions off their limits.
+
+.. math::
+
+    \min_t \; \frac12 \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2
+    - \mu \sum_i \big( \log (t_i - t_{min,i}) + \log (t_{max,i} - t_i) \big)
+    \quad \text{s.t.} \quad A t = w
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import InputError
+from .barrier_newton import barrier_point
+from .method import Method, Proposal
+from .standard_form import StandardForm
+
+__all__ = ["LogBarrier", "start_in_form"]
+
+
+class LogBarrier(Method):
+    """Continuously differentiable distribution, strictly inside the limits.
+
+    Existence: wherever the feasible tensions have an interior; where they have none (w on the very boundary), the
+    nearest to t_ref. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where
+    a cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance
+    of about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: tens of
+    Newton steps from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set: a
+    certificate.
+    """
+
+    name: ClassVar[str] = "log-barrier"
+    guarantee: ClassVar[str] = (
+        "unique, strictly inside the limits, continuously differentiable; certificate if there are none"
+    )
+    source: ClassVar[str] = (
+        "in the spirit of E. Ueland, T. Sauder, R. Skjetne, IEEE Access 9, 2021; Boyd, Vandenberghe 2004"
+    )
+    exact: ClassVar[bool] = True
+    continuous: ClassVar[bool] = True
+    options: ClassVar[dict[str, str] | None] = {
+        "barrier": "square root of mu in units of the narrowest range t_max - t_min (of 1 N if there is none); 0.01 if "
+        "not given",
+        "start": "tensions to start from [N], shape (m,), say the last answer; they need not give w",
+    }
+
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Minimise by Newton's method."""
+        barrier = options.get("barrier", 0.01)
+        if not isinstance(barrier, float | int) or not 1e-6 <= barrier <= 1e6:
+            raise InputError(f"barrier: is {barrier!r}; accepted: a number from 1e-6 to 1e6")
+        ranges = (form.upper - form.lower) * form.unit
+        # Taken from the limits alone: with anything that depends on w the tensions would not be smooth in it.
+        narrowest = float(ranges[np.isfinite(ranges)].min(initial=np.inf))
+        root = barrier * (narrowest if np.isfinite(narrowest) else 1.0) / form.unit.min(initial=np.inf)
+        return barrier_point(form, 1.0, root**2, start_in_form(form, options.get("start")))
+
+
+def start_in_form(form: StandardForm, start: Any) -> Any:
+    """Return the tensions to start from as a point s, shape (k,), or None if there are none."""
+    if start is None:
+        return None
+    t = np.asarray(start)
+    if t.shape != form.origin.shape or t.dtype.kind not in "fiu" or not np.isfinite(t).all():
+        raise InputError(f"start: is {start!r}; accepted: {form.origin.size} finite tensions [N], one per cable")
+    return (t[form.moving] - form.origin[form.moving]) / form.unit

@@ -1,0 +1,108 @@
+r"""How far the required wrench is from the boundary of the available wrench set: `capacity_margin`.
+
+The available wrench set is a zonotope, the sum of one segment per cable. Each of its facets is parallel to rank - 1
+columns of A, so the normals are among the directions d orthogonal to rank - 1 columns, and the facet lies at the
+support value h(d): hyperplane shifting (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut 2010). No other direction of
+length one gives a smaller h(d) - d . w than the distance, so too many candidates do no harm, and degenerate ones
+neither.
+"""
+
+from itertools import combinations
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .problem import TensionProblem
+from .projection import project
+from .tolerances import NEGLIGIBLE, RANK
+
+__all__ = ["Margin", "capacity_margin"]
+
+Array = NDArray[np.float64]
+
+
+class Margin(NamedTuple):
+    """Signed distance of w to the boundary of the available wrench set.
+
+    Attributes
+    ----------
+    value :
+        The distance [N], moments divided by the problem's length: positive inside, negative outside.
+    gradient :
+        d value / d w, shape (n,): force entries are numbers, moment entries in 1/m. Where two facets are equally near
+        it is that of one of them; the value has a kink there.
+    direction :
+        Outward direction d to the nearest boundary point (inside) or from it to w (outside), shape (n,), in the form of
+        `Certificate.direction`. Then gradient = -direction. Zeros if there is no boundary.
+    """
+
+    value: float
+    gradient: Array  # (n,)
+    direction: Array  # (n,)
+
+
+def capacity_margin(problem: TensionProblem) -> Margin:
+    """Return the capacity margin of a wrench, its gradient and the direction of least reserve.
+
+    Outside, minus the value is the distance from w to the set: the certificate's shortfall (but for status singular,
+    where the certificate counts the part outside the range of A alone). Inside, every facet is looked at: all subsets
+    of rank - 1 of the cables with a choice, 56 for m = 8 and 792 for m = 12 with six equations.
+
+    If the set is flat (rank of the cables with a choice below n) it has no inside among all wrenches. Then a wrench in
+    the set, within `TensionProblem.tolerance`, has the margin measured inside the flat, among the wrenches that the
+    robot can give at all; one beside the flat is outside, with a negative value.
+
+    Parameters
+    ----------
+    problem :
+        The problem; its t_ref and weights play no part. Without a boundary (limits infinite in every direction) the
+        value is infinite, and 0 if the set is a single wrench.
+
+    Returns
+    -------
+    :
+        The margin.
+    """
+    closest, residual = project(problem)
+    distance = float(np.sqrt(residual @ residual))
+    if distance > problem.tolerance(closest):
+        return _margin(problem, -distance, residual / distance)
+    moving = problem.t_min < problem.t_max
+    columns = problem.scaled_A[:, moving]  # (n, k)
+    U, sigma, _ = np.linalg.svd(columns, full_matrices=False)
+    rank = int(np.count_nonzero(sigma > RANK * sigma[0])) if sigma.size else 0
+    if rank == 0:
+        return _margin(problem, 0.0, np.zeros(problem.n))
+    basis = U[:, :rank]  # (n, rank)
+    normals = _normals(basis.T @ columns) @ basis.T  # (candidates, n)
+    pull = normals @ problem.scaled_A  # (candidates, m)
+    pull[np.abs(pull) <= NEGLIGIBLE * problem.column_norms.max()] = 0.0
+    # Support value less demand, from where a point of the set is known: no tension is far from it.
+    with np.errstate(invalid="ignore"):
+        up = np.where(pull > 0.0, pull * (problem.t_max - closest), 0.0)
+        down = np.where(pull < 0.0, pull * (problem.t_min - closest), 0.0)
+    reserve = (up + down).sum(axis=1)
+    nearest = int(np.argmin(reserve))
+    if not np.isfinite(reserve[nearest]):
+        return _margin(problem, np.inf, np.zeros(problem.n))
+    return _margin(problem, float(reserve[nearest]), normals[nearest])
+
+
+def _margin(problem: TensionProblem, value: float, direction: Array) -> Margin:
+    in_rows = problem.row_scale * direction
+    return Margin(value, 0.0 - in_rows, in_rows)
+
+
+def _normals(columns: Array) -> Array:
+    """Return unit vectors orthogonal to each rank - 1 of the columns, both signs, shape (candidates, rank)."""
+    rank, k = columns.shape
+    subsets = np.array(list(combinations(range(k), rank - 1)), dtype=np.intp).reshape(comb(k, rank - 1), rank - 1)
+    chosen = np.zeros((subsets.shape[0], rank, rank))
+    # Columns of length one, so that a short one has a say in where its facet is.
+    lengths = np.linalg.norm(columns, axis=0)
+    unit = columns / np.where(lengths > 0.0, lengths, 1.0)
+    chosen[:, : rank - 1] = unit.T[subsets]
+    normals = np.linalg.svd(chosen)[2][:, -1]
+    return np.concatenate([normals, -normals])

@@ -1,0 +1,51 @@
+"""Tension-rate limits: tensions near the last ones, for every method."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .problem import TensionProblem
+
+__all__ = ["limit_rate"]
+
+
+def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike) -> TensionProblem:
+    """Narrow a problem's limits to what can be reached from the last tensions.
+
+    The result is a problem like any other, for every method: `solve(limit_rate(problem, last.tensions, 5.0))`. If it is
+    infeasible its certificate speaks of the narrowed limits. A cable whose last tension is so far outside its limits
+    that they cannot be reached goes as far towards them as it may.
+
+    Parameters
+    ----------
+    problem :
+        The problem with the limits of the cables themselves.
+    previous :
+        The last tensions [N], shape (m,).
+    rate_max :
+        By how much a tension may change from one call to the next [N], >= 0, shape (m,) or one number; a rate in N/s
+        times the time step.
+
+    Returns
+    -------
+    :
+        The same problem with both limits moved into previous - rate_max to previous + rate_max.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value.
+    """
+    at, step = _per_cable("previous", previous, problem.m), _per_cable("rate_max", rate_max, problem.m)
+    if not (step >= 0.0).all() or not np.isfinite(at).all():
+        wrong = f"rate_max: is {step.min():g}" if np.isfinite(at).all() else "previous: is not finite"
+        raise InputError(f"{wrong}; accepted: finite tensions and numbers >= 0 [N per call]")
+    lower, upper = (np.clip(limit, at - step, at + step) for limit in (problem.t_min, problem.t_max))
+    return TensionProblem(problem.A, problem.w, lower, upper, problem.t_ref, problem.weights, problem.length)
+
+
+def _per_cable(name: str, value: ArrayLike, m: int) -> NDArray[np.float64]:
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu" or array.shape not in ((), (m,)):
+        raise InputError(f"{name}: has shape {array.shape}, type {array.dtype}; accepted: ({m},) or one real number")
+    return np.broadcast_to(array.astype(np.float64), (m,))

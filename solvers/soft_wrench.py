@@ -1,0 +1,84 @@
+r"""Method "soft-wrench": tensions for any wrench whatever, the required one if it is available.
+
+.. math::
+
+    \min_t \; \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2 + \rho |S (A t - w)|^2
+    \quad \text{s.t.} \quad t_{min} \le t \le t_{max}
+
+For :math:`\rho \to \infty` this is: project w on the available wrench set, then take the least squares to t_ref that
+give the projection.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .box_least_squares import box_least_squares
+from .direct_daqp import bounded_least_norm
+from .method import Method, Proposal
+from .standard_form import StandardForm
+
+__all__ = ["SoftWrench"]
+
+# How much the limits may give way, in units of s, until least squares on the boundary of the available wrench set finds
+# something there despite rounding.
+_ROOM = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
+
+
+class SoftWrench(Method):
+    """Tensions inside the limits whose wrench is w or, where that is out of reach, as near to it as can be.
+
+    Existence: always. Without `rho`: where w is available the tensions are those of "active-set" and the status is
+    optimal; elsewhere their wrench is the available one nearest to w (moments divided by the problem's length), the
+    status is inaccurate, `residual` is the distance and the certificate is there. Lipschitz in w everywhere, across the
+    boundary too: a projection is, and so is least squares inside limits. With `rho` the wrench gives way before the
+    limits force it to, by about the cost's gradient / rho: smoother, and the status is inaccurate nearly everywhere,
+    with a certificate only where w is out of reach. Lipschitz in w, and in the wrench matrix too. Cost: two active-set
+    solves, one with `rho`.
+    """
+
+    name: ClassVar[str] = "soft-wrench"
+    guarantee: ClassVar[str] = (
+        "always tensions, Lipschitz in w: the optimum if w is available, else the nearest wrench and a certificate"
+    )
+    source: ClassVar[str] = "A. F. Côté, P. Cardou, C. Gosselin, Mechatronics 2016, slack form"
+    exact: ClassVar[bool] = True
+    continuous: ClassVar[bool] = True
+    always_answers: ClassVar[bool] = True
+    options: ClassVar[dict[str, str] | None] = {
+        "rho": "weight of the squared wrench error beside the squared tensions, 1e-12 to 1e12; infinite if not given"
+    }
+
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Minimise over the box; without rho, first the wrench error, then the distance to t_ref."""
+        rho = options.get("rho")
+        if rho is None:
+            return _nearest_wrench(form)
+        if not isinstance(rho, float | int) or not 1e-12 <= rho <= 1e12:
+            raise InputError(f"rho: is {rho!r}; accepted: a number from 1e-12 to 1e12, or None for infinite")
+        root = np.sqrt(rho) * form.sigma
+        k = form.lower.size
+        s, _ = box_least_squares(
+            np.vstack([root[:, None] * form.Q, np.eye(k)]), np.r_[root * form.b, np.zeros(k)], form.lower, form.upper
+        )
+        return Proposal(s, final=True)
+
+
+def _nearest_wrench(form: StandardForm) -> Proposal:
+    """Give b if that can be, else the available b nearest to it in newtons, with the least norm."""
+
+    def least_norm(b: NDArray[np.float64], room: float) -> Proposal:
+        upper, lower = np.append(form.upper + room, b), np.append(form.lower - room, b)
+        return bounded_least_norm(upper, lower, form.Q, equalities=b.size)
+
+    exact = least_norm(form.b, 0.0)
+    if exact.s is not None:
+        return exact
+    nearest, _ = box_least_squares(form.sigma[:, None] * form.Q, form.sigma * form.b, form.lower, form.upper)
+    for room in _ROOM:
+        found = least_norm(form.Q @ nearest, room)
+        if found.s is not None:
+            return found
+    return Proposal(nearest)

@@ -1,0 +1,421 @@
+"""Each method against what it claims: status, optimality, continuity; agreement where theory says they agree."""
+
+import re
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from towline.errors import InputError
+from towline.solvers import TensionProblem, certify, limit_rate, methods, solve
+
+from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
+from .references import optimum_by_enumeration
+
+# The methods that test_solvers does not take through the zoo already.
+NEW = [name for name in methods() if name not in ("active-set", "qp", "min-norm")]
+ALWAYS_FIND = [name for name in NEW if methods()[name].exact]
+CLOSED = ("closed-form", "improved-closed-form")
+
+# Feasible problems to which a method has no answer, by its docstring.
+CENTRELESS = {"no limits at all", "no upper limit"}
+DECLINED = {
+    "centroid": CENTRELESS,
+    "analytic-centre": CENTRELESS,
+    "least-sum": {"no limits at all"},
+    "largest-margin": CENTRELESS,
+    "min-max": {"no limits at all"},
+}
+
+
+@pytest.mark.parametrize("method", NEW)
+def test_the_zoo_is_told_apart_or_declined_as_documented(method):
+    failed = []
+    for name, (problem, status) in ZOO.items():
+        solution = solve(problem, method)
+        if status != "optimal":
+            assert solution.certificate is not None
+            assert solution.certificate.verify(problem)
+            assert (solution.status == "inaccurate") if method == "soft-wrench" else (solution.status == status), name
+        elif solution.feasible:
+            assert solution.residual <= problem.tolerance(solution.tensions)
+            assert solution.bound_violation == 0.0
+            assert solution.certificate is None
+        else:
+            assert solution.status == "failed", name
+            assert solution.detail
+            assert solution.certificate is None
+            failed.append(name)
+    if method not in CLOSED:
+        assert set(failed) <= DECLINED.get(method, set())
+
+
+@pytest.mark.parametrize("method", NEW)
+def test_every_feasible_problem_is_solved_by_methods_that_say_so(method):
+    rng = np.random.default_rng(31)
+    counts = {"optimal": 0, "failed": 0}
+    for k in range(80):
+        problem = random_feasible(rng, 3 + k % 8)
+        counts[solve(problem, method).status] += 1
+    if method in ALWAYS_FIND or method == "dykstra":
+        assert counts["failed"] == 0
+    else:
+        assert counts["optimal"] >= (60 if method == "improved-closed-form" else 30)
+    for k in range(40):
+        problem = random_infeasible(rng, 3 + k % 8)
+        solution = solve(problem, method)
+        assert not solution.feasible
+        assert solution.certificate.shortfall == certify(problem).shortfall
+
+
+def inner_problem(rng, m, **wish):
+    """A problem with tensions well inside the limits."""
+    A = geometric_matrix(rng, m)
+    return TensionProblem(A, A @ rng.uniform(5, 50, m), T_MIN, T_MAX, **wish)
+
+
+def best_along(problem, gradient):
+    """Least gradient . t among the feasible tensions, by linear program."""
+    bounds = np.column_stack([problem.t_min, problem.t_max])
+    answer = linprog(gradient, A_eq=problem.A, b_eq=problem.w, bounds=bounds, method="highs")
+    assert answer.status == 0
+    return answer.fun
+
+
+def test_methods_that_solve_the_same_problem_agree():
+    rng = np.random.default_rng(32)
+    same = [("2-norm", {}), ("dykstra", {}), ("soft-wrench", {}), ("p-norm", {"p": 2})]
+    for k in range(40):
+        m = 6 + k % 5
+        problem = inner_problem(rng, m, t_ref=rng.uniform(0, 60, m), weights=10.0 ** rng.uniform(-1, 1, m))
+        expected = solve(problem).tensions
+        for method, options in same:
+            found = solve(problem, method, **options).tensions
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * T_MAX, err_msg=method)
+        sums = {method: solve(problem, method).tensions.sum() for method in ("1-norm", "least-sum")}
+        assert sums["1-norm"] == pytest.approx(sums["least-sum"], rel=1e-8)
+        assert sums["1-norm"] == pytest.approx(best_along(problem, np.ones(m)), rel=1e-6)
+
+
+def test_one_norm_counts_negative_tensions_as_tensions():
+    rng = np.random.default_rng(33)
+    for m in (7, 8, 9, 10):
+        A = geometric_matrix(rng, m)
+        problem = TensionProblem(A, A @ rng.uniform(-20, 20, m), -30, 30)
+        doubled = linprog(np.ones(2 * m), A_eq=np.hstack([A, -A]), b_eq=problem.w, bounds=(0, 30), method="highs")
+        assert np.abs(solve(problem, "1-norm").tensions).sum() == pytest.approx(doubled.fun, rel=1e-7)
+
+
+def test_linear_programs_reach_the_optimum_of_a_plain_formulation():
+    rng = np.random.default_rng(34)
+    for k in range(20):
+        m = 7 + k % 3
+        problem = inner_problem(rng, m, weights=10.0 ** rng.uniform(-1, 1, m))
+        equal = {"A_eq": np.hstack([problem.A, np.zeros((6, 1))]), "b_eq": problem.w, "method": "highs"}
+        one, bounds = np.ones((m, 1)), [(None, None)] * (m + 1)
+        last = np.r_[np.zeros(m), 1.0]
+        box = np.r_[np.full(m, T_MAX), np.full(m, -T_MIN)]
+        safe = linprog(-last, A_ub=np.block([[np.eye(m), one], [-np.eye(m), one]]), b_ub=box, bounds=bounds, **equal)
+        t = solve(problem, "largest-margin").tensions
+        assert min((t - T_MIN).min(), (T_MAX - t).min()) == pytest.approx(-safe.fun, rel=1e-6)
+        low = linprog(
+            last, A_ub=np.hstack([np.eye(m), -one]), b_ub=np.zeros(m), bounds=[(T_MIN, T_MAX)] * m + bounds[:1], **equal
+        )
+        assert solve(problem, "min-max").tensions.max() == pytest.approx(low.fun, rel=1e-6)
+
+
+@pytest.mark.parametrize("p", [3, 4, 8])
+def test_p_norm_is_optimal(p):
+    """No feasible direction goes down: the gradient's best feasible point is the answer itself."""
+    rng = np.random.default_rng(35)
+    for k in range(20):
+        m = 7 + k % 3
+        problem = inner_problem(rng, m, t_ref=30.0 * (k % 2), weights=10.0 ** rng.uniform(-1, 1, m))
+        t = solve(problem, "p-norm", p=p).tensions
+        apart = np.sqrt(problem.weights) * (t - problem.t_ref)
+        size = np.abs(apart).max()
+        gradient = np.sqrt(problem.weights) * np.sign(apart) * np.abs(apart / size) ** (p - 1)
+        assert gradient @ t - best_along(problem, gradient) <= 1e-6 * (np.abs(gradient) @ np.abs(t))
+
+
+def test_barrier_methods_are_stationary_and_strictly_inside():
+    rng = np.random.default_rng(36)
+    for k in range(20):
+        m = 7 + k % 4
+        problem = inner_problem(rng, m, t_ref=rng.uniform(0, 60, m))
+        null = np.linalg.svd(problem.A)[2][6:]
+        for method, mu in (("log-barrier", (0.01 * (T_MAX - T_MIN)) ** 2), ("analytic-centre", 1.0)):
+            t = solve(problem, method).tensions
+            assert (t > T_MIN).all()
+            assert (t < T_MAX).all()
+            pull = mu * (1 / (T_MAX - t) - 1 / (t - T_MIN))
+            gradient = pull if method == "analytic-centre" else t - problem.t_ref + pull
+            assert np.abs(null @ gradient).max() <= 1e-7 * np.abs(gradient).max()
+
+
+def test_log_barrier_tends_to_the_least_squares_as_its_weight_falls():
+    rng = np.random.default_rng(37)
+    for m in (7, 8, 10):
+        problem = inner_problem(rng, m)
+        expected = solve(problem).tensions
+        apart = [np.abs(solve(problem, "log-barrier", barrier=b).tensions - expected).max() for b in (1e-1, 1e-2, 1e-3)]
+        assert apart[0] > apart[1] > apart[2]
+        assert apart[2] < 1e-2
+
+
+def test_a_warm_start_saves_newton_steps():
+    rng = np.random.default_rng(38)
+    A, t = geometric_matrix(rng, 8), rng.uniform(5, 50, 8)
+    for method in ("log-barrier", "analytic-centre"):
+        cold, warm, last = [], [], None
+        for phase in np.linspace(0, 1, 40):
+            problem = TensionProblem(A, A @ (t + 4 * np.sin(6 * phase + np.arange(8))), T_MIN, T_MAX)
+            first = solve(problem, method)
+            cold.append(first.iterations)
+            if last is not None:
+                again = solve(problem, method, start=last)
+                warm.append(again.iterations)
+                np.testing.assert_allclose(again.tensions, first.tensions, rtol=0, atol=1e-7)
+            last = first.tensions
+        print(method, "Newton steps, cold and warm:", np.median(cold), np.median(warm))
+        assert np.median(warm) < np.median(cold)
+
+
+def test_the_centroid_of_shapes_that_everybody_knows():
+    for m in (1, 2, 3, 4, 5, 6):  # a simplex, of dimension m - 1
+        t = solve(TensionProblem(np.ones((1, m)), [3.0], 0, 60), "centroid").tensions
+        np.testing.assert_allclose(t, 3.0 / m, rtol=1e-9)
+    for pairs in (1, 2, 3, 4):  # a box: each pair pulls against itself
+        A = np.kron(np.eye(pairs), [[1.0, -1.0]])
+        t = solve(TensionProblem(A, np.full(pairs, 2.0), 1, 9, weights=range(1, 2 * pairs + 1)), "centroid").tensions
+        np.testing.assert_allclose(t, np.tile([6.0, 4.0], pairs), rtol=1e-9)
+    # No wish: where it is symmetric, the origin is nothing special.
+    t = solve(TensionProblem([[1.0, -1.0]], [0.0], -1, 9), "centroid").tensions
+    np.testing.assert_allclose(t, 4.0)
+
+
+def test_the_centroid_of_a_polygon_is_the_mean_of_its_points():
+    rng = np.random.default_rng(39)
+    for _ in range(5):
+        problem = inner_problem(rng, 8)
+        null = np.linalg.svd(problem.A)[2][6:]
+        particular = np.linalg.lstsq(problem.A, problem.w, rcond=None)[0]
+        # Tile the polygon's bounding box.
+        ends = [[best_along(problem, sign * row) * sign for sign in (1, -1)] for row in null]
+        edges = [np.linspace(low, high, 801) for low, high in ends]
+        x, y = np.meshgrid(*[(edge[1:] + edge[:-1]) / 2 for edge in edges])
+        points = np.column_stack([x.ravel(), y.ravel()]) @ null + particular
+        points = points[((points >= T_MIN) & (points <= T_MAX)).all(axis=1)]
+        found = solve(problem, "centroid").tensions
+        np.testing.assert_allclose(found, points.mean(axis=0), rtol=0, atol=5e-3 * np.ptp(points, axis=0).max())
+
+
+def test_the_closed_form_is_the_pseudo_inverse_about_the_middle_and_its_improvement_finds_more():
+    rng = np.random.default_rng(40)
+    found = dict.fromkeys(CLOSED, 0)
+    for k in range(100):
+        problem = random_feasible(rng, 7 + k % 3)
+        middle = np.full(problem.m, (T_MIN + T_MAX) / 2)
+        expected = middle + np.linalg.pinv(problem.A) @ (problem.w - problem.A @ middle)
+        inside = (expected >= T_MIN).all() and (expected <= T_MAX).all()
+        for method in CLOSED:
+            solution = solve(problem, method)
+            found[method] += solution.feasible
+            if inside:
+                np.testing.assert_allclose(solution.tensions, expected, rtol=0, atol=1e-8)
+            if not solution.feasible:
+                assert solution.status == "failed"
+                assert solution.detail
+        assert solve(problem, "closed-form").feasible is bool(inside)
+    print("found of 100:", found)
+    assert found["improved-closed-form"] > found["closed-form"]
+
+
+def test_soft_wrench_gives_the_nearest_wrench_with_the_least_norm():
+    rng = np.random.default_rng(41)
+    for k in range(60):
+        problem = random_infeasible(rng, 4 + k % 6)
+        solution = solve(problem, "soft-wrench")
+        assert solution.status == "inaccurate"
+        if not solution.certificate.singular:
+            assert solution.residual == pytest.approx(solution.certificate.shortfall, rel=1e-6)
+        if k < 12 and problem.m <= 6:
+            given = problem.A @ solution.tensions
+            least = optimum_by_enumeration(problem.A, given, problem.t_min - 1e-7, problem.t_max + 1e-7)
+            np.testing.assert_allclose(solution.tensions, least, rtol=0, atol=1e-3)
+
+
+def test_soft_wrench_with_a_weight_minimises_the_sum():
+    rng = np.random.default_rng(42)
+    for rho in (1e-2, 1.0, 1e3):
+        problem = inner_problem(rng, 8, t_ref=rng.uniform(0, 60, 8))
+        solution = solve(problem, "soft-wrench", rho=rho)
+        assert solution.status == "inaccurate"
+        assert solution.certificate is None
+        t = solution.tensions
+        gradient = t - problem.t_ref + rho * problem.A.T @ (problem.A @ t - problem.w)
+        free = (t > T_MIN) & (t < T_MAX)
+        assert np.abs(gradient[free]).max() <= 1e-8 * max(1.0, rho) * T_MAX
+        assert (gradient[t == T_MIN] >= 0).all()
+        assert (gradient[t == T_MAX] <= 0).all()
+
+
+class Motion:
+    """Attachments, cable directions and tensions that give w, all moving smoothly; feasible throughout."""
+
+    def __init__(self, seed, m):
+        rng = np.random.default_rng(seed)
+        self.points = rng.uniform(-1, 1, (2, 3, m)), rng.normal(size=(2, 3, m))
+        self.levels = rng.uniform(5, 50, m), rng.uniform(-4, 4, m)
+        self.phases = rng.uniform(0, 2 * np.pi, m)
+
+    def at(self, time):
+        (r0, r1), (u0, u1) = self.points
+        r, u = r0 + 0.2 * np.sin(time) * r1, u0 + 0.4 * np.sin(time + 1.0) * u1
+        u = u / np.linalg.norm(u, axis=0)
+        A = np.vstack([u, np.cross(r, u, axis=0)])
+        t = self.levels[0] + self.levels[1] * np.sin(2 * time + self.phases)
+        return TensionProblem(A, A @ t, T_MIN, T_MAX)
+
+
+def jump(function, instants=33, halvings=10):
+    """Largest change of a function that halving the step does not halve, relative to the coarse one: about 1 at a jump.
+
+    The three steps with the largest change are bisected, always into the half that changes more. Where the function is
+    continuous with bounded slope the last change is about 2^-halvings of the slope times the step.
+    """
+    times = np.linspace(0, 2, instants)
+    values = [function(time) for time in times]
+    changes = [np.abs(b - a).max() for a, b in pairwise(values)]
+    worst = 0.0
+    for k in np.argsort(changes)[-3:]:
+        (a, fa), (b, fb) = (times[k], values[k]), (times[k + 1], values[k + 1])
+        for _ in range(halvings):
+            middle = (a + b) / 2
+            value = function(middle)
+            if np.abs(value - fa).max() > np.abs(fb - value).max():
+                b, fb = middle, value
+            else:
+                a, fa = middle, value
+        worst = max(worst, np.abs(fb - fa).max() / max(changes))
+    return worst
+
+
+CONTINUOUS = [name for name, method in methods().items() if method.continuous]
+
+
+@pytest.mark.parametrize("method", CONTINUOUS)
+def test_methods_that_claim_continuity_do_not_jump(method):
+    def tensions(time):
+        return solve(motion.at(time), method).tensions
+
+    worst = 0.0
+    for seed in range(20):
+        motion = Motion(seed, m=6 + seed % 4 if seed % 5 else 8)
+        worst = max(worst, jump(tensions, halvings=10))
+    print(f"{method}: largest change left after 10 halvings {worst:.1e} of the largest step")
+    assert worst <= 0.05
+
+
+def test_the_continuity_test_can_see():
+    """Linear programs do jump as the cables turn; one of twenty motions shows it."""
+    jumps = []
+    for seed in range(20):
+        motion = Motion(seed, m=8)
+        jumps.append(jump(lambda time: solve(motion.at(time), "1-norm").tensions))
+    assert max(jumps) > 0.3
+
+
+def test_soft_wrench_does_not_jump_as_the_wrench_leaves_the_set():
+    seen = set()
+    A = geometric_matrix(np.random.default_rng(7), 8)
+    for seed in range(20):
+        outside = 3.0 * Motion(seed, 8).at(0.0).w
+        inside = A @ np.random.default_rng(seed).uniform(5, 50, 8)
+
+        def tensions(time, inside=inside, outside=outside):
+            solution = solve(TensionProblem(A, inside + time * (outside - inside), T_MIN, T_MAX), "soft-wrench")
+            seen.add(str(solution.status))
+            return solution.tensions
+
+        assert jump(tensions) <= 0.05
+    assert seen == {"optimal", "inaccurate"}
+
+
+@pytest.mark.parametrize(
+    ("method", "smooth"), [("log-barrier", True), ("analytic-centre", True), ("active-set", False)]
+)
+def test_barrier_methods_have_a_continuous_derivative_and_least_squares_has_not(method, smooth):
+    options = {"barrier": 0.05} if method == "log-barrier" else {}
+    h = 1e-5
+
+    def slope(time):
+        ahead, behind = (solve(motion.at(time + step), method, **options).tensions for step in (h, -h))
+        return (ahead - behind) / (2 * h)
+
+    jumps = []
+    for seed in range(20):
+        motion = Motion(seed, m=7 + seed % 2)
+        jumps.append(jump(slope, instants=21, halvings=12))
+    print(f"{method}: largest change of the derivative left after 12 halvings {max(jumps):.1e}")
+    assert max(jumps) <= 0.05 if smooth else max(jumps) > 0.1
+
+
+def test_rate_limits_hold_for_every_method():
+    rng = np.random.default_rng(43)
+    problem = inner_problem(rng, 8)
+    last = solve(problem).tensions
+    moved = TensionProblem(problem.A, problem.w + problem.A @ rng.uniform(-0.3, 0.3, 8), T_MIN, T_MAX)
+    limited = limit_rate(moved, last, 0.5)
+    for method in methods():
+        solution = solve(limited, method)
+        if method in CLOSED and not solution.feasible:
+            continue
+        assert solution.feasible, method
+        assert np.abs(solution.tensions - last).max() <= 0.5 + 1e-12
+    far = TensionProblem(problem.A, problem.A @ (last + 2.0), T_MIN, T_MAX + 10)
+    assert solve(far).feasible
+    assert solve(limit_rate(far, last, 0.5)).certificate is not None
+    assert solve(limit_rate(far, last, np.inf)).tensions == pytest.approx(solve(far).tensions)
+    # Tensions that were outside the limits come back as fast as they may.
+    back = limit_rate(TensionProblem([[1.0, -1.0]], [0.0], 1, 10), [15, -3], 2)
+    assert (back.t_min.tolist(), back.t_max.tolist()) == ([13, -1], [13, -1])
+    for wrong, message in (((last, -1), "rate_max: is -1"), ((last[:3], 1), r"previous: has shape \(3,\)")):
+        with pytest.raises(InputError, match=message):
+            limit_rate(problem, *wrong)
+
+
+@pytest.mark.parametrize(
+    ("method", "options", "message"),
+    [
+        ("p-norm", {"p": 1}, "p: is 1; accepted: a number from 2 to 20"),
+        ("dykstra", {"max_iter": 0}, "max_iter: is 0; accepted: a whole number"),
+        ("log-barrier", {"barrier": "big"}, "barrier: is 'big'; accepted: a number"),
+        ("log-barrier", {"start": [1, 2]}, r"start: is \[1, 2\]; accepted: 8 finite tensions"),
+        ("soft-wrench", {"rho": -1}, "rho: is -1; accepted: a number"),
+        ("centroid", {"p": 4}, "options: 'p' is unknown; accepted: none"),
+    ],
+)
+def test_wrong_options_are_told(method, options, message):
+    with pytest.raises(InputError, match=message):
+        solve(inner_problem(np.random.default_rng(44), 8), method, **options)
+
+
+def test_dykstra_says_how_far_it_came():
+    rng = np.random.default_rng(45)
+    problem = inner_problem(rng, 8, t_ref=[-50, 0, 0, 200, 0, 9, 90, 10])
+    rough = solve(problem, "dykstra", max_iter=3)
+    assert rough.status == "inaccurate"
+    assert "3 iterations" in rough.detail
+    assert rough.residual > 0
+
+
+def test_the_page_on_adding_a_method_works():
+    page = (Path(__file__).parent.parent / "docs" / "adding-a-method.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["optimal", "inaccurate", "infeasible"], done.stderr
