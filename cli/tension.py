@@ -73,6 +73,7 @@ def _problem(
 
 def _show(robot: Robot, at: dict[str, Any], answer: TensionSolution, methods: dict[str, TensionSolution]) -> None:
     from rich.console import Console
+    from rich.measure import Measurement
     from rich.table import Table
 
     # One row a method: there are more of them than cables.
@@ -87,7 +88,10 @@ def _show(robot: Robot, at: dict[str, Any], answer: TensionSolution, methods: di
     table.add_row("t_max", *(f"{limit:g}" for limit in robot.t_max), "", "")
     pose = ", ".join(f"{value:g}" for value in at["pose"])
     typer.echo(f"{robot.name} at ({pose}): {answer.status.value.upper()}")
-    Console().print(table)
+    console = Console()
+    # A number cut to fit a narrow terminal would be another number: rather let lines wrap.
+    whole = Measurement.get(console, console.options.update(max_width=1000), table).maximum
+    Console(width=max(console.width, whole)).print(table)
     if answer.tensions is not None:
         typer.echo(f"residual {answer.residual:.2e} N")
     if answer.certificate is not None:
