@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.ticker import MaxNLocator
 
 
-def draw(trajectory: xr.Dataset, folder: Path, prefix: str = "") -> list[Path]:
+def draw(trajectory: xr.Dataset, folder: Path) -> list[Path]:
     """Draw all figures of a plan's dataset into `folder`, and return their paths."""
     pictures = {"path": path(trajectory), "tensions": tensions(trajectory), "base": base_offset(trajectory)}
-    return [style.save(picture, folder / f"{prefix}{name}.png") for name, picture in pictures.items()]
+    return [style.save(picture, folder / f"{name}.png") for name, picture in pictures.items()]
 
 
 def path(trajectory: xr.Dataset) -> Figure:
