@@ -18,6 +18,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from .cables.elastic import axial_stiffness, unstrained_length
 from .cables.pulley import exit_points
 from .robot import Robot
 from .rotation import Matrix, rotation
@@ -48,8 +49,8 @@ def tension_stiffness(robot: Robot, pose: Matrix, anchor_points: Matrix, axes: M
 def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) -> Matrix:
     """Sum of k_i a_i a_i^T, (6, 6), in {G} about the CoM [N/m, N, N m], of the cables that pull."""
     EA = ca.DM([cable.stiffness or np.inf for cable in robot.cables])
-    # E A / L0 with the unstrained length L0 = l / (1 + t / E A); a slack cable has no stiffness
-    k = ca.if_else(tensions > 0, (EA + tensions) / lengths, 0)
+    k = axial_stiffness(EA, unstrained_length(lengths, tensions, EA))
+    k = ca.if_else(tensions > 0, k, 0)  # a slack cable has no stiffness
     return A @ ca.diag(k) @ A.T
 
 
