@@ -8,6 +8,7 @@ from .barrier_newton import barrier_point
 from .log_barrier import start_in_form
 from .method import Method, Proposal
 from .standard_form import StandardForm
+from .tolerances import RANK
 
 __all__ = ["AnalyticCentre"]
 
@@ -16,9 +17,10 @@ class AnalyticCentre(Method):
     """Analytic centre of the feasible tensions.
 
     Existence: wherever the feasible tensions have an interior and are bounded; where they have no interior (w on the
-    very boundary), the nearest to t_ref; failed if they are unbounded. A smooth function of A (of constant rank), w and
-    the limits; t_ref and weights play no part. Like "centroid" without its geometry: any m - rank costs the same, tens
-    of Newton steps, few from the last answer (`start`). Outside the feasible set: a certificate.
+    very boundary), the nearest to t_ref; failed if they are unbounded. Cables without any limit have no say in it. A
+    smooth function of A (of constant rank), w and the limits; t_ref and weights play no part. Like "centroid" without
+    its geometry: any m - rank costs the same, about ten Newton steps, few from the last answer (`start`). Outside the
+    feasible set: a certificate.
     """
 
     name: ClassVar[str] = "analytic-centre"
@@ -35,6 +37,28 @@ class AnalyticCentre(Method):
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Minimise the logarithms alone."""
         start = start_in_form(form, options.get("start"))
-        if (np.isinf(form.lower) & np.isinf(form.upper)).any():
-            return Proposal(None, detail="a cable without limits has no centre", final=True)
-        return barrier_point(form, 0.0, 1.0, start)
+        limited = np.isfinite(form.lower) | np.isfinite(form.upper)
+        if limited.all():
+            return barrier_point(form, 0.0, 1.0, start)
+        # Cables without limits have no say in the centre: they give what the others leave, in one way if it is bounded.
+        unlimited = form.Q[:, ~limited]
+        U, sigma, _ = np.linalg.svd(unlimited)
+        if sigma.size < unlimited.shape[1] or sigma.min(initial=1.0) <= RANK:
+            return Proposal(None, detail="the feasible tensions are unbounded: no centre", final=True)
+        rest = U[:, sigma.size :].T
+        V, size, Wt = np.linalg.svd(rest @ form.Q[:, limited])
+        rank = int(np.count_nonzero(size > RANK))
+        reduced = form._replace(
+            Q=Wt[:rank],
+            N=Wt[rank:],
+            b=(V[:, :rank].T @ (rest @ form.b)) / size[:rank],
+            lower=form.lower[limited],
+            upper=form.upper[limited],
+        )
+        found = barrier_point(reduced, 0.0, 1.0, None if start is None else start[limited])
+        if found.s is None:
+            return found
+        s = np.zeros(form.lower.size)
+        s[limited] = found.s
+        s[~limited] = np.linalg.lstsq(unlimited, form.b - form.Q @ s, rcond=RANK)[0]
+        return found._replace(s=s)

@@ -5,9 +5,11 @@ r"""Newton's method for a point inside the limits: least of a square and logarit
     \min_s \; \frac{c}{2} |s|^2 - \mu \sum_i \big( \log (s_i - lower_i) + \log (upper_i - s_i) \big)
     \quad \text{s.t.} \quad Q s = b
 
-The infeasible-start Newton method (Boyd and Vandenberghe 2004, section 10.3) needs no point that gives w to begin with,
-so the last answer along a motion will do. Should it get stuck, a linear program finds a point to start from, from where
-damped steps cannot fail: the function is self-concordant.
+Far from the answer the plain Newton method crawls along the limits: with w not met yet, or with weights that differ by
+thousands, hundreds of short steps. So primal-dual steps (Wright 1997, chapter 5), in which each distance to a limit has
+a multiplier of its own, lead from any point, the last answer along a motion if there is one, to where plain Newton
+steps converge at once. Should they get stuck, a linear program finds a point to start from, from where damped steps
+cannot fail: the function is self-concordant (Boyd and Vandenberghe 2004, section 9.6).
 """
 
 import numpy as np
@@ -21,17 +23,29 @@ __all__ = ["barrier_point"]
 
 Array = NDArray[np.float64]
 
-_STEPS = 60
+_STEPS = 50
 _DAMPED_STEPS = 300
 
 # Squared Newton decrement, in units of mu, below which the next full step would change nothing that counts.
-_CONVERGED = 1e-22
+_CONVERGED = 1e-18
 
-# Error in Q s = b that is rounding.
-_ON_PLANE = 1e-14
+# Error in Q s = b from which on plain Newton steps take over.
+_ON_PLANE = 1e-10
+
+# How far, relative to mu, the products of distance and multiplier may be from mu when plain Newton steps take over.
+_CENTRED = 0.5
+
+# By how much one step may lower the products of distance and multiplier, on their way to mu.
+_REDUCTION = 0.05
 
 # Of the way to the nearest limit, what a step may go.
 _FRACTION = 0.99
+
+# A distance to a limit, in units of s, that rounding may turn into none.
+_NO_ROOM = 1e-13
+
+# In units of s, which is of order one: a minimiser out here means that there is none.
+_FAR = 1e9
 
 
 def barrier_point(form: StandardForm, square: float, mu: float, start: Array | None) -> Proposal:
@@ -48,17 +62,21 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
     start :
         Where to begin, shape (k,), anywhere; None = in the middle of the limits.
     """
-    s = _pulled_inside(form, start)
-    found, used = _infeasible_start(form, square, mu, s)
-    if found is not None:
-        return Proposal(found, used)
-    s = _interior_point(form)
-    if s is None:
+    if not form.lower.size:
+        return Proposal(np.zeros(0))
+    near, used = _primal_dual(form, square, mu, _pulled_inside(form, start), warm=start is not None)
+    if near is not None:
+        found, more = _damped(form, square, mu, near)
+        used += more
+        if found is not None:
+            return Proposal(found, used)
+    inner = _interior_point(form)
+    if inner is None:
         return Proposal(None, used, "the feasible tensions have no interior")
-    found, more = _damped(form, square, mu, s)
-    if found is None:
+    found, more = _damped(form, square, mu, inner)
+    if found is None and square == 0.0:
         return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", final=True)
-    return Proposal(found, used + more)
+    return Proposal(found, used + more, "" if found is not None else f"not converged in {_DAMPED_STEPS} Newton steps")
 
 
 def _pulled_inside(form: StandardForm, start: Array | None) -> Array:
@@ -80,62 +98,86 @@ def _slopes(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Arr
     return square * s + mu * (above - below), square + mu * (above**2 + below**2)
 
 
-def _newton_step(form: StandardForm, gradient: Array, hessian: Array, error: Array) -> tuple[Array, Array]:
-    """Return the step, (k,), and the multipliers after it, (r,)."""
+def _newton_step(form: StandardForm, gradient: Array, hessian: Array, error: Array) -> Array:
+    """Return the step, (k,)."""
     root = 1.0 / np.sqrt(hessian)
-    M = form.Q * root  # (r, k)
-    # M^T has full column rank; its QR loses half the digits that M M^T would.
-    orthogonal, triangle = np.linalg.qr(M.T)
     scaled = gradient * root
-    y = np.linalg.solve(triangle.T, error) if error.size else error
-    along = orthogonal @ (y + orthogonal.T @ scaled)
-    multipliers = -np.linalg.solve(triangle, y + orthogonal.T @ scaled) if error.size else error
-    return root * (along - scaled), np.asarray(multipliers, dtype=np.float64)
+    if not error.size:
+        return -root * scaled
+    # M^T has full column rank; its QR loses half the digits that M M^T would.
+    orthogonal, triangle = np.linalg.qr((form.Q * root).T)  # M = Q root, (r, k)
+    along = orthogonal @ (np.linalg.solve(triangle.T, error) + orthogonal.T @ scaled)
+    return root * (along - scaled)
 
 
-def _infeasible_start(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array | None, int]:
-    """Take Newton steps on the optimality conditions, halved until their error falls."""
-    multipliers = np.zeros(form.b.size)
-
-    def error_at(s: Array, multipliers: Array) -> float:
-        gradient, _ = _slopes(form, square, mu, s)
-        dual, primal = gradient + multipliers @ form.Q, form.Q @ s - form.b
-        return float(np.sqrt(dual @ dual / mu + primal @ primal))
-
+def _primal_dual(form: StandardForm, square: float, mu: float, s: Array, warm: bool) -> tuple[Array | None, int]:
+    """Return a point inside the limits and on Q s = b near the minimiser, or None if it does not come near."""
+    below, above = s - form.lower, form.upper - s
+    limits = int(np.isfinite(below).sum() + np.isfinite(above).sum())
+    # Cold, distances and multipliers are taken as those of a much larger mu, from which it falls step by step.
+    product = mu if warm or not limits else max(mu, square * float(np.abs(s).max()) ** 2, 1e-2)
+    at_lower, at_upper = product / below, product / above
     for iteration in range(_STEPS):
-        gradient, hessian = _slopes(form, square, mu, s)
         left = form.b - form.Q @ s
-        step, target = _newton_step(form, gradient, hessian, left)
-        if step @ (hessian * step) <= _CONVERGED * mu and left @ left <= _ON_PLANE**2:
-            return s + step, iteration
-        length = min(1.0, _FRACTION * _way_to_limits(form, s, step))
-        now = error_at(s, multipliers)
-        for _ in range(40):
-            ahead = s + length * step, multipliers + length * (target - multipliers)
-            if error_at(*ahead) <= (1.0 - 0.01 * length) * now or now < 1e-12:
-                break
-            length *= 0.5
-        else:
-            # Rounding is all that is left, or nothing leads on from here.
-            done = step @ (hessian * step) <= 1e-16 * mu and left @ left <= 1e-24
-            return (s + step if done else None), iteration
-        s, multipliers = ahead
+        target = max(mu, _REDUCTION * product)
+        gradient = square * s - target / below + target / above
+        with np.errstate(invalid="ignore"):
+            curve_low, curve_high = np.nan_to_num(at_lower / below), np.nan_to_num(at_upper / above)
+        step = _newton_step(form, gradient, square + curve_low + curve_high, left)
+        change_low = target / below - at_lower - curve_low * step
+        change_high = target / above - at_upper + curve_high * step
+        length = min(1.0, _FRACTION * min(_way_to_limits(form, s, step), _way_to_zero(at_lower, change_low)))
+        length = min(length, _FRACTION * _way_to_zero(at_upper, change_high))
+        s = s + length * step
+        at_lower, at_upper = at_lower + length * change_low, at_upper + length * change_high
+        below, above = s - form.lower, form.upper - s
+        room = min(float(below.min(initial=np.inf)), float(above.min(initial=np.inf)))
+        if not (np.abs(s).max(initial=0.0) < _FAR and room > _NO_ROOM):
+            return None, iteration + 1
+        with np.errstate(invalid="ignore"):
+            products = np.concatenate([at_lower * below, at_upper * above])
+        products = products[np.isfinite(products)]
+        product = float(products.sum() / limits) if limits else mu
+        error = form.b - form.Q @ s
+        if error @ error <= _ON_PLANE**2 and np.abs(products - mu).max(initial=0.0) <= _CENTRED * mu:
+            return s, iteration + 1
     return None, _STEPS
 
 
 def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array | None, int]:
-    """Take damped Newton steps from a point inside that gives w: always downhill, never outside."""
+    """Take Newton steps from a point inside that gives w: always downhill, never outside."""
     for iteration in range(_DAMPED_STEPS):
         gradient, hessian = _slopes(form, square, mu, s)
-        left = form.b - form.Q @ s
-        step, _ = _newton_step(form, gradient, hessian, left)
+        step = _newton_step(form, gradient, hessian, form.b - form.Q @ s)
         decrement = float(np.sqrt(step @ (hessian * step) / mu))
-        if decrement**2 <= max(_CONVERGED, 1e-18):
+        if decrement**2 <= _CONVERGED:
             # One step more costs nothing and squares the error.
             return s + step, iteration
-        length = 1.0 if decrement < 0.25 else 1.0 / (1.0 + decrement)
-        s = s + min(length, _FRACTION * _way_to_limits(form, s, step)) * step
+        if not np.abs(s).max(initial=0.0) < _FAR:
+            return None, iteration
+        length = min(1.0, _FRACTION * _way_to_limits(form, s, step))
+        if decrement > 0.25:
+            # 1 / (1 + decrement) always lowers the function; often much more does.
+            now = _value(form, square, mu, s)
+            while (
+                length > 1.0 / (1.0 + decrement)
+                and _value(form, square, mu, s + length * step) > now - 0.1 * length * decrement**2 * mu
+            ):
+                length *= 0.5
+        s = s + length * step
     return None, _DAMPED_STEPS
+
+
+def _value(form: StandardForm, square: float, mu: float, s: Array) -> float:
+    """Return the function that is minimised, but for a constant."""
+    distances = np.concatenate([s - form.lower, form.upper - s])
+    return 0.5 * square * float(s @ s) - mu * float(np.log(distances[np.isfinite(distances)]).sum())
+
+
+def _way_to_zero(values: Array, change: Array) -> float:
+    """Return how many changes it is until the first of the positive values is zero."""
+    falling = change < 0.0
+    return float((values[falling] / -change[falling]).min(initial=np.inf))
 
 
 def _way_to_limits(form: StandardForm, s: Array, step: Array) -> float:

@@ -1,4 +1,4 @@
-"""Method "centroid": the centre of gravity of the feasible tensions."""
+"""Method "centroid": the centre of gravity of the feasible tensions, which the field calls barycentric."""
 
 from typing import Any, ClassVar
 
@@ -8,21 +8,26 @@ from .standard_form import StandardForm
 
 __all__ = ["Centroid"]
 
+# Largest m - rank that is taken: the hull of the corners takes 0.2 ms in three dimensions, 7 ms in five, 0.25 s in six
+# and minutes in eight.
+_MOST = 5
+
 
 class Centroid(Method):
-    """Barycentre of the feasible polygon; of the interval for m - rank = 1, of the polytope beyond 2.
+    """Barycentric distribution: the centroid of the feasible polygon.
 
-    Existence: wherever the problem is feasible and the feasible tensions are bounded; failed if they are unbounded (a
-    missing limit). With w on the very boundary and m - rank > 2 it is the nearest to t_ref instead. Continuous while
-    the feasible tensions have an interior, and where they shrink to a point. Far from the limits: the safest choice
-    against slack, at the price of high tensions. Cost: pairs of lines for a polygon; Qhull and a linear program beyond
-    m - rank = 2, which is slow. Outside the feasible set: a certificate. The centroid is that of the tensions
-    themselves whatever t_ref and weights.
+    Of the interval for m - rank = 1, of the polytope for 3 to 5. Existence: wherever the problem is feasible and the
+    feasible tensions are bounded; failed if they are unbounded (a missing limit), and at once if m - rank > 5. With w
+    on the very boundary and m - rank > 2 it is the nearest to t_ref instead. Continuous while the feasible tensions
+    have an interior, and where they shrink to a point. Far from the limits: the safest choice against slack, at the
+    price of high tensions. Cost: pairs of lines for a polygon; Qhull and a linear program, 2 ms to 10 ms, beyond.
+    Outside the feasible set: a certificate. The centroid is that of the tensions themselves whatever t_ref and weights.
     """
 
     name: ClassVar[str] = "centroid"
     guarantee: ClassVar[str] = (
-        "the centroid of the feasible tensions, continuous; failed if they are unbounded, certificate if there are none"
+        "barycentric: the centroid of the feasible tensions, continuous; failed if they are unbounded or m - rank > 5, "
+        "certificate if there are none"
     )
     source: ClassVar[str] = (
         "L. Mikelsons et al., ICRA 2008; J. Lamaury, M. Gouttefarde, Cable-Driven Parallel Robots 2013"
@@ -32,6 +37,10 @@ class Centroid(Method):
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Take the centroid of the corners in the null space."""
+        freedom = form.N.shape[0]
+        if freedom > _MOST:
+            told = f"m - rank is {freedom}, and a centroid is costly beyond {_MOST}; analytic-centre takes any"
+            return Proposal(None, detail=told, final=True)
         points = corners(form)
         if points is None:
             return Proposal(None, detail="the feasible tensions have no centroid: unbounded", final=True)

@@ -160,7 +160,9 @@ def optimise(
         **inequalities,
     )
     if answer.x is None or answer.status != 0:
-        return Proposal(None, detail=f"highs: {answer.message}", final=answer.status in _UNBOUNDED)
+        unbounded = answer.status in _UNBOUNDED
+        told = "no limit bounds what is optimised" if unbounded else f"highs: {answer.message}"
+        return Proposal(None, detail=told, final=unbounded)
     return Proposal(_on_the_equations(form, answer.x[:k]), int(answer.nit))
 
 

@@ -25,9 +25,9 @@ class LogBarrier(Method):
     Existence: wherever the feasible tensions have an interior; where they have none (w on the very boundary), the
     nearest to t_ref. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where
     a cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance
-    of about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: tens of
-    Newton steps from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set: a
-    certificate.
+    of about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: about
+    ten Newton steps from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set:
+    a certificate.
     """
 
     name: ClassVar[str] = "log-barrier"
