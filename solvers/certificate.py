@@ -19,7 +19,7 @@ from .problem import TensionProblem
 from .projection import project
 from .tolerances import NEGLIGIBLE, RANK
 
-__all__ = ["Certificate", "certify"]
+__all__ = ["Certificate", "certificate_along", "certify"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -146,6 +146,17 @@ def certify(problem: TensionProblem) -> Certificate | None:
     return _certificate(problem, residual, closest)
 
 
+def certificate_along(problem: TensionProblem, direction: Array) -> Certificate | None:
+    """Return the certificate along a direction, shape (n,), of any length, or None if it proves nothing.
+
+    Its shortfall is a lower bound of the distance to the available wrench set, and `closest` the nearest tensions that
+    the projection found.
+    """
+    vector = direction / problem.row_scale
+    size = float(np.sqrt(vector @ vector))
+    return _along(problem, vector / size, project(problem)[0]) if 0.0 < size < np.inf else None
+
+
 def _numbers(values: NDArray[Any], decimals: int) -> str:
     return ", ".join(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)
 
@@ -160,9 +171,12 @@ def _outside_range(problem: TensionProblem) -> Array | None:
 def _certificate(problem: TensionProblem, vector: Array, closest: Array) -> Certificate | None:
     """Make the certificate along a scaled wrench `vector` [N], or None if it proves nothing."""
     size = np.sqrt(vector @ vector)
-    if size <= problem.tolerance(closest):
-        return None
-    direction = problem.row_scale * (vector / size)
+    return None if size <= problem.tolerance(closest) else _along(problem, vector / size, closest)
+
+
+def _along(problem: TensionProblem, unit: Array, closest: Array) -> Certificate | None:
+    """Make the certificate along a scaled direction of length one, or None if it proves nothing."""
+    direction = problem.row_scale * unit
     support, at_max, at_min = _support(problem, direction)
     demand = float(direction @ problem.w)
     certificate = Certificate(

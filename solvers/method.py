@@ -77,6 +77,13 @@ class Method(ABC):
         """
         return None
 
+    def direction(self, problem: TensionProblem) -> NDArray[np.float64] | None:
+        """Return the direction, shape (n,), on which "infeasible" or "singular" of `attempt` rests.
+
+        It is asked for only where `certify` finds none.
+        """
+        return None
+
     @abstractmethod
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Choose s with Q s = b and lower <= s <= upper."""
