@@ -27,6 +27,7 @@ from .qp import QuadraticProgram
 from .soft_wrench import SoftWrench
 from .solution import Status, TensionSolution
 from .standard_form import StandardForm, standard_form
+from .tolerances import DOUBTFUL
 
 __all__ = ["methods", "solve"]
 
@@ -93,12 +94,14 @@ def solve(
     if not isinstance(problem, TensionProblem):
         raise InputError(f"problem: is a {type(problem).__name__}; accepted: a TensionProblem")
     form = standard_form(problem)
-    nothing_to_find = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
-    at_origin = Proposal(np.zeros(form.moving.size))
-    proposal = (
-        at_origin if nothing_to_find and chosen.seeks_reference else chosen.propose(form, used_backend, **options)
-    )
-    verdict = _judge(problem, form, chosen, proposal)
+    proposal, verdict = None, None
+    if form.sigma.size and form.sigma[-1] <= DOUBTFUL * form.sigma[0]:
+        coarse = standard_form(problem, DOUBTFUL)
+        proposal = _propose(chosen, coarse, used_backend, options)
+        verdict = _accept(problem, coarse, proposal)
+    if proposal is None or verdict is None:
+        proposal = _propose(chosen, form, used_backend, options)
+        verdict = _accept(problem, form, proposal) or _explain(problem, form, chosen, proposal)
     return TensionSolution(
         problem,
         verdict.tensions,
@@ -119,11 +122,23 @@ class _Verdict(NamedTuple):
     detail: str = ""
 
 
-def _judge(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict:
-    """Decide what a proposal is worth: tensions that give w, else a verified certificate, else what is left."""
+def _propose(method: Method, form: StandardForm, backend: str | None, options: dict[str, Any]) -> Proposal:
+    """Ask the method, unless its answer is t_ref and that will do."""
+    at_reference = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
+    if at_reference and method.seeks_reference:
+        return Proposal(np.zeros(form.moving.size))
+    return method.propose(form, backend, **options)
+
+
+def _accept(problem: TensionProblem, form: StandardForm, proposal: Proposal) -> _Verdict | None:
+    """Return the verdict on tensions that give w, else None."""
     tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-    if tensions is not None and _gives_wrench(problem, tensions):
-        return _Verdict(Status.OPTIMAL, tensions)
+    return _Verdict(Status.OPTIMAL, tensions) if tensions is not None and _gives_wrench(problem, tensions) else None
+
+
+def _explain(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict:
+    """Decide what a proposal that does not give w is worth: a verified certificate, else what is left."""
+    tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
     certificate = certify(problem)
     if certificate is not None and method.always_answers and tensions is not None:
         return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)

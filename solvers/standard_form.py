@@ -62,8 +62,16 @@ class StandardForm(NamedTuple):
         return np.minimum(np.maximum(t, problem.t_min), problem.t_max)
 
 
-def standard_form(problem: TensionProblem) -> StandardForm:
-    """Bring a problem to standard form, by singular value decomposition of its scaled wrench matrix."""
+def standard_form(problem: TensionProblem, cut: float = RANK) -> StandardForm:
+    """Bring a problem to standard form, by singular value decomposition of its scaled wrench matrix.
+
+    Parameters
+    ----------
+    problem :
+        The problem.
+    cut :
+        Singular values below this part of the largest count as zero.
+    """
     apart = problem.t_min < problem.t_max
     origin = np.where(apart, problem.t_ref, problem.t_min)
     moving = np.flatnonzero(apart)
@@ -73,7 +81,7 @@ def standard_form(problem: TensionProblem) -> StandardForm:
     wrench = problem.scaled_w - problem.scaled_A @ origin
 
     U, sigma, Vt = np.linalg.svd(matrix)
-    rank = int(np.count_nonzero(sigma > RANK * sigma[0])) if sigma.size else 0
+    rank = int(np.count_nonzero(sigma > cut * sigma[0])) if sigma.size else 0
     b = (U[:, :rank].T @ wrench) / sigma[:rank]
 
     lower = (problem.t_min[moving] - origin[moving]) / unit

@@ -1,6 +1,6 @@
 """The numbers by which this room judges, in one place. All are relative and have no unit."""
 
-__all__ = ["FEASIBILITY", "NEGLIGIBLE", "RANK", "ROUNDING"]
+__all__ = ["DOUBTFUL", "FEASIBILITY", "NEGLIGIBLE", "RANK", "ROUNDING"]
 
 # Wrench error that still counts as none, relative to what the problem asks (see `TensionProblem.tolerance`). Tensions
 # are called optimal only below it and a certificate is believed only above it, so the two answers cannot both be given.
@@ -11,6 +11,11 @@ ROUNDING = 1e-13
 
 # Singular values below this part of the largest count as zero.
 RANK = 1e-12
+
+# Directions with singular values between RANK and this part of the largest are asked for only if w would be missed
+# without them: geometry written with twelve digits makes them out of nothing, and tensions that serve them serve the
+# rounding. It is below the pivots of which `kernel` is sure, so that the kernel leaves such problems alone.
+DOUBTFUL = 1e-10
 
 # A cable pulls along a direction d only if |d . a_i| exceeds this part of the largest column norm. Smaller products are
 # rounding: times an infinite tension limit they would void every certificate. It is larger than RANK, so that a

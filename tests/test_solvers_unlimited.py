@@ -158,3 +158,23 @@ def test_a_wrench_out_of_reach_is_told_by_a_certificate_whatever_the_method_refu
         solution = solve(problem, method)
         assert solution.certificate is not None, method
         assert solution.certificate.verify(problem)
+
+
+@pytest.mark.parametrize("cables", [4, 5, 6])
+@pytest.mark.parametrize("length", [1.0, 0.058])
+def test_the_rounding_of_a_robot_file_does_not_choose_the_tensions(cables, length):
+    """A load below the centre of a regular polygon, in numbers of twelve digits: the tensions are equal by symmetry.
+
+    Cable lines meet in one point but for rounding, which makes singular values of 1e-12 instead of 0.
+    """
+    angles = 2 * np.pi * np.arange(cables) / cables + 0.3
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(cables)])
+    r, top = np.round(0.057735026919 * ring, 12), np.round(1.08 * ring + [[0.0], [0.0], [0.8]], 12)
+    u = (top - r) / np.linalg.norm(top - r, axis=0)
+    weight = [0, 0, 98.1, 0, 0, 0]
+    problem = TensionProblem(np.vstack([u, np.cross(r, u, axis=0)]), weight, 0, 500, length=length)
+    for name in methods():
+        if name in ("least-sum", "1-norm"):
+            continue  # many tensions have the same sum
+        tensions = solve(problem, name).tensions
+        np.testing.assert_allclose(tensions, 98.1 / u[2].sum(), rtol=1e-7, err_msg=name)
