@@ -3,6 +3,7 @@
 CasADi is imported here and nowhere else in this room.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from .inputs import shown, whole_number
 from .problem import TensionProblem
 from .registry import solve
 from .sensitivity import derivatives
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["casadi_function"]
 
 Array = NDArray[np.float64]
+
+_MOST = 1000  # cables or wrench rows
 
 _INPUTS = ("A", "w", "t_min", "t_max")
 
@@ -63,9 +67,9 @@ def casadi_function(
     InputError
         If an argument is not what `TensionProblem` accepts.
     """
-    for label, value in (("m", m), ("n", n)):
-        if not isinstance(value, int) or value < 1:
-            raise InputError(f"{label}: is {value!r}; accepted: a whole number from 1 up")
+    m, n = whole_number("m", m, 1, _MOST), whole_number("n", n, 1, _MOST)
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9]|_(?!_))*", name):
+        raise InputError(f"name: is {shown(name)}; accepted: a letter, then letters, digits and single underscores")
     constants = {"t_ref": t_ref, "weights": weights, "length": length}
     TensionProblem(np.zeros((n, m)), np.zeros(n), 0.0, 1.0, **constants)
     return _callback(name, m, n, constants)

@@ -30,7 +30,8 @@ class Centroid(Method):
         "certificate if there are none"
     )
     source: ClassVar[str] = (
-        "L. Mikelsons et al., ICRA 2008; J. Lamaury, M. Gouttefarde, Cable-Driven Parallel Robots 2013"
+        "L. Mikelsons et al., ICRA 2008; J. Lamaury, M. Gouttefarde, Cable-Driven Parallel Robots 2013; "
+        "M. Gouttefarde, J. Lamaury, C. Reichert, T. Bruckmann, IEEE Trans. Robotics 31(6), 2015"
     )
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs import required
 from .problem import TensionProblem
 from .projection import project
 from .tolerances import NEGLIGIBLE, RANK
@@ -75,6 +76,7 @@ class Certificate:
         Nothing is believed but the direction: support, demand and binding cables are computed again and compared.
         False means that it proves nothing, not that the problem is feasible.
         """
+        required("problem", problem, TensionProblem)
         if self.direction.shape != (problem.n,) or self.closest.shape != (problem.m,):
             return False
         unit = self.direction / problem.row_scale
@@ -137,7 +139,7 @@ def certify(problem: TensionProblem) -> Certificate | None:
     :
         A verified certificate. None means that w is available within the tolerance.
     """
-    closest, residual = project(problem)
+    closest, residual = project(required("problem", problem, TensionProblem))
     outside = _outside_range(problem)
     if outside is not None:
         certificate = _certificate(problem, outside, closest)

@@ -36,7 +36,10 @@ class ClosedForm(Method):
     guarantee: ClassVar[str] = (
         "one matrix product, smooth in w; may leave the limits though the problem is feasible: then failed"
     )
-    source: ClassVar[str] = "A. Pott, T. Bruckmann, L. Mikelsons, Computational Kinematics 2009"
+    source: ClassVar[str] = (
+        "A. Pott, T. Bruckmann, L. Mikelsons, 'Closed-form force distribution for parallel wire robots', "
+        "Computational Kinematics 2009"
+    )
     exact: ClassVar[bool] = False
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

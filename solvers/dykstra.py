@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from .inputs import whole_number
 from .method import Method, Proposal
 from .standard_form import StandardForm
 from .tolerances import RANK
@@ -61,9 +61,7 @@ class Dykstra(Method):
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Project in turn from s = 0."""
-        max_iter = options.get("max_iter", 50_000)
-        if not isinstance(max_iter, int) or max_iter < 1:
-            raise InputError(f"max_iter: is {max_iter!r}; accepted: a whole number from 1 up")
+        max_iter = whole_number("max_iter", options.get("max_iter", 50_000), 1, 10**9)
         Q, b, lower, upper = form.Q, form.b, form.lower, form.upper
         x = np.minimum(np.maximum(lower, 0.0), upper)
         p = -x

@@ -25,7 +25,10 @@ class ImprovedClosedForm(Method):
     guarantee: ClassVar[str] = (
         "at most m - rank + 1 pseudo-inverses; finds most but not all feasible distributions: failed on the others"
     )
-    source: ClassVar[str] = "A. Pott, Advances in Robot Kinematics 2014, 'An improved force distribution algorithm'"
+    source: ClassVar[str] = (
+        "A. Pott, 'An improved force distribution algorithm for over-constrained cable-driven parallel robots', "
+        "Computational Kinematics (CK 2013), 2014"
+    )
     exact: ClassVar[bool] = False
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

@@ -39,7 +39,7 @@ class LeastSum(Method):
     name: ClassVar[str] = "least-sum"
     guarantee: ClassVar[str] = "the least sum of tensions, of these the nearest to t_ref; may jump as cables turn"
     source: ClassVar[str] = (
-        "S. Fang et al., IEEE/ASME Trans. Mechatronics 9(2), 2004; "
+        "S. Fang et al., IEEE/ASME Trans. Mechatronics 9(3), 2004; "
         "HiGHS: Q. Huangfu, J. Hall, Math. Prog. Comp. 10, 2018"
     )
     exact: ClassVar[bool] = True
@@ -98,7 +98,7 @@ class MinMax(Method):
 
     name: ClassVar[str] = "min-max"
     guarantee: ClassVar[str] = "the least largest tension, of these the nearest to t_ref; may jump as cables turn"
-    source: ClassVar[str] = "the infinity norm of C. Gosselin, M. Grenier, Meccanica 46, 2011, as a linear program"
+    source: ClassVar[str] = "the infinity norm of C. Gosselin, M. Grenier, Meccanica 46(1), 2011, as a linear program"
     exact: ClassVar[bool] = True
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

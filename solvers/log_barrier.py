@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from .barrier_newton import barrier_point
+from .inputs import number, shown
 from .method import Method, Proposal
 from .standard_form import StandardForm
 
@@ -35,7 +36,8 @@ class LogBarrier(Method):
         "unique, strictly inside the limits, continuously differentiable; certificate if there are none"
     )
     source: ClassVar[str] = (
-        "in the spirit of E. Ueland, T. Sauder, R. Skjetne, IEEE Access 9, 2021; Boyd, Vandenberghe 2004"
+        "in the spirit of E. Ueland, T. Sauder, R. Skjetne, 'Optimal force allocation for overconstrained cable-driven "
+        "parallel robots: continuously differentiable solutions', IEEE Trans. Robotics 37(2), 2021"
     )
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
@@ -47,9 +49,7 @@ class LogBarrier(Method):
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Minimise by Newton's method."""
-        barrier = options.get("barrier", 0.01)
-        if not isinstance(barrier, float | int) or not 1e-6 <= barrier <= 1e6:
-            raise InputError(f"barrier: is {barrier!r}; accepted: a number from 1e-6 to 1e6")
+        barrier = number("barrier", options.get("barrier", 0.01), 1e-6, 1e6)
         ranges = (form.upper - form.lower) * form.unit
         # Taken from the limits alone: with anything that depends on w the tensions would not be smooth in it.
         narrowest = float(ranges[np.isfinite(ranges)].min(initial=np.inf))
@@ -61,7 +61,10 @@ def start_in_form(form: StandardForm, start: Any) -> Any:
     """Return the tensions to start from as a point s, shape (k,), or None if there are none."""
     if start is None:
         return None
-    t = np.asarray(start)
+    try:
+        t = np.asarray(start)
+    except (ValueError, TypeError, OverflowError):
+        t = np.zeros(0, dtype=object)
     if t.shape != form.origin.shape or t.dtype.kind not in "fiu" or not np.isfinite(t).all():
-        raise InputError(f"start: is {start!r}; accepted: {form.origin.size} finite tensions [N], one per cable")
+        raise InputError(f"start: is {shown(start)}; accepted: {form.origin.size} finite tensions [N], one per cable")
     return (t[form.moving] - form.origin[form.moving]) / form.unit

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .inputs import required
 from .problem import TensionProblem
 from .projection import project
 from .tolerances import NEGLIGIBLE, RANK
@@ -65,7 +66,7 @@ def capacity_margin(problem: TensionProblem) -> Margin:
     :
         The margin.
     """
-    closest, residual = project(problem)
+    closest, residual = project(required("problem", problem, TensionProblem))
     distance = float(np.sqrt(residual @ residual))
     if distance > problem.tolerance(closest):
         return _margin(problem, -distance, residual / distance)

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from .direct_daqp import bounded_least_norm
+from .inputs import number
 from .method import Method, Proposal
 from .standard_form import StandardForm
 
@@ -41,7 +41,7 @@ class PNorm(Method):
 
     name: ClassVar[str] = "p-norm"
     guarantee: ClassVar[str] = "the unique optimum, continuous; no tensions and a certificate if there are none"
-    source: ClassVar[str] = "C. Gosselin, M. Grenier, Meccanica 46, 2011; R. Verhoeven, thesis, Duisburg 2004"
+    source: ClassVar[str] = "C. Gosselin, M. Grenier, Meccanica 46(1), 2011; R. Verhoeven, thesis, Duisburg 2004"
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
@@ -49,9 +49,7 @@ class PNorm(Method):
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Take Newton steps, each a quadratic program, from the least-squares solution."""
-        p = options.get("p", 4)
-        if not isinstance(p, float | int) or not 2 <= p <= 20:
-            raise InputError(f"p: is {p!r}; accepted: a number from 2 to 20")
+        p = number("p", options.get("p", 4), 2, 20)
         first = bounded_least_norm(
             np.concatenate([form.upper, form.b]), np.concatenate([form.lower, form.b]), form.Q, equalities=form.b.size
         )

@@ -15,7 +15,7 @@ __all__ = ["OneNorm", "TwoNorm"]
 
 Array = NDArray[np.float64]
 
-_SOURCE = "J. Lamaury, M. Gouttefarde, Cable-Driven Parallel Robots 2013"
+_SOURCE = "M. Gouttefarde, J. Lamaury, C. Reichert, T. Bruckmann, IEEE Trans. Robotics 31(6), 2015"
 _EMPTY = "the lines of the limits enclose nothing"
 
 # Corners whose norms differ by less, relative to the largest tension among them, count as equally good.

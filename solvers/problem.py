@@ -164,6 +164,8 @@ class TensionProblem:
         tensions :
             The tensions to judge [N], shape (m,).
         """
+        if not isinstance(tensions, np.ndarray) or tensions.shape != self.t_min.shape or tensions.dtype != np.float64:
+            tensions = _per_cable("tensions", tensions, self.m)
         nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
         asked = np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero)
         return float(FEASIBILITY * asked + ROUNDING * (self.column_norms @ (np.abs(tensions) + np.abs(self.t_ref))))

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from .inputs import required
 from .problem import TensionProblem
 
 __all__ = ["limit_rate"]
@@ -36,6 +37,7 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
     InputError
         If an argument has a wrong type, shape or value.
     """
+    required("problem", problem, TensionProblem)
     at, step = _per_cable("previous", previous, problem.m), _per_cable("rate_max", rate_max, problem.m)
     if not (step >= 0.0).all() or not np.isfinite(at).all():
         wrong = f"rate_max: is {step.min():g}" if np.isfinite(at).all() else "previous: is not finite"
@@ -45,7 +47,12 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
 
 
 def _per_cable(name: str, value: ArrayLike, m: int) -> NDArray[np.float64]:
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):
+        raise InputError(
+            f"{name}: is no array (rows of unequal length?); accepted: ({m},) or one real number"
+        ) from None
     if array.dtype.kind not in "fiu" or array.shape not in ((), (m,)):
         raise InputError(f"{name}: has shape {array.shape}, type {array.dtype}; accepted: ({m},) or one real number")
     return np.broadcast_to(array.astype(np.float64), (m,))

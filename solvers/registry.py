@@ -16,6 +16,7 @@ from .closed_form import ClosedForm
 from .direct_daqp import Daqp
 from .dykstra import Dykstra
 from .improved_closed_form import ImprovedClosedForm
+from .inputs import required, shown
 from .linear_programs import LargestMargin, LeastSum, MinMax
 from .log_barrier import LogBarrier
 from .method import Method, Proposal
@@ -86,13 +87,18 @@ def solve(
         If there is no such method, back end or option; the message lists those that there are.
     """
     start = time.perf_counter()
-    if method == "active-set" and backend is None and not options and type(problem) is TensionProblem:
+    if (
+        isinstance(method, str)
+        and method == "active-set"
+        and backend is None
+        and not options
+        and type(problem) is TensionProblem
+    ):
         answer = _ACTIVE_SET.attempt(problem)
         if answer is not None:
             return TensionSolution(problem, answer[1], answer[0], "active-set", None, time.perf_counter() - start)
     chosen, used_backend = _lookup(method, backend, options)
-    if not isinstance(problem, TensionProblem):
-        raise InputError(f"problem: is a {type(problem).__name__}; accepted: a TensionProblem")
+    required("problem", problem, TensionProblem)
     form = standard_form(problem)
     proposal, verdict = None, None
     if form.sigma.size and form.sigma[-1] <= DOUBTFUL * form.sigma[0]:
@@ -163,13 +169,13 @@ def _lookup(name: str | Method, backend: str | None, options: dict[str, Any]) ->
     elif isinstance(name, str) and name in _METHODS:
         method = _METHODS[name]
     else:
-        raise InputError(f"method: {name!r} is unknown; accepted: {', '.join(_METHODS)}")
+        raise InputError(f"method: {shown(name)} is unknown; accepted: {', '.join(_METHODS)}")
     available = method.backends()
     if backend is None:
         backend = next(iter(available), None)
-    elif backend not in available:
+    elif not isinstance(backend, str) or backend not in available:
         accepted = ", ".join(available) or f"None, since method {method.name} has no back ends"
-        raise InputError(f"backend: {backend!r} is not installed; accepted: {accepted}")
+        raise InputError(f"backend: {shown(backend)} is not installed; accepted: {accepted}")
     if method.options is not None:
         unknown = [key for key in options if key not in method.options]
         if unknown:

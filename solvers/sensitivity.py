@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .inputs import required
 from .problem import TensionProblem
 from .solution import TensionSolution
 
@@ -73,9 +74,14 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     Raises
     ------
     InputError
-        If the solution has no tensions.
+        If an argument is something else, or the solution has no tensions or those of another number of cables.
     """
-    return derivatives(problem, _tensions(solution)).w
+    tensions = _tensions(required("solution", solution, TensionSolution))
+    if tensions.size != required("problem", problem, TensionProblem).m:
+        raise InputError(
+            f"solution: has {tensions.size} tensions; accepted: {problem.m}, one for each cable of problem"
+        )
+    return derivatives(problem, tensions).w
 
 
 def derivatives(problem: TensionProblem, tensions: Array) -> Derivatives:

@@ -14,9 +14,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from .box_least_squares import box_least_squares
 from .direct_daqp import bounded_least_norm
+from .inputs import number
 from .method import Method, Proposal
 from .standard_form import StandardForm
 
@@ -43,7 +43,10 @@ class SoftWrench(Method):
     guarantee: ClassVar[str] = (
         "always tensions, Lipschitz in w: the optimum if w is available, else the nearest wrench and a certificate"
     )
-    source: ClassVar[str] = "A. F. Côté, P. Cardou, C. Gosselin, Mechatronics 2016, slack form"
+    source: ClassVar[str] = (
+        "A. F. Côté, P. Cardou, C. Gosselin, 'A tension distribution algorithm for cable-driven parallel robots "
+        "operating beyond their wrench-feasible workspace', ICCAS 2016, slack form"
+    )
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
     always_answers: ClassVar[bool] = True
@@ -56,9 +59,7 @@ class SoftWrench(Method):
         rho = options.get("rho")
         if rho is None:
             return _nearest_wrench(form)
-        if not isinstance(rho, float | int) or not 1e-12 <= rho <= 1e12:
-            raise InputError(f"rho: is {rho!r}; accepted: a number from 1e-12 to 1e12, or None for infinite")
-        root = np.sqrt(rho) * form.sigma
+        root = np.sqrt(number("rho", rho, 1e-12, 1e12, ", or None for infinite")) * form.sigma
         k = form.lower.size
         s, _ = box_least_squares(
             np.vstack([root[:, None] * form.Q, np.eye(k)]), np.r_[root * form.b, np.zeros(k)], form.lower, form.upper

@@ -339,7 +339,7 @@ def test_rate_limits_hold_for_every_method():
     ("method", "options", "message"),
     [
         ("p-norm", {"p": 1}, "p: is 1; accepted: a number from 2 to 20"),
-        ("dykstra", {"max_iter": 0}, "max_iter: is 0; accepted: a whole number"),
+        ("dykstra", {"max_iter": 0}, "max_iter: is 0; accepted: a whole number from 1"),
         ("log-barrier", {"barrier": "big"}, "barrier: is 'big'; accepted: a number"),
         ("log-barrier", {"start": [1, 2]}, r"start: is \[1, 2\]; accepted: 8 finite tensions"),
         ("soft-wrench", {"rho": -1}, "rho: is -1; accepted: a number"),
