@@ -20,7 +20,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 __all__ = ["WIDTH", "any_of", "gather", "load", "magnitude", "maximum", "minimum", "splat", "sqrt", "store", "where"]
 
@@ -182,23 +182,24 @@ minimum = _compared("<", "Return the smaller, the second where one is nan.")
 
 def _operator(on: Callable[..., Any], result: Any, build: Callable[..., Any]) -> None:
     """Define an operator of two vectors, or of a vector and a number."""
+    for kinds in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes)):
 
-    @intrinsic
-    def apply(typingctx: Any, x: Any, y: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             pairs = zip(signature.args, arguments, strict=True)
             return build(builder, *[a if kind is lanes else _splat(builder, a) for kind, a in pairs])
 
-        return result(*[lanes if isinstance(kind, Lanes) else types.float64 for kind in (x, y)]), generate
+        lower_builtin(on, *kinds)(generate)
 
-    @overload(on, strict=False)
-    def operate(x: Any, y: Any) -> Any:
-        kinds = (x, y)
-        if any(isinstance(kind, Lanes) for kind in kinds) and all(
-            isinstance(kind, Lanes | types.Float | types.Integer) for kind in kinds
-        ):
-            return lambda x, y: apply(x, y)
-        return None
+    @type_callable(on)
+    def kind_of(context: Any) -> Any:
+        def typer(x, y):
+            if x is lanes or y is lanes:
+                number = [isinstance(kind, types.Float | types.Integer) for kind in (x, y)]
+                if all(n or kind is lanes for n, kind in zip(number, (x, y), strict=True)):
+                    return result(*[types.float64 if n else lanes for n in number])
+            return None
+
+        return typer
 
 
 _operator(operator.add, lanes, lambda builder, x, y: builder.fadd(x, y, flags=_FUSE))
@@ -209,38 +210,33 @@ for _symbol, _on in {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">="
     _operator(_on, mask, lambda builder, x, y, symbol=_symbol: builder.fcmp_ordered(symbol, x, y))
 
 
-def _logical(on: Callable[..., Any], build: str) -> None:
-    """Define an operator of two masks."""
+def _logical(on: Callable[..., Any], build: str, count: int) -> None:
+    """Define an operator of masks."""
 
-    @intrinsic
-    def apply(typingctx: Any, x: Any, y: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return getattr(builder, build)(*arguments)
-
-        return mask(mask, mask), generate
-
-    @overload(on, strict=False)
-    def operate(x: Any, y: Any) -> Any:
-        return (lambda x, y: apply(x, y)) if isinstance(x, Mask) and isinstance(y, Mask) else None
-
-
-_logical(operator.and_, "and_")
-_logical(operator.or_, "or_")
-
-
-@intrinsic
-def _not(typingctx: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.not_(arguments[0])
+        return getattr(builder, build)(*arguments)
 
-    return mask(mask), generate
+    lower_builtin(on, *[mask] * count)(generate)
+
+    @type_callable(on)
+    def kind_of(context: Any) -> Any:
+        if count == 1:
+            return lambda x: mask(mask) if x is mask else None
+        return lambda x, y: mask(mask, mask) if x is mask and y is mask else None
 
 
-@overload(operator.invert, strict=False)
-def _invert(x: Any) -> Any:
-    return (lambda x: _not(x)) if isinstance(x, Mask) else None
+_logical(operator.and_, "and_", 2)
+_logical(operator.or_, "or_", 2)
+_logical(operator.invert, "not_", 1)
 
 
-@overload(operator.neg, strict=False)
-def _negative(x: Any) -> Any:
-    return (lambda x: 0.0 - x) if isinstance(x, Lanes) else None
+def _negative(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    return builder.fneg(*arguments)
+
+
+lower_builtin(operator.neg, lanes)(_negative)
+
+
+@type_callable(operator.neg)
+def _kind_of_negative(context: Any) -> Any:
+    return lambda x: lanes(lanes) if x is lanes else None

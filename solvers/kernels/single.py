@@ -61,7 +61,8 @@ def what_counts(A, w, lower, upper, ref, t, length, n, m):
     return asked, rounding
 
 
-@jit()
+# One signature, so that Numba does not compile it once more for arrays that may be written.
+@jit(numba.int64(*[GIVEN] * 6, numba.float64, numba.int64, numba.int64, *[VECTOR] * 4))
 def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     """Solve one problem of flat arrays; A (n m,) row by row. Return the status.
 
