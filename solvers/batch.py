@@ -98,6 +98,7 @@ def solve_batch(
     t_ref: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     length: ArrayLike | None = None,
+    *,
     rho: float | None = None,
     threads: int | None = None,
 ) -> BatchSolution:

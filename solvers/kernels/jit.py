@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import config
 
 __all__ = ["GIVEN", "VECTOR", "has_room", "jit"]
 
@@ -19,7 +20,7 @@ _ROOM = 50_000_000  # bytes; the machine code of this room takes about 5 MB
 
 def has_room() -> bool:
     """Whether the disk has room for machine code: Numba would raise when it is full."""
-    place = Path(getattr(numba.config, "CACHE_DIR", "") or __file__)
+    place = Path(getattr(config, "CACHE_DIR", "") or __file__)
     try:
         return shutil.disk_usage(next(folder for folder in (place, *place.parents) if folder.exists())).free > _ROOM
     except OSError:

@@ -34,6 +34,8 @@ from .simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, sqrt,
 
 __all__ = ["reduce_lanes", "slabs_in_lanes", "slabs_size"]
 
+_STEEP, _NEAR = 1e-6, 1e6  # sine, and distance in units of what a limit may be passed by
+
 
 @jit()
 def reduce_lanes(n, m, W):
@@ -126,7 +128,9 @@ def slabs_in_lanes(n, m, W, V):
             den = a_j * along0 + b_j * along1
             parallel = magnitude(den) < PARALLEL
             low_j, high_j = load(W, cable(LOW, m) + j) - here, load(W, cable(HIGH, m) + j) - here
-            good = good & ~(moves & parallel & ((low_j > slack) | (high_j < -slack)))
+            # Where a slab whose limit is near is nearly parallel, rounding says where it is met.
+            near = (magnitude(den) < _STEEP) & ((low_j > -slack * _NEAR) | (high_j < slack * _NEAR))
+            good = good & ~(moves & near)
             inverse = 1.0 / den
             low_j, high_j = low_j * inverse, high_j * inverse
             turned = den < 0.0

@@ -81,7 +81,12 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, row: Any) -> Any:
     return builder.bitcast(builder.gep(data, [at]), _VECTOR.as_pointer())
 
 
-@intrinsic
+def _instruction(function: Callable[..., Any]) -> Any:
+    """Define an intrinsic; a type checker is not told of the typing context, which Numba adds."""
+    return intrinsic(function)
+
+
+@_instruction
 def splat(typingctx: Any, number: Any) -> Any:
     """Return a vector of one number."""
 
@@ -91,7 +96,7 @@ def splat(typingctx: Any, number: Any) -> Any:
     return lanes(types.float64), generate
 
 
-@intrinsic
+@_instruction
 def load(typingctx: Any, array: Any, row: Any) -> Any:
     """Return the row of an array of float64, eight numbers a row."""
 
@@ -101,7 +106,7 @@ def load(typingctx: Any, array: Any, row: Any) -> Any:
     return lanes(array, types.intp), generate
 
 
-@intrinsic
+@_instruction
 def store(typingctx: Any, array: Any, row: Any, value: Any) -> Any:
     """Write a vector to the row of an array of float64."""
 
@@ -112,7 +117,7 @@ def store(typingctx: Any, array: Any, row: Any, value: Any) -> Any:
     return types.void(array, types.intp, lanes), generate
 
 
-@intrinsic
+@_instruction
 def gather(typingctx: Any, array: Any, places: Any, offset: Any) -> Any:
     """Return the numbers at places[e] + offset of an array of float64; `places` is a tuple of eight."""
 
@@ -129,7 +134,7 @@ def gather(typingctx: Any, array: Any, places: Any, offset: Any) -> Any:
     return lanes(array, types.UniTuple(types.intp, WIDTH), types.intp), generate
 
 
-@intrinsic
+@_instruction
 def where(typingctx: Any, chosen: Any, yes: Any, no: Any) -> Any:
     """Choose lane by lane."""
 
@@ -139,7 +144,7 @@ def where(typingctx: Any, chosen: Any, yes: Any, no: Any) -> Any:
     return lanes(mask, lanes, lanes), generate
 
 
-@intrinsic
+@_instruction
 def any_of(typingctx: Any, chosen: Any) -> Any:
     """Whether a mask holds in any lane."""
 
@@ -158,7 +163,7 @@ def _unary(name: str, doc: str) -> Any:
         return lanes(lanes), generate
 
     function.__doc__ = doc
-    return intrinsic(function)
+    return _instruction(function)
 
 
 sqrt = _unary("sqrt", "Return the square root.")
@@ -173,7 +178,7 @@ def _compared(comparison: str, doc: str) -> Any:
         return lanes(lanes, lanes), generate
 
     function.__doc__ = doc
-    return intrinsic(function)
+    return _instruction(function)
 
 
 maximum = _compared(">", "Return the larger, the second where one is nan.")
