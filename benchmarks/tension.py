@@ -196,7 +196,7 @@ class _Runner:
 
 def measure(task: Task, who: Sequence[Contender], repeats: int, limit: float) -> list[Row]:
     """Measure contenders at one task, in blocks that take turns; the reference is to be among them."""
-    runners = [_Runner(contender, task, limit) for contender in who]
+    runners = [_Runner(contender, task, limit) for contender in who if task.kind in contender.kinds]
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -243,7 +243,7 @@ def _judge(contender: Contender, task: Task, answers: list[Array | None]) -> tup
         if answer is None or not np.isfinite(answer).all():
             failures += 1
         elif contender.same_aim:
-            errors.append(float(np.abs(answer - task.optima[i])[: task.m].max()))
+            errors.append(float(np.abs(answer[: task.m] - task.optima[i][: task.m]).max()))
             failures += errors[-1] > FAILED
         else:
             failures += _violation(task.problems[i], answer) > FAILED

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import TensionProblem, methods, solve, solve_batch
-from .tension_tasks import Task
+from ..solvers import TensionProblem, compiled, methods, solve, solve_batch
+from .tension_tasks import KINDS, STIFFNESS, Task
 
 __all__ = ["REFERENCE", "Contender", "contenders"]
 
@@ -63,6 +63,8 @@ class Contender(NamedTuple):
         True if it takes all problems at once.
     same_aim :
         False if it minimises something else than the QP, so that its tensions may differ.
+    kinds :
+        Kinds of tasks that it can take part in.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Contender(NamedTuple):
     prepare: Callable[[Task], Any]
     batch: bool = False
     same_aim: bool = True
+    kinds: tuple[str, ...] = KINDS
 
 
 def contenders() -> list[Contender]:
@@ -78,7 +81,11 @@ def contenders() -> list[Contender]:
     found = [Contender(REFERENCE, asked, _daqp)]
     for name in methods():
         found.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
+    found.append(Contender("towline kernel alone", "its own, 1e-9", _towline_kernel))
     found.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
+    found.append(
+        Contender("towline solve_batch, rho", "its own, 3e-14", _towline_soft_batch, batch=True, kinds=("soft",))
+    )
     native = {
         "daqp": ("daqp Model, reuse", _daqp_model),
         "osqp": ("osqp, reuse", _osqp),
@@ -139,6 +146,32 @@ def _towline_batch(task: Task) -> Batch:
     def run() -> tuple[Array, NDArray[np.bool_]]:
         answer = solve_batch(A, w, t_min, t_max, weights=weights, threads=1)
         return answer.tensions, answer.feasible
+
+    return run
+
+
+def _towline_soft_batch(task: Task) -> Batch:
+    m = task.m
+    A, w, t_min, t_max = (
+        _over_and_over(np.array([values(problem) for problem in task.problems]))
+        for values in (lambda p: p.A[:, :m], lambda p: p.w, lambda p: p.t_min[:m], lambda p: p.t_max[:m])
+    )
+
+    def run() -> tuple[Array, NDArray[np.bool_]]:
+        answer = solve_batch(A, w, t_min, t_max, rho=STIFFNESS, threads=1)
+        return answer.tensions, np.isfinite(answer.residual)
+
+    return run
+
+
+def _towline_kernel(task: Task) -> Single:
+    kernel = compiled.load().solve_packed
+    packed = [problem.packed for problem in task.problems]
+    n, size = task.problems[0].A.shape
+
+    def run(i: int) -> Array | None:
+        tensions = np.empty(size)
+        return tensions if kernel(packed[i], n, size, tensions) == 0 else None
 
     return run
 

@@ -16,7 +16,7 @@ from ..errors import SolverError
 from ..solvers import TensionProblem
 from .qp_solver import as_qp, multipliers
 
-__all__ = ["KINDS", "Task", "make_task"]
+__all__ = ["KINDS", "STIFFNESS", "Task", "make_task"]
 
 Array = NDArray[np.float64]
 

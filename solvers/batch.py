@@ -24,9 +24,9 @@ ROWS_WORTH_A_THREAD = 2000  # about a millisecond
 # Codes of `kernel`; those it is unsure of never leave this module.
 _STATUSES = (Status.OPTIMAL, Status.INFEASIBLE, Status.SINGULAR, Status.INACCURATE, Status.INVALID, Status.FAILED)
 _CODES = {status: code for code, status in enumerate(_STATUSES)}
-_UNSURE = 3
+_OPTIMAL, _INACCURATE, _UNSURE = 0, 3, 6
 
-_LANES = 32  # threads take whole blocks of the kernel, so that a row meets the same company whoever solves it
+_LANES = 8  # threads take whole vectors of the kernels, so that a row meets the same company whoever solves it
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class BatchSolution:
     residual :
         Wrench error |S (A t - w)| [N], shape (...); nan without tensions.
     direction :
-        Wrench direction that proves a row infeasible or singular, shape (..., n), scaled as that of a `Certificate`;
+        Wrench direction that proves w out of reach, where it is, shape (..., n), scaled as that of a `Certificate`;
         nan elsewhere. Every one was verified. It is a direction along which the shortfall is more than the tolerance,
         not always the one along which it is largest: that is `solution(index).certificate`.
     shortfall, support :
@@ -98,6 +98,8 @@ def solve_batch(
     t_ref: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     length: ArrayLike | None = None,
+    *,
+    rho: float | None = None,
     threads: int | None = None,
 ) -> BatchSolution:
     """Distribute the tensions of many problems, each as `solve` does with the method "active-set".
@@ -120,6 +122,10 @@ def solve_batch(
         Weights of the cables, shape (..., m) or one number; None = 1.
     length :
         Characteristic length [m], shape (...); None = 1 m.
+    rho :
+        Weight of the squared wrench error beside the squared tensions, as in the method "soft-wrench", 1e-12 to 1e12:
+        every row that is a problem gets tensions, and those whose wrench is not the required one are "inaccurate".
+        None = the wrench must be met.
     threads :
         How many threads share the rows; None = one for each 2000 rows, at most as many as there are processors. The
         result does not depend on it.
@@ -132,6 +138,9 @@ def solve_batch(
     start = time.perf_counter()
     if threads is not None and (not isinstance(threads, int) or isinstance(threads, bool) or threads < 1):
         raise InputError(f"threads: is {threads!r}; accepted: 1 and more, or None")
+    if rho is not None and (isinstance(rho, bool) or not isinstance(rho, float | int) or not 1e-12 <= rho <= 1e12):
+        raise InputError(f"rho: is {rho!r}; accepted: a number from 1e-12 to 1e12, or None")
+    soft = 0.0 if rho is None else 1.0 / rho
     matrix = _real("A", A)
     if matrix.ndim < 2 or 0 in matrix.shape[-2:]:
         raise InputError(
@@ -162,15 +171,15 @@ def solve_batch(
             per[position] = np.prod(tail, dtype=np.int64)
         flat.append(np.ascontiguousarray(value).reshape(-1))
 
-    tensions, direction, info = np.empty(rows * m), np.full(rows * n, np.nan), np.full(rows * 3, np.nan)
+    tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
     code = np.full(rows, _UNSURE, np.int8)
-    kernel = compiled.load()
+    kernels = compiled.load()
     share = threads or min(os.cpu_count() or 1, max(1, rows // ROWS_WORTH_A_THREAD))
     block = max(_LANES, -(-rows // (_LANES * share)) * _LANES)
 
     def work(first: int) -> None:
         stop = min(first + block, rows)
-        kernel.solve_rows(*flat, per, n, m, first, stop, tensions, direction, info, code)
+        kernels.solve_rows(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, code)
 
     if share == 1:
         work(0)
@@ -178,46 +187,41 @@ def solve_batch(
         with ThreadPoolExecutor(share) as pool:
             list(pool.map(work, range(0, rows, block)))
 
-    t, d, numbers = tensions.reshape(rows, m), direction.reshape(rows, n), info.reshape(rows, 3)
+    t, d, proof = tensions.reshape(rows, m), direction.reshape(rows, n), info.reshape(rows, 2)
     problem = {
         name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
     }
     if code.any():
-        t[code != 0] = np.nan
-        proven = (code == 1) | (code == 2)
-        d[~proven] = np.nan
-        numbers[~proven, :2] = np.nan
-        numbers[code != 0, 2] = np.nan
+        without = (code != _OPTIMAL) & (code != _INACCURATE)
+        t[without], residual[without] = np.nan, np.nan
+        unproven = (code == _OPTIMAL) | (code == _CODES[Status.INVALID]) | np.isnan(proof[:, 1])
+        d[unproven], proof[unproven] = np.nan, np.nan
         for row in np.flatnonzero(code == _UNSURE):
-            _one_by_one(row, lead, problem, code, t, d, numbers)
+            solution = _one_by_one(row, lead, problem, rho)
+            code[row] = _CODES[solution.status]
+            if solution.tensions is not None:
+                t[row], residual[row] = solution.tensions, solution.residual
+            d[row], proof[row] = np.nan, np.nan
+            if (certificate := solution.certificate) is not None:
+                d[row], proof[row] = certificate.direction, (certificate.support, certificate.shortfall)
+    else:
+        d, proof = np.broadcast_to(np.nan, d.shape), np.broadcast_to(np.nan, proof.shape)
     return BatchSolution(
         t.reshape(*lead, m),
         code.reshape(lead),
-        numbers[:, 2].reshape(lead),
+        residual.reshape(lead),
         d.reshape(*lead, n),
-        numbers[:, 1].reshape(lead),
-        numbers[:, 0].reshape(lead),
+        proof[:, 1].reshape(lead),
+        proof[:, 0].reshape(lead),
         time.perf_counter() - start,
         problem,
     )
 
 
-def _one_by_one(
-    row: np.intp,
-    lead: tuple[int, ...],
-    problem: dict[str, Array],
-    code: NDArray[np.int8],
-    t: Array,
-    d: Array,
-    info: Array,
-) -> None:
-    """Fill a row that the kernel left open, by `solve`."""
-    solution = solve(_row(problem, tuple(int(i) for i in np.unravel_index(row, lead))))
-    code[row] = _CODES[solution.status]
-    if solution.tensions is not None:
-        t[row], info[row, 2] = solution.tensions, solution.residual
-    if (certificate := solution.certificate) is not None:
-        d[row], info[row, :2] = certificate.direction, (certificate.support, certificate.shortfall)
+def _one_by_one(row: np.intp, lead: tuple[int, ...], problem: dict[str, Array], rho: float | None) -> TensionSolution:
+    """Solve a row that the kernels left open."""
+    stated = _row(problem, tuple(int(i) for i in np.unravel_index(row, lead)))
+    return solve(stated) if rho is None else solve(stated, method="soft-wrench", rho=rho)
 
 
 def _row(problem: dict[str, Array], index: int | tuple[int, ...]) -> TensionProblem:

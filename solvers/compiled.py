@@ -7,6 +7,7 @@ off without them, and one that would have to compile them needs many more before
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 
@@ -18,6 +19,8 @@ CALLS_WORTH_COMPILING = 300_000
 solve_packed: Callable[..., int] | None = None
 """`kernel.solve_packed` once it is loaded."""
 
+_ROOM = Path(__file__).parent / "kernels"
+
 _calls = 0
 _loading = threading.Lock()
 
@@ -26,10 +29,12 @@ def load() -> ModuleType:
     """Load the kernels now, or compile them if this machine has not yet; return their module."""
     global solve_packed
     with _loading:
-        from . import kernel
+        if solve_packed is None:
+            _forget_old_code()
+        from . import kernels
 
-        solve_packed = kernel.solve_packed
-    return kernel
+        solve_packed = kernels.solve_packed
+    return kernels
 
 
 def count_a_call() -> Callable[..., int] | None:
@@ -43,4 +48,13 @@ def count_a_call() -> Callable[..., int] | None:
 
 def _on_disk() -> bool:
     """Whether Numba left the kernels' machine code beside their source, where it keeps it if it may write there."""
-    return any((Path(__file__).parent / "__pycache__").glob("kernel.*.nbi"))
+    return any((_ROOM / "__pycache__").glob("rows.*.nbi"))
+
+
+def _forget_old_code() -> None:
+    """Remove machine code that is older than any source of the room: Numba looks at a function's own file only."""
+    changed = max((source.stat().st_mtime for source in _ROOM.glob("*.py")), default=0.0)
+    for index in (_ROOM / "__pycache__").glob("*.nbi"):
+        with suppress(OSError):
+            if index.stat().st_mtime < changed:
+                index.unlink()

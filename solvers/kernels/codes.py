@@ -1,0 +1,26 @@
+"""What the kernels answer, and the numbers by which they judge beside those of `tolerances`."""
+
+__all__ = [
+    "CLEAR",
+    "DEPENDENT",
+    "INACCURATE",
+    "INFEASIBLE",
+    "INVALID",
+    "OPTIMAL",
+    "PARALLEL",
+    "SINGULAR",
+    "SLACK",
+    "SURE_PIVOT",
+    "SURE_ZERO",
+    "UNSURE",
+]
+
+OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID, FAILED, UNSURE = range(7)
+
+# Pivots above the first part of the largest are sure to count, below the second they are rounding. RANK lies between.
+SURE_PIVOT, SURE_ZERO = 1e-9, 1e-14
+
+SLACK = 1e-12  # how far s may pass a limit, relative to the size of s
+PARALLEL = 1e-11  # sine and length below which a slab does not cut a line
+DEPENDENT = 1e-22  # square of the part of a normal outside the span of the active ones
+CLEAR = 4.0  # a shortfall is beyond doubt from this many tolerances

@@ -1,0 +1,71 @@
+"""Eight directions at once: which of them prove their wrench out of reach. As `proof.proves`, but for rank."""
+
+from __future__ import annotations
+
+from ..tolerances import FEASIBILITY, NEGLIGIBLE, ROUNDING
+from .codes import CLEAR
+from .jit import jit
+from .lanes import (
+    ASKED,
+    NORM,
+    PER_LENGTH,
+    PROVEN,
+    REF,
+    SA,
+    SHORTFALL,
+    SUPPORT,
+    SW,
+    T_HIGH,
+    T_LOW,
+    D,
+    cable,
+    matrix,
+    wrench,
+)
+from .simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
+
+__all__ = ["prove_in_lanes"]
+
+
+@jit()
+def prove_in_lanes(chosen, n, m, W, V, d):
+    """Keep the directions in rows d of V, in the units of S w, where `chosen` and proven; return where.
+
+    What is kept are the unit direction for w itself, its support and the shortfall; PROVEN says where.
+    """
+    square = splat(0.0)
+    for i in range(n):
+        x = load(V, d + i)
+        square = square + x * x
+    usable = chosen & (square > 0.0) & (square < 1e200)
+    unit = 1.0 / sqrt(where(usable, square, splat(1.0)))
+    demand, rounded, largest = splat(0.0), splat(0.0), splat(0.0)
+    for i in range(n):
+        demand = demand + unit * load(V, d + i) * load(W, wrench(SW, n, m) + i)
+    for c in range(m):
+        low, high, norm = load(W, cable(T_LOW, m) + c), load(W, cable(T_HIGH, m) + c), load(W, cable(NORM, m) + c)
+        nearest = magnitude(minimum(maximum(low, splat(0.0)), high))
+        rounded = rounded + norm * (magnitude(load(W, cable(REF, m) + c)) + nearest)
+        largest = maximum(norm, largest)
+    support, pulls = splat(0.0), splat(0.0)
+    for c in range(m):
+        pull = splat(0.0)
+        for i in range(n):
+            pull = pull + unit * load(V, d + i) * load(W, matrix(SA, n, m) + i * m + c)
+        reach = pull * where(pull > 0.0, load(W, cable(T_HIGH, m) + c), load(W, cable(T_LOW, m) + c))
+        counts = magnitude(pull) > NEGLIGIBLE * largest
+        pulls = where(counts, splat(1.0), pulls)
+        reach = where(counts, reach, splat(0.0))
+        support = support + reach
+        rounded = rounded + 1e2 * magnitude(reach)
+    doubt = CLEAR * (FEASIBILITY * load(W, ASKED) + ROUNDING * rounded)
+    proven = usable & (pulls > 0.0) & (demand - support > doubt)  # nan of infinite limits proves nothing
+    store(W, PROVEN, where(proven, splat(1.0), load(W, PROVEN)))
+    store(W, SUPPORT, where(proven, support, load(W, SUPPORT)))
+    store(W, SHORTFALL, where(proven, demand - support, load(W, SHORTFALL)))
+    for i in range(n):
+        x = unit * load(V, d + i)
+        if n == 6 and i >= 3:
+            x = x * load(W, PER_LENGTH)
+        store(W, wrench(D, n, m) + i, where(proven, x, load(W, wrench(D, n, m) + i)))
+    return proven

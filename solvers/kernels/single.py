@@ -1,0 +1,227 @@
+r"""Bounded least norm in the null space of the wrench matrix, one problem at a time: behind "active-set".
+
+.. math::
+
+    \min_s |s|^2 \quad \text{s.t.} \quad B s = b, \; lower \le s \le upper, \qquad s = s_0 + N z
+
+B is reduced by Householder reflections from the right with row pivoting (B = P^T L Q_1^T; Golub and Van Loan, 5.4).
+That gives the least-norm s_0, orthogonal to the orthonormal null-space basis N; what remains is the z of least norm
+inside slabs, one for each cable. In up to two dimensions the slabs are taken one after another (Seidel 1991): an
+optimum that the next slab forbids moves onto its edge, cut to an interval by the slabs before. Beyond two dimensions a
+dual active-set method (Goldfarb and Idnani 1983) adds the most violated limit and drops those whose multiplier would
+change sign.
+
+Nothing here is believed that the data do not confirm. Tensions count only if, inside their limits, their wrench error
+is below `TensionProblem.tolerance`; a direction only if its support value falls short of the demand by more than that.
+Near the boundary, near the rank cut, or if rounding makes the iteration lose its way, the answer is UNSURE and whoever
+asked goes to the robust path of `registry.py`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from ..tolerances import FEASIBILITY, ROUNDING
+from .codes import INFEASIBLE, OPTIMAL, SINGULAR, SLACK, UNSURE
+from .dual_active_set import dual_active_set
+from .jit import GIVEN, VECTOR, jit
+from .proof import outside_range, proves
+from .reduction import reduce, reflect
+from .slabs import nearest_in_slabs
+
+__all__ = ["solve_one", "solve_packed", "what_counts", "work_size"]
+
+
+@jit()
+def work_size(n: int, m: int) -> int:
+    """Return how many numbers of scratch one problem needs."""
+    return n * m + 6 * n + 6 * m + (m * m + 2 * m) + (2 * m * m + 6 * m + 2) + n * n + n
+
+
+@jit()
+def what_counts(A, w, lower, upper, ref, t, length, n, m):
+    """Return what the problem asks, and the sum of terms that rounding is a part of: see `TensionProblem.tolerance`."""
+    per_length = 1.0 / length
+    required, rounding = 0.0, 0.0
+    for i in range(n):
+        x = w[i] * (per_length if n == 6 and i >= 3 else 1.0)
+        required += x * x
+    asked = math.sqrt(required)
+    for c in range(m):
+        square = 0.0
+        for i in range(n):
+            x = A[i * m + c] * (per_length if n == 6 and i >= 3 else 1.0)
+            square += x * x
+        norm = math.sqrt(square)
+        asked += norm * abs(min(max(lower[c], 0.0), upper[c]))
+        rounding += norm * (abs(t[c]) + abs(ref[c]))
+    return asked, rounding
+
+
+# One signature, so that Numba does not compile it once more for arrays that may be written.
+@jit(numba.int64(*[GIVEN] * 6, numba.float64, numba.int64, numba.int64, *[VECTOR] * 4))
+def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
+    """Solve one problem of flat arrays; A (n m,) row by row. Return the status.
+
+    t (m,) gets the tensions, d (n,) the certificate's direction, info (3,) support, shortfall and wrench error.
+    """
+    per_length = 1.0 / length
+    at = 0
+    B = work[at : at + n * m]
+    at += n * m
+    b, diag, tau, norms, y = (
+        work[at : at + n],
+        work[at + n :],
+        work[at + 2 * n :],
+        work[at + 3 * n :],
+        work[at + 4 * n :],
+    )
+    at += 6 * n
+    low, high, s = work[at : at + m], work[at + m : at + 2 * m], work[at + 2 * m : at + 3 * m]
+    unit, push = work[at + 3 * m : at + 4 * m], work[at + 4 * m : at + 5 * m]
+    at += 5 * m
+    N = work[at : at + m * m + 2 * m]
+    at += m * m + 2 * m
+    rest = work[at:]
+    integers = np.empty(n + 2 * m, np.int64)
+    order, moving, active = integers[:n], integers[n : n + m], integers[n + m :]
+
+    heaviest = 0.0
+    for c in range(m):
+        heaviest = max(heaviest, weights[c])
+    mm = 0
+    size = 0.0
+    for c in range(m):
+        if lower[c] < upper[c]:
+            moving[mm] = c
+            omega = weights[c]
+            scale = 1.0 if omega == heaviest else math.sqrt(heaviest / omega)
+            unit[mm] = scale
+            low[mm] = (lower[c] - ref[c]) / scale
+            high[mm] = (upper[c] - ref[c]) / scale
+            size = max(size, abs(min(max(low[mm], 0.0), high[mm])))
+            t[c] = ref[c]
+            mm += 1
+        else:
+            t[c] = lower[c]
+    for i in range(n):
+        scale = per_length if n == 6 and i >= 3 else 1.0
+        total = w[i]
+        for c in range(m):
+            total -= A[i * m + c] * t[c]
+        b[i] = total * scale
+        for c in range(mm):
+            B[i * mm + c] = A[i * m + moving[c]] * scale * unit[c]
+
+    rank = reduce(B, n, mm, order, diag, tau, norms) if mm else 0
+    if rank < 0:
+        return UNSURE
+    total = 0.0
+    for j in range(rank):
+        x = b[order[j]]
+        for i in range(j):
+            x -= B[j * mm + i] * y[i]
+        y[j] = x / diag[j]
+        total += y[j] * y[j]
+        s[j] = y[j]
+    size = max(size, math.sqrt(total))
+    slack = SLACK * size
+    for c in range(rank, mm):
+        s[c] = 0.0
+    for j in range(rank - 1, -1, -1):
+        reflect(B, tau, j, mm, s, 0)
+
+    outside = False
+    for c in range(mm):
+        push[c] = 0.0
+        if s[c] < low[c] - slack or s[c] > high[c] + slack:
+            outside = True
+    found = 0
+    k = mm - rank
+    if outside:
+        N[: max(k, 2) * mm] = 0.0
+        for c in range(k):
+            N[c * mm + rank + c] = 1.0
+            for j in range(rank - 1, -1, -1):
+                reflect(B, tau, j, mm, N, c * mm)
+        if k <= 2:
+            z = rest[:2]
+            if nearest_in_slabs(N[:mm], N[mm : 2 * mm], s, low, high, mm, slack, z, push):
+                for c in range(mm):
+                    s[c] += N[c] * z[0] + N[mm + c] * z[1]
+            else:
+                found = 1
+        else:
+            found = dual_active_set(N, k, s, low, high, mm, slack, push, rest, active)
+    if found == 0:
+        for c in range(mm):
+            i = moving[c]
+            t[i] += unit[c] * s[c]
+        for c in range(m):
+            t[c] = min(max(t[c], lower[c]), upper[c])
+        asked, rounding = what_counts(A, w, lower, upper, ref, t, length, n, m)
+        error = 0.0
+        for i in range(n):
+            total = -w[i]
+            for c in range(m):
+                total += A[i * m + c] * t[c]
+            if n == 6 and i >= 3:
+                total *= per_length
+            error += total * total
+        info[2] = math.sqrt(error)
+        if info[2] <= FEASIBILITY * asked + ROUNDING * rounding:
+            return OPTIMAL
+    if found == 2:
+        return UNSURE
+    # A part of w outside the range of A makes the problem singular, whatever else is wrong with it.
+    if rank < n and outside_range(A, w, n, m, per_length, d, rest):
+        return SINGULAR if proves(A, w, lower, upper, ref, n, m, per_length, d, info) == SINGULAR else UNSURE
+    if found == 0:
+        return UNSURE
+    # push = B^T d, and push is in the row space of B.
+    for j in range(rank):
+        reflect(B, tau, j, mm, push, 0)
+    for j in range(rank - 1, -1, -1):
+        x = push[j]
+        for i in range(j + 1, rank):
+            x -= B[i * mm + j] * y[i]
+        y[j] = x / diag[j]
+    for i in range(n):
+        d[order[i]] = y[i] if i < rank else 0.0
+    verdict = proves(A, w, lower, upper, ref, n, m, per_length, d, info)
+    return INFEASIBLE if verdict == INFEASIBLE else UNSURE
+
+
+@jit(numba.int64(GIVEN, numba.int64, numba.int64, VECTOR))
+def solve_packed(data, n, m, t):
+    """Solve one problem given as one array: A row by row, w, t_min, t_max, t_ref, weights, length. Return its status.
+
+    Parameters
+    ----------
+    data :
+        Shape (n m + n + 5 m + 1,).
+    n, m :
+        Wrench rows and cables.
+    t :
+        Gets the tensions, shape (m,).
+    """
+    at = n * m + n
+    work = np.empty(work_size(n, m) + n + 3)
+    return solve_one(
+        data[: n * m],
+        data[n * m : at],
+        data[at : at + m],
+        data[at + m : at + 2 * m],
+        data[at + 2 * m : at + 3 * m],
+        data[at + 3 * m : at + 4 * m],
+        data[at + 4 * m],
+        n,
+        m,
+        t,
+        work[:n],
+        work[n : n + 3],
+        work[n + 3 :],
+    )
