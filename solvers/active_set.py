@@ -43,11 +43,13 @@ class ActiveSet(Daqp):
         return None if code > 2 else (_ANSWERS[code], None)
 
     def direction(self, problem: TensionProblem) -> NDArray[np.float64] | None:
-        """Return the kernel's own direction, from a batch of one row."""
-        kernel = compiled.load()
+        """Return the kernel's own direction."""
+        compiled.load()
+        from .kernels.single import solve_one, work_size
+
         n, m = problem.A.shape
         data = (problem.A.ravel(), problem.w, problem.t_min, problem.t_max, problem.t_ref, problem.weights)
-        direction, info, code = np.full(n, np.nan), np.full(3, np.nan), np.zeros(1, np.int8)
-        length, shared = np.array([problem.length]), np.zeros(7, np.int64)
-        kernel.solve_rows(*data, length, shared, n, m, 0, 1, np.empty(m), direction, info, code)
-        return direction if code[0] in (1, 2) else None
+        direction = np.full(n, np.nan)
+        outputs = np.empty(m), direction, np.empty(3), np.empty(work_size(n, m))
+        code = solve_one(*data, problem.length, n, m, *outputs)
+        return direction if code in (1, 2) else None

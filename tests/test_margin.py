@@ -151,7 +151,8 @@ def test_the_casadi_function_is_solve_with_a_derivative():
     function = casadi_function(8)
     assert function.name_in() == ["A", "w", "t_min", "t_max"]
     data = problem.A, problem.w, problem.t_min, problem.t_max
-    np.testing.assert_array_equal(function(*data).full()[:, 0], solve(problem).tensions)
+    # solve may be the kernel by now, if other tests have loaded it.
+    np.testing.assert_allclose(function(*data).full()[:, 0], solve(problem).tensions, rtol=0, atol=1e-9 * T_MAX)
     symbols = [ca.MX.sym(name, *np.atleast_2d(value.T).T.shape) for name, value in zip("Awlh", data, strict=True)]
     t = function(*symbols)
     jacobian = ca.Function("jacobian", symbols, [ca.jacobian(t, ca.vec(symbol)) for symbol in symbols])
