@@ -19,7 +19,7 @@ class ActiveSet(Daqp):
     """Weighted least squares to t_ref inside the limits, by a dual active-set method in the null space.
 
     What the kernel is not sure of goes to the daqp package and is judged as the other methods are. So do the first
-    calls of a process: the kernel takes half a second to load from the disk (twenty to compile, once on a machine) and
+    calls of a process: the kernel takes half a second to load from the disk (25 to compile, once on a machine) and
     saves 60 us a call, so that it is loaded by call number `compiled.CALLS_WORTH_LOADING`, or by
     `solve_batch`, or by `compiled.load()` if a control loop must not wait. Both give the same tensions to 1e-9.
     """

@@ -26,8 +26,6 @@ _STATUSES = (Status.OPTIMAL, Status.INFEASIBLE, Status.SINGULAR, Status.INACCURA
 _CODES = {status: code for code, status in enumerate(_STATUSES)}
 _OPTIMAL, _INACCURATE, _UNSURE = 0, 3, 6
 
-_LANES = 8  # threads take whole vectors of the kernels, so that a row meets the same company whoever solves it
-
 
 @dataclass(frozen=True, eq=False)
 class BatchSolution:
@@ -175,7 +173,8 @@ def solve_batch(
     code = np.full(rows, _UNSURE, np.int8)
     kernels = compiled.load()
     share = threads or min(os.cpu_count() or 1, max(1, rows // ROWS_WORTH_A_THREAD))
-    block = max(_LANES, -(-rows // (_LANES * share)) * _LANES)
+    # Whole vectors for each thread, so that a row meets the same company whoever solves it.
+    block = max(kernels.WIDTH, -(-rows // (kernels.WIDTH * share)) * kernels.WIDTH)
 
     def work(first: int) -> None:
         stop = min(first + block, rows)

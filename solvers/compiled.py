@@ -1,7 +1,7 @@
 """When the Numba kernels are loaded: not before they pay.
 
 `import numba` takes 0.2 s to 0.5 s and the machine code 0.3 s from the disk; the first time on a machine it is compiled
-in some 20 s. A call without the kernels costs about 0.07 ms more: a process that solves a handful of problems is better
+in some 25 s. A call without the kernels costs about 0.07 ms more: a process that solves a handful of problems is better
 off without them, and one that would have to compile them needs many more before that pays.
 """
 

@@ -45,12 +45,12 @@ def arithmetic():
 
 
 numbers = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1e-6)
-eight = st.lists(numbers, min_size=8, max_size=8).map(np.array)
+many = st.lists(numbers, min_size=16, max_size=16).map(np.array)
 
 
-@given(x=eight, y=eight, a=numbers)
+@given(x=many, y=many, a=numbers)
 def test_vectors_compute_as_numpy_does(arithmetic, x, y, a):
-    result = np.empty(96)
+    result = np.empty(12 * 16)
     arithmetic(x, y, a, result)
     expected = [
         x + y,
@@ -66,7 +66,7 @@ def test_vectors_compute_as_numpy_does(arithmetic, x, y, a):
         np.where((x > y) & (x > 0.0), x, y),
         np.where((x > y) | (y > 1.0), x, 2 * y),
     ]
-    np.testing.assert_array_equal(result.reshape(12, 8), expected)
+    np.testing.assert_array_equal(result.reshape(12, 16), expected)
 
 
 def mixture(rng, m, count):
@@ -100,7 +100,7 @@ def shortfall_along(problem, d):
 
 @pytest.mark.parametrize("m", [6, 7, 8, 9, 12, 16])
 def test_lanes_answer_as_single_problems_do(kernels, m):
-    problems = mixture(np.random.default_rng(m), m, 203)  # no multiple of eight
+    problems = mixture(np.random.default_rng(m), m, 203)  # no multiple of sixteen
     batch = solve_batch(**stacked(problems), threads=1)
     tensions = np.empty(m)
     for row, problem in enumerate(problems):

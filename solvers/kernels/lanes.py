@@ -1,4 +1,4 @@
-"""Eight problems at once: how they lie in the work array, how they get there, and how their answers are judged.
+"""Sixteen problems at once: how they lie in the work array, how they get there, and how their answers are judged.
 
 Each row of the work array is a vector of `simd`, one lane for each problem. There are single rows, rows for each cable,
 rows for each wrench row, and two matrices: S A, and B, that is S A with columns scaled to equal weights, which a solver
@@ -13,7 +13,7 @@ import numpy as np
 from ..tolerances import FEASIBILITY, ROUNDING
 from .codes import INACCURATE, INFEASIBLE, OPTIMAL, SLACK, UNSURE
 from .jit import jit
-from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, splat, sqrt, store, where
+from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
 
 __all__ = [
     "ASKED",
@@ -94,23 +94,14 @@ def _gather(source, each, size, members, W, row):
         for i in range(size):
             store(W, row + i, splat(source[i]))
         return
-    places = (
-        members[0] * each,
-        members[1] * each,
-        members[2] * each,
-        members[3] * each,
-        members[4] * each,
-        members[5] * each,
-        members[6] * each,
-        members[7] * each,
-    )
+    starts = places(members, each)
     for i in range(size):
-        store(W, row + i, gather(source, places, i))
+        store(W, row + i, gather(source, starts, i))
 
 
 @jit()
 def prepare(given, per, n, m, members, keep, W):
-    """Bring the problems of eight rows into lanes; with `keep`, their matrices are there already.
+    """Bring the problems of sixteen rows into lanes; with `keep`, their matrices are there already.
 
     `given` are the arrays of `rows.solve_rows`, from A to length.
     """

@@ -1,4 +1,4 @@
-r"""Eight problems at once with any number of cables: Newton's method on the dual.
+r"""Sixteen problems at once with any number of cables: Newton's method on the dual.
 
 The dual of the bounded least norm has one unknown for each equation: with multipliers y the best s is
 :math:`s(y) = clip(B^T y)`, and y is right where

@@ -1,4 +1,4 @@
-"""Eight directions at once: which of them prove their wrench out of reach. As `proof.proves`, but for rank."""
+"""Sixteen directions at once: which of them prove their wrench out of reach. As `proof.proves`, but for rank."""
 
 from __future__ import annotations
 

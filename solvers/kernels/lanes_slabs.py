@@ -1,4 +1,4 @@
-"""Eight problems at once with at most two more cables than equations: reduction, then one slab after another.
+"""Sixteen problems at once with at most two more cables than equations: reduction, then one slab after another.
 
 The same steps as `reduction` and `slabs`, without branches and without pivoting: a matrix that would need it, or one
 that lacks rank, is left to `single`. For a problem without tensions the limits that exclude them give the direction

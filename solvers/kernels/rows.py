@@ -1,4 +1,4 @@
-r"""Rows of a batch: eight at a time where that can be trusted, else one by one."""
+r"""Rows of a batch: sixteen at a time where that can be trusted, else one by one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STEPS, _TURNS = 5, 5
 
 @jit()
 def _exchange(y, start, n, members, V, keep):
-    """Keep the multipliers of eight problems from the first rows of V, or bring them back."""
+    """Keep the multipliers of sixteen problems from the first rows of V, or bring them back."""
     for e in range(WIDTH):
         at = (members[e] - start) * n
         for i in range(n):

@@ -1,11 +1,11 @@
-"""Vectors of eight numbers for Numba: one instruction works on eight problems.
+"""Vectors of sixteen numbers for Numba: one instruction works on many problems.
 
-Numba's loops over eight problems become vector instructions only if LLVM can prove that nothing overlaps, which for a
-kernel with many intermediate rows it cannot. Here a vector is a type of its own, `<8 x double>` in LLVM, that lives in
+Numba's loops over problems become vector instructions only if LLVM can prove that nothing overlaps, which for a
+kernel with many intermediate rows it cannot. Here a vector is a type of its own, `<16 x double>` in LLVM, that lives in
 registers; LLVM splits it where the processor's are shorter. `Lanes` has + - * / and comparisons, among each other and
 with numbers; a comparison gives `Mask`, which has & | ~.
 
-    x = load(work, row)                  # numbers 8 row to 8 row + 7 of an array
+    x = load(work, row)                  # numbers 16 row to 16 row + 15 of an array
     y = where(x > 0.0, sqrt(x), splat(0.0))
     store(work, row, y)
 
@@ -22,9 +22,22 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-__all__ = ["WIDTH", "any_of", "gather", "load", "magnitude", "maximum", "minimum", "splat", "sqrt", "store", "where"]
+__all__ = [
+    "WIDTH",
+    "any_of",
+    "gather",
+    "load",
+    "magnitude",
+    "maximum",
+    "minimum",
+    "places",
+    "splat",
+    "sqrt",
+    "store",
+    "where",
+]
 
-WIDTH = 8
+WIDTH = 16  # two registers of the widest processors, so that one need not wait for the other
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
@@ -32,14 +45,14 @@ _FUSE = ("contract",)
 
 
 class Lanes(types.Type):
-    """Eight floats."""
+    """Sixteen floats."""
 
     def __init__(self) -> None:
         super().__init__(name=f"Lanes{WIDTH}")
 
 
 class Mask(types.Type):
-    """Eight truths."""
+    """Sixteen truths."""
 
     def __init__(self) -> None:
         super().__init__(name=f"Mask{WIDTH}")
@@ -98,7 +111,7 @@ def splat(typingctx: Any, number: Any) -> Any:
 
 @_instruction
 def load(typingctx: Any, array: Any, row: Any) -> Any:
-    """Return the row of an array of float64, eight numbers a row."""
+    """Return the row of an array of float64, sixteen numbers a row."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
@@ -118,15 +131,32 @@ def store(typingctx: Any, array: Any, row: Any, value: Any) -> Any:
 
 
 @_instruction
-def gather(typingctx: Any, array: Any, places: Any, offset: Any) -> Any:
-    """Return the numbers at places[e] + offset of an array of float64; `places` is a tuple of eight."""
+def places(typingctx: Any, rows: Any, each: Any) -> Any:
+    """Return where the numbers of so many rows begin, `each` of them apart, as a tuple for `gather`."""
+    kind = types.UniTuple(types.intp, WIDTH)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        given, places, offset = arguments
+        given, each = arguments
+        data = context.make_array(signature.args[0])(context, builder, given).data
+        starts = []
+        for e in range(WIDTH):
+            row = builder.load(builder.gep(data, [ir.Constant(each.type, e)]))
+            starts.append(builder.mul(row, each))
+        return cgutils.pack_array(builder, starts)
+
+    return kind(rows, types.intp), generate
+
+
+@_instruction
+def gather(typingctx: Any, array: Any, starts: Any, offset: Any) -> Any:
+    """Return the numbers at starts[e] + offset of an array of float64; `starts` is from `places`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        given, starts, offset = arguments
         data = context.make_array(signature.args[0])(context, builder, given).data
         vector = ir.Constant(_VECTOR, ir.Undefined)
         for e in range(WIDTH):
-            at = builder.add(builder.extract_value(places, e), offset)
+            at = builder.add(builder.extract_value(starts, e), offset)
             number = builder.load(builder.gep(data, [at]))
             vector = builder.insert_element(vector, number, ir.Constant(ir.IntType(32), e))
         return vector
