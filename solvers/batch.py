@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from . import compiled
+from .inputs import number, shown, whole_number
 from .problem import TensionProblem
 from .registry import solve
 from .solution import Status, TensionSolution
@@ -85,6 +86,13 @@ class BatchSolution:
         InputError
             If the row is invalid; the message says why.
         """
+        accepted = f"what picks one row of shape {self.code.shape}"
+        try:
+            picked = self.code[index]
+        except (IndexError, TypeError, ValueError):
+            raise InputError(f"index: is {shown(index)}; accepted: {accepted}") from None
+        if np.ndim(picked):
+            raise InputError(f"index: is {shown(index)}, {np.size(picked)} rows; accepted: {accepted}")
         return solve(_row(self.problem, index))
 
 
@@ -134,11 +142,9 @@ def solve_batch(
         If an argument has a wrong type or its shape does not fit the others.
     """
     start = time.perf_counter()
-    if threads is not None and (not isinstance(threads, int) or isinstance(threads, bool) or threads < 1):
-        raise InputError(f"threads: is {threads!r}; accepted: 1 and more, or None")
-    if rho is not None and (isinstance(rho, bool) or not isinstance(rho, float | int) or not 1e-12 <= rho <= 1e12):
-        raise InputError(f"rho: is {rho!r}; accepted: a number from 1e-12 to 1e12, or None")
-    soft = 0.0 if rho is None else 1.0 / rho
+    if threads is not None:
+        threads = whole_number("threads", threads, 1, 1024)
+    soft = 0.0 if rho is None else 1.0 / number("rho", rho, 1e-12, 1e12, also=", or None")
     matrix = _real("A", A)
     if matrix.ndim < 2 or 0 in matrix.shape[-2:]:
         raise InputError(

@@ -166,7 +166,7 @@ def test_bad_rows_are_flagged_and_the_rest_solved():
         ),
         ({"t_min": np.ones(6)}, r"t_min: has shape \(6,\); accepted: \(\.\.\., 8\)"),
         ({"t_max": None}, r"t_max: has shape \(\) and type object"),
-        ({"threads": 0}, "threads: is 0; accepted: 1 and more"),
+        ({"threads": 0}, "threads: is 0; accepted: a whole number from 1"),
     ],
 )
 def test_wrong_arguments_are_told(change, message):

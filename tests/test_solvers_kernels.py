@@ -186,8 +186,22 @@ def test_a_shared_matrix_changes_nothing(m):
 
 @pytest.mark.parametrize("rho", ["stiff", 0.0, -1.0, np.nan, np.inf, True, 1e13])
 def test_rho_is_a_number_in_its_range(rho):
-    with pytest.raises(InputError, match=r"^rho: .*accepted: a number from 1e-12 to 1e12, or None"):
+    with pytest.raises(InputError, match=r"^rho: .*accepted: a number from 1e-12 to 1e\+12, or None"):
         solve_batch(np.eye(2), np.ones(2), 0.0, 1.0, rho=rho)
+
+
+@pytest.mark.parametrize("index", [None, "spam", 7, (0, 0), 1.5, slice(None), [0, 1]])
+def test_an_index_picks_one_row(index):
+    batch = solve_batch(np.eye(2), np.ones((3, 2)), 0.0, 2.0)
+    assert batch.solution(-1).feasible
+    with pytest.raises(InputError, match=r"^index: .*accepted: what picks one row of shape \(3,\)$"):
+        batch.solution(index)
+
+
+@pytest.mark.parametrize("threads", [0, True, 2.0, np.arange(40), "two"])
+def test_threads_is_a_whole_number(threads):
+    with pytest.raises(InputError, match=r"^threads: .*accepted: a whole number from 1 to 1024$"):
+        solve_batch(np.eye(2), np.ones(2), 0.0, 1.0, threads=threads)
 
 
 def test_machine_code_older_than_a_source_is_forgotten(tmp_path, monkeypatch):
