@@ -113,7 +113,12 @@ def slabs_in_lanes(n, m, W, V):
             continue
         square = a * a + b * b
         cuts = square > PARALLEL * PARALLEL
-        good = good & (cuts | ~moves)
+        fixed = moves & ~cuts  # nothing moves this s, and it is beyond its limit
+        if any_of(fixed):
+            if not any_of(excluded):
+                _clear(m, V)
+            store(V, i, where(fixed, where(below, splat(-1.0), splat(1.0)), load(V, i)))
+            good, excluded, moves = good & ~fixed, excluded | fixed, moves & cuts
         inverse = 1.0 / where(cuts, square, splat(1.0))
         root = sqrt(inverse)
         edge = (where(below, low, high) - s) * inverse
@@ -146,8 +151,7 @@ def slabs_in_lanes(n, m, W, V):
             f = where(den_start > 0.0, -magnitude(den_stop), magnitude(den_stop))
             g = where(den_stop > 0.0, magnitude(den_start), -magnitude(den_start))
             if not any_of(excluded):
-                for c in range(m):
-                    store(V, c, splat(0.0))
+                _clear(m, V)
             _push(n, m, W, V, i, empty, at_start, at_stop, f, g)
             good, excluded = good & ~empty, excluded | empty
         shift = minimum(maximum(start, splat(0.0)), stop)
@@ -179,6 +183,13 @@ def _least_norm(n, m, W):
         store(W, own + c, splat(0.0))
     _reflect_back(n, m, W, own)
     store(W, SLACKS, SLACK * maximum(load(W, SIZE), sqrt(square)))
+
+
+@jit()
+def _clear(m, V):
+    """Set the multipliers, the first m rows of V, to zero."""
+    for c in range(m):
+        store(V, c, splat(0.0))
 
 
 @jit()
