@@ -36,12 +36,18 @@ PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]
 class PathBase(Part):
     """What all paths share."""
 
+    kind: str
     frame: str = Field(default="world", description="what the path is given in: world, or the name of the only carrier")
 
     @property
     def natural_duration(self) -> float | None:
         """How long the path takes by its own numbers [s]; None: as long as the task says."""
         return None
+
+    @property
+    def stretches(self) -> bool:
+        """Whether another duration means the same places, later or sooner."""
+        return self.kind in ("rest", "line") or (self.kind == "waypoints" and self.natural_duration is None)
 
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
@@ -147,15 +153,17 @@ class WaypointPath(PathBase):
     def at(self, times: np.ndarray, duration: float) -> Motion:
         from scipy.interpolate import make_interp_spline
 
-        points = np.array(self.points)
-        if self.times is None:
-            steps = np.linalg.norm(np.diff(points, axis=0), axis=1)  # a radian counts as a metre
-            knots = np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
-        else:
-            knots = np.array(self.times)
+        points, knots = np.array(self.points), self.knots(duration)
         at_rest = [(derivative, np.zeros(6)) for derivative in (1, 2, 3)]
         spline = make_interp_spline(knots, points, k=7, bc_type=(at_rest, at_rest))
         return Motion(spline(times), spline(times, 1), spline(times, 2))
+
+    def knots(self, duration: float) -> np.ndarray:
+        """When the path is at its points [s]."""
+        if self.times is not None:
+            return np.array(self.times)
+        steps = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)  # a radian counts as a metre
+        return np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
 
 
 class SamplePath(PathBase):

@@ -6,9 +6,11 @@ import os
 import time
 from typing import Any
 
+from ..errors import InputError
 from ..models import Robot
 from . import transcription
 from .audit import Audit, audit
+from .guess import initial_guess
 from .result import Plan, PlanStatus
 from .scenario import Deviation, Scenario, lay_out
 from .task import Task, read_task
@@ -22,7 +24,12 @@ SHRINK = 2e-3  # of the carriers' speed and acceleration limits
 NO_SLACK = 1e-6  # of the weight: a motion that misses less at its nodes is a start for another try
 
 
-def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], progress: Progress | None = None) -> Plan:
+def plan(
+    robot: Robot,
+    task: Task | dict[str, Any] | str | os.PathLike[str],
+    progress: Progress | None = None,
+    start: Plan | None = None,
+) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
     The platform follows the task's path, exactly or inside a tube; the carriers hold, move as given, or are free inside
@@ -37,6 +44,8 @@ def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], pro
         A `Task`, a mapping with its keys, or the path of a YAML file.
     progress
         Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
+    start
+        A plan of the same robot for a similar task, to start from; None: the planner makes its own guess.
 
     Returns
     -------
@@ -53,7 +62,23 @@ def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], pro
     scenario = lay_out(robot, read_task(task))
     if scenario.count == 0:
         return _fixed_motion(scenario)
-    return _free_motion(scenario, progress)
+    return _free_motion(scenario, progress, _start(scenario, start))
+
+
+def _start(scenario: Scenario, start: Plan | None) -> Deviation | None:
+    """What a plan to start from deviates by, stretched to this scenario's duration."""
+    if start is None or start.deviation is None:
+        return None
+    theirs = start.deviation
+    if start.scenario.owners() != scenario.owners() or theirs.tensions.shape[1] != scenario.robot.m:
+        raise InputError(
+            f"start: is a plan of {start.scenario.robot.name!r} for {start.scenario.task.name!r} with other "
+            "coordinates free; accepted: one whose robot, tube and base leave the same coordinates free"
+        )
+    if scenario.duration_range is not None:
+        return theirs
+    stretch = scenario.duration / theirs.nodes[-1]
+    return Deviation(theirs.nodes * stretch, theirs.q, theirs.v / stretch, theirs.a / stretch**2, theirs.tensions)
 
 
 def _fixed_motion(scenario: Scenario) -> Plan:
@@ -75,8 +100,10 @@ class _Search:
         """Build and solve the program of `mesh` from `guess`; None: from one that it makes."""
         start = time.perf_counter()
         program = transcription.build(self.scenario, mesh)
-        nodes = program.nodes
-        start_at = transcription.initial_guess(self.scenario, nodes) if guess is None else guess.at(nodes)
+        if guess is None:
+            start_at = initial_guess(self.scenario, program.shares * self.scenario.duration)
+        else:
+            start_at = guess.at(program.shares * guess.nodes[-1])
         built = time.perf_counter()
         outcome = transcription.solve(program, start_at, self._progress)
         self.build_s += built - start
@@ -86,21 +113,26 @@ class _Search:
     def plan(self, status: PlanStatus, outcome: Outcome, seen: Audit) -> Plan:
         """What came of it."""
         told = (outcome.iterations, outcome.message)
-        return Plan(self.scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told)
+        scenario = self.scenario.lasting(outcome.duration)
+        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told)
+
+    def audit(self, outcome: Outcome) -> Audit:
+        """What the audit says of it."""
+        return audit(self.scenario.lasting(outcome.duration), outcome.deviation)
 
 
-def _free_motion(scenario: Scenario, progress: Progress | None) -> Plan:
+def _free_motion(scenario: Scenario, progress: Progress | None, start: Deviation | None) -> Plan:
     """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
     search = _Search(scenario, progress)
     steps = scenario.task.steps
-    outcome = search.solve(Mesh(steps), None)
+    outcome = search.solve(Mesh(steps), start)
     if not outcome.success:
         closest = search.solve(Mesh(steps, elastic=True), None)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
-            return search.plan(PlanStatus.NOT_FOUND, closest, audit(scenario, closest.deviation))
+            return search.plan(PlanStatus.NOT_FOUND, closest, search.audit(closest))
         outcome = search.solve(Mesh(steps), closest.deviation)
     reserve, shrink = 0.0, 0.0
-    seen = audit(scenario, outcome.deviation)
+    seen = search.audit(outcome)
     for attempt in range(1, REFINEMENTS + 1):
         if seen.passed or not outcome.success:
             break
@@ -110,6 +142,6 @@ def _free_motion(scenario: Scenario, progress: Progress | None) -> Plan:
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if seen.excess else shrink
         outcome = search.solve(Mesh(steps, reserve * scenario.robot.force_scale, shrink), outcome.deviation)
-        seen = audit(scenario, outcome.deviation)
+        seen = search.audit(outcome)
     feasible = seen.passed and outcome.success
     return search.plan(PlanStatus.FEASIBLE if feasible else PlanStatus.NOT_FOUND, outcome, seen)
