@@ -60,7 +60,7 @@ def plan(
         If the task is not valid or does not fit the robot; one line naming the field and the value.
     """
     scenario = lay_out(robot, read_task(task))
-    if scenario.count == 0:
+    if scenario.is_fixed:
         return _fixed_motion(scenario)
     return _free_motion(scenario, progress, _start(scenario, start))
 
@@ -129,7 +129,8 @@ def _free_motion(scenario: Scenario, progress: Progress | None, start: Deviation
     if not outcome.success:
         closest = search.solve(Mesh(steps, elastic=True), None)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
-            return search.plan(PlanStatus.NOT_FOUND, closest, search.audit(closest))
+            seen = search.audit(closest)
+            return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, closest, seen)
         outcome = search.solve(Mesh(steps), closest.deviation)
     reserve, shrink = 0.0, 0.0
     seen = search.audit(outcome)

@@ -98,6 +98,11 @@ class Scenario:
         return len(self.platform_free) + len(self.carrier_free)
 
     @property
+    def is_fixed(self) -> bool:
+        """Whether the task leaves nothing to choose but tensions."""
+        return self.count == 0 and self.duration_range is None
+
+    @property
     def output_samples(self) -> int:
         """How many intervals the saved trajectory has."""
         return max(round(self.duration * self.task.output_rate), 1)
