@@ -20,8 +20,9 @@ def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
     q, v, a = (np.zeros((len(nodes), n)) for _ in range(3))
     platform, carriers = scenario.references(nodes)
     for column, (owner, coordinate) in enumerate(scenario.owners()):
-        roams = owner is not None and robot.carriers[owner].kind in ("prescribed", "quadrotor")
-        if roams and coordinate in POSITION and not scenario.relative:
+        if owner is None or scenario.relative or coordinate not in POSITION:
+            continue
+        if robot.carriers[owner].kind in ("prescribed", "quadrotor"):
             offset = robot.carrier_home[owner, coordinate] - robot.home[coordinate]
             q[:, column] = platform.pose[:, coordinate] + offset - carriers[owner].pose[:, coordinate]
             v[:, column] = platform.velocity[:, coordinate] - carriers[owner].velocity[:, coordinate]

@@ -122,7 +122,7 @@ def limits(scenario: Scenario) -> Limits:
     robot = scenario.robot
     bodies = [ca.SX.sym(f"body{i}", 18) for i in range(1 + len(robot.carriers))]
     # Pieces of one symbol are no symbols: derivatives are taken with respect to these.
-    motions: list[Motion] = [tuple(ca.SX.sym(f"part{k}", 6) for k in range(3)) for _ in bodies]
+    motions: list[Motion] = [(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6)) for _ in bodies]
     tensions = ca.SX.sym("tensions", robot.m)
     found = _all(scenario, State(robot, motions[0], motions[1:], tensions))
     inner = ca.Function(

@@ -36,7 +36,6 @@ PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]
 class PathBase(Part):
     """What all paths share."""
 
-    kind: str
     frame: str = Field(default="world", description="what the path is given in: world, or the name of the only carrier")
 
     @property
@@ -47,7 +46,7 @@ class PathBase(Part):
     @property
     def stretches(self) -> bool:
         """Whether another duration means the same places, later or sooner."""
-        return self.kind in ("rest", "line") or (self.kind == "waypoints" and self.natural_duration is None)
+        return False
 
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
@@ -59,6 +58,11 @@ class RestPath(PathBase):
 
     kind: Literal["rest"]
     pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+
+    @property
+    @override
+    def stretches(self) -> bool:
+        return True
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
@@ -76,6 +80,11 @@ class LinePath(PathBase):
         default="smooth",
         description="smooth: from rest to rest, acceleration and jerk zero there; uniform: constant speed",
     )
+
+    @property
+    @override
+    def stretches(self) -> bool:
+        return True
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
@@ -148,6 +157,11 @@ class WaypointPath(PathBase):
     @override
     def natural_duration(self) -> float | None:
         return None if self.times is None else self.times[-1]
+
+    @property
+    @override
+    def stretches(self) -> bool:
+        return self.times is None
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:

@@ -66,8 +66,8 @@ class Program:
         """The deviation that a solution x stands for."""
         layout, columns = self.layout, self.layout.columns(x)
         tensions = columns[:, layout.tensions] * self.scenario.robot.force_scale
-        parts = (columns[:, part] for part in (layout.q, layout.v, layout.a))
-        return Deviation(self.shares * self.duration(x), *parts, tensions)
+        q, v, a = (columns[:, part] for part in (layout.q, layout.v, layout.a))
+        return Deviation(self.shares * self.duration(x), q, v, a, tensions)
 
     def pack(self, deviation: Deviation) -> np.ndarray:
         """The x that a deviation at the nodes stands for, slacks zero."""
