@@ -204,12 +204,13 @@ def test_threads_is_a_whole_number(threads):
         solve_batch(np.eye(2), np.ones(2), 0.0, 1.0, threads=threads)
 
 
-def test_machine_code_older_than_a_source_is_forgotten(tmp_path, monkeypatch):
-    (tmp_path / "__pycache__").mkdir()
-    index, source = tmp_path / "__pycache__" / "rows.solve_rows-1.py311.nbi", tmp_path / "slabs.py"
+@pytest.mark.parametrize("name", ["kernels/slabs.py", "tolerances.py"])
+def test_machine_code_older_than_a_source_is_forgotten(tmp_path, monkeypatch, name):
+    (tmp_path / "kernels" / "__pycache__").mkdir(parents=True)
+    index, source = tmp_path / "kernels" / "__pycache__" / "rows.solve_rows-1.py311.nbi", tmp_path / name
     index.touch()
     source.touch()
-    monkeypatch.setattr(compiled, "_ROOM", tmp_path)
+    monkeypatch.setattr(compiled, "_ROOM", tmp_path / "kernels")
     os.utime(index, (1000, 1000))
     os.utime(source, (999, 999))
     compiled._forget_old_code()
