@@ -10,11 +10,10 @@ from ..errors import InputError
 from ..models import Robot
 from . import transcription
 from .audit import Audit, audit
-from .guess import initial_guess
 from .result import Plan, PlanStatus
 from .scenario import Deviation, Scenario, lay_out
 from .task import Task, read_task
-from .transcription import Mesh, Outcome, Progress
+from .transcription import Mesh, Outcome, Progress, Solver
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
@@ -59,10 +58,32 @@ def plan(
     InputError
         If the task is not valid or does not fit the robot; one line naming the field and the value.
     """
-    scenario = lay_out(robot, read_task(task))
-    if scenario.is_fixed:
-        return _fixed_motion(scenario)
-    return _free_motion(scenario, progress, _start(scenario, start))
+    return Planner(robot, task).plan(progress, start)
+
+
+class Planner:
+    """Plans one task, again if need be: programs and solvers are kept, and the last solution to start from.
+
+    Parameters
+    ----------
+    robot, task
+        As for `plan`.
+
+    Raises
+    ------
+    InputError
+        As `plan` does.
+    """
+
+    def __init__(self, robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str]):
+        self.scenario = lay_out(robot, read_task(task))
+        self._solvers: dict[Mesh, Solver] = {}
+
+    def plan(self, progress: Progress | None = None, start: Plan | None = None) -> Plan:
+        """Plan; from `start`, else from the last solution, else from a guess."""
+        if self.scenario.is_fixed:
+            return _fixed_motion(self.scenario)
+        return _free_motion(_Search(self.scenario, self._solvers, progress), _start(self.scenario, start))
 
 
 def _start(scenario: Scenario, start: Plan | None) -> Deviation | None:
@@ -92,20 +113,19 @@ def _fixed_motion(scenario: Scenario) -> Plan:
 class _Search:
     """Solves one scenario's programs, one after the other, and keeps the time that it took."""
 
-    def __init__(self, scenario: Scenario, progress: Progress | None):
-        self.scenario, self._progress = scenario, progress
+    def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
+        self.scenario, self._solvers, self._progress = scenario, solvers, progress
         self.build_s, self.solve_s = 0.0, 0.0
 
     def solve(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
-        """Build and solve the program of `mesh` from `guess`; None: from one that it makes."""
+        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
         start = time.perf_counter()
-        program = transcription.build(self.scenario, mesh)
-        if guess is None:
-            start_at = initial_guess(self.scenario, program.shares * self.scenario.duration)
-        else:
-            start_at = guess.at(program.shares * guess.nodes[-1])
+        if mesh not in self._solvers:
+            self._solvers[mesh] = Solver(transcription.build(self.scenario, mesh))
+        solver = self._solvers[mesh]
         built = time.perf_counter()
-        outcome = transcription.solve(program, start_at, self._progress)
+        at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
+        outcome = solver.solve(at, self._progress)
         self.build_s += built - start
         self.solve_s += time.perf_counter() - built
         return outcome
@@ -121,9 +141,9 @@ class _Search:
         return audit(self.scenario.lasting(outcome.duration), outcome.deviation)
 
 
-def _free_motion(scenario: Scenario, progress: Progress | None, start: Deviation | None) -> Plan:
+def _free_motion(search: _Search, start: Deviation | None) -> Plan:
     """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
-    search = _Search(scenario, progress)
+    scenario = search.scenario
     steps = scenario.task.steps
     outcome = search.solve(Mesh(steps), start)
     if not outcome.success:

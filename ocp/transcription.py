@@ -11,7 +11,7 @@ duration T too where the task leaves it open:
           tube, reach, speed, tilt at the Bernstein points, acceleration at the nodes: so they hold between nodes too
 
 Tensions are in units of `Robot.force_scale`, the weight, moments over `Robot.length`. `build` makes the program and
-`solve` solves it, so that it can be looked at in between.
+a `Solver` solves it, so that it can be looked at in between.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import SolverError
 from . import spline
+from .guess import initial_guess
 from .layout import DURATION, MARGIN, Layout
 from .limits import limits as limits_of
 from .path import WaypointPath
@@ -156,55 +157,76 @@ def build(scenario: Scenario, mesh: Mesh) -> Program:
     )
 
 
-def solve(program: Program, guess: Deviation, progress: Progress | None = None, max_iterations: int = 400) -> Outcome:
-    """Solve the program with IPOPT from `guess`; that it found nothing is told, not raised.
-
-    Raises
-    ------
-    SolverError
-        If CasADi or IPOPT break.
-    KeyboardInterrupt
-        If a person stopped it.
-    """
-    return Solver(program, max_iterations).solve(guess, progress)
+# The guess is near: IPOPT's default 0.1 throws it away, and "adaptive" took 8 times as long.
+_FROM_A_GUESS = {"mu_init": 1e-2}
+# A solution with its multipliers is nearer still.
+_FROM_A_SOLUTION = {
+    "mu_init": 1e-6,
+    "warm_start_init_point": "yes",
+    "warm_start_bound_push": 1e-6,
+    "warm_start_bound_frac": 1e-6,
+    "warm_start_slack_bound_push": 1e-6,
+    "warm_start_slack_bound_frac": 1e-6,
+    "warm_start_mult_bound_push": 1e-6,
+}
 
 
 class Solver:
-    """IPOPT for one program, to be run from several guesses."""
+    """IPOPT for one program, to be run from several guesses, or from its own last solution."""
 
     def __init__(self, program: Program, max_iterations: int = 400):
         self.program = program
         self._watch = _Watch(program)
-        options: dict[str, Any] = {
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "tol": 1e-8,
-                "constr_viol_tol": 1e-9,
-                "max_iter": max_iterations,
-                "mu_init": 1e-2,  # the guess is near: the default 0.1 throws it away; "adaptive" took 8 times as long
-            },
-            "print_time": False,
-            "error_on_fail": False,
-            "iteration_callback": self._watch,
-        }
+        self._max_iterations = max_iterations
+        self._cold = self._make(_FROM_A_GUESS)
+        self._warm: ca.Function | None = None
+        self._last: dict[str, ca.DM] | None = None
+
+    def _make(self, start: dict[str, Any]) -> ca.Function:
+        quiet = {"print_level": 0, "sb": "yes"}
+        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
+        options = {"print_time": False, "error_on_fail": False, "iteration_callback": self._watch}
         try:
-            self._nlp = ca.nlpsol("planner", "ipopt", program.problem, options)
+            return ca.nlpsol("planner", "ipopt", self.program.problem, {"ipopt": quiet | accuracy | start, **options})
         except RuntimeError as error:
             raise _broken(error) from None
 
-    def solve(self, guess: Deviation, progress: Progress | None = None) -> Outcome:
-        """Solve from `guess`; see `solve`."""
+    def solve(self, guess: Deviation | None, progress: Progress | None = None) -> Outcome:
+        """Solve from `guess`; None: from the last solution and its multipliers, or else from a guess of our own.
+
+        That nothing is found is told, not raised.
+
+        Raises
+        ------
+        SolverError
+            If CasADi or IPOPT break.
+        KeyboardInterrupt
+            If a person stopped it.
+        """
         program, watch = self.program, self._watch
+        start: dict[str, Any] = {
+            "lbx": program.lower,
+            "ubx": program.upper,
+            "lbg": program.lower_g,
+            "ubg": program.upper_g,
+        }
+        if guess is not None or self._last is None:
+            nlp = self._cold
+            if guess is None:
+                guess = initial_guess(program.scenario, program.shares * program.scenario.duration)
+            start["x0"] = program.pack(guess)
+        else:
+            nlp = self._warm = self._warm or self._make(_FROM_A_SOLUTION)
+            start |= {"x0": self._last["x"], "lam_x0": self._last["lam_x"], "lam_g0": self._last["lam_g"]}
         watch.begin(progress)
-        bounds = {"lbx": program.lower, "ubx": program.upper, "lbg": program.lower_g, "ubg": program.upper_g}
         try:
-            result = self._nlp(x0=program.pack(guess), **bounds)
+            result = nlp(**start)
         except RuntimeError as error:
             raise _broken(error) from None
-        statistics = self._nlp.stats()
+        statistics = nlp.stats()
         if watch.interrupted or statistics["return_status"] == "User_Requested_Stop":
             raise KeyboardInterrupt
+        self._last = result if statistics["success"] else None
         x = result["x"].full().ravel()
         missing = program.layout.columns(x)[:, program.layout.missing]
         return Outcome(
