@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import BatchSolution, Status, TensionProblem, certify, solve_batch
+from ..solvers import BatchSolution, Status, TensionProblem, capacity_margin, certify, solve_batch
 
 Array = NDArray[np.float64]
 
@@ -108,8 +108,11 @@ def _compare(seed: int, data: tuple[Array, ...], answer: BatchSolution, row: int
     status = str(answer.status[row])
     if answer.feasible[row]:
         error = optimality_error(problem, answer.tensions[row])
-        told = [] if error < 1e-7 else [Disagreement(seed, status, f"optimality missed by {error:.1e}", np.inf)]
-        return Report(Counter(), told, error)
+        if error < 1e-7:
+            return Report(Counter(), [], error)
+        distance = abs(capacity_margin(problem).value) / (problem.tolerance(answer.tensions[row]) / 1e-9)
+        told = Disagreement(seed, status, f"optimality missed by {error:.1e}", distance)
+        return Report(Counter(), [told], 0.0 if distance <= BOUNDARY else error)
     certificate = certify(problem)
     if certificate is not None and certificate.verify(problem) and _excludes(answer.direction[row], problem):
         proven = Status.SINGULAR if certificate.singular else Status.INFEASIBLE
