@@ -1,14 +1,15 @@
 """The available wrench set as half-spaces, for a whole path at once: `facets`.
 
-The set {A t : t_min <= t <= t_max} is a zonotope. The normals of its facets are orthogonal to rank - 1 columns of A, and
-the facets lie at the support values along them: hyperplane shifting (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut
-2010). `solvers.capacity_margin` has the nearest of them for one wrench; here are all of them for many wrench matrices.
+The set {A t : t_min <= t <= t_max} is a zonotope. The normals of its facets are orthogonal to rank - 1 columns of A,
+and the facets lie at the support values along them: hyperplane shifting (Bouchard, Gosselin, Moore 2010; Gouttefarde,
+Krut 2010). `solvers.capacity_margin` has the nearest of them for one wrench; here are all of them for many matrices.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb
 
 import numpy as np
 
@@ -104,7 +105,7 @@ def _full(columns: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.nd
     count, n, m = columns.shape
     if n == 0:
         return np.zeros((count, 1, 0)), np.zeros((count, 1)), np.zeros((count, 1))
-    subsets = np.array(list(combinations(range(m), n - 1)), dtype=np.int64).reshape(-1, n - 1)
+    subsets = np.array(list(combinations(range(m), n - 1)), dtype=np.int64).reshape(comb(m, n - 1), n - 1)
     shared = np.zeros(len(subsets), dtype=np.int64)
     shared[1:] = np.cumprod(subsets[1:] == subsets[:-1], axis=1).sum(axis=1)
     normals = np.empty((count, len(subsets), n))

@@ -156,7 +156,7 @@ class Course:
             if not np.isfinite(most):
                 continue
             pair = np.stack([carriers.velocity[:, index, :3], carriers.acceleration[:, index, :3]], axis=2)
-            R = np.linalg.qr(pair, mode="r")  # (n, 2, 2)
+            R = np.asarray(np.linalg.qr(pair, mode="r"))  # (n, 2, 2)
             a, b = (R[:, :, k] @ around / most for k in (0, 1))
             found.append((a, b, np.full_like(a, -np.cos(np.pi / SIDES))))
         return found

@@ -54,6 +54,10 @@ class PhasePlane:
         a, b, c = (np.hstack(parts) for parts in zip(*rows, strict=True))
         return a, b, c
 
+    def rests_at_ends(self, weight: float) -> bool:
+        """Whether the platform can rest at the first and the last place."""
+        return bool((self.rows(weight)[2][[0, -1]] <= 0).all())
+
     def tension_rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The facets' half-planes alone: first those of `available.high`, then those of `available.low`."""
         normals, low, high = self.available.normals, self.available.low, self.available.high
@@ -104,25 +108,27 @@ def phase_plane(course: Course, limits: Limits, s: np.ndarray, margin: float, sh
 
 
 def proofs(course: Course, limits: Limits, s: np.ndarray, margin: float) -> list[Proof]:
-    """Proofs for the places among s, (N,), at which nothing is allowed; at the first and the last only rest is."""
+    """Proofs for the places among s, (N,), at which nothing is allowed.
+
+    At the first and the last that is rest, which lasts, so that the platform does not accelerate there either.
+    """
     robot, weight = course.robot, course.robot.force_scale
     plane = phase_plane(course, limits, s, margin)
     low, high = robot.t_min + margin, robot.t_max - margin
     platform, carriers = course.at(s)
     A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)
     whole = course.wrench(platform)
-    x_max = plane.x_max.copy()
-    x_max[[0, -1]] = 0.0
-    beside_span = plane.rows(weight)[2][:, -1] > 0
+    at_rest = plane.rows(weight)[2][:, -1] > 0  # beside the span of the cables whatever the speed
+    at_rest[[0, -1]] = True
     rows = plane.tension_rows(weight)
     in_rows = robot.dof_mask / np.array([1.0, 1, 1, *[robot.length] * 3])
     found = []
-    for k in np.flatnonzero(beside_span | (rows[2] > 0).any(axis=1)):  # at the others the platform can rest
-        if beside_span[k]:
+    for k in np.flatnonzero(at_rest | (rows[2] > 0).any(axis=1)):  # at the others the platform can rest
+        if at_rest[k]:
             problem = masked_problem(course.dynamics, A[k], whole.c[k], low, high)
             certificate = certify(problem)
         else:
-            (u, x), weights = _nearest(*(part[k] for part in rows), x_max[k])
+            (u, x), weights = _nearest(rows[0][k], rows[1][k], rows[2][k], plane.x_max[k])
             w = whole.a[k] * u + whole.b[k] * x + whole.c[k]
             problem = masked_problem(course.dynamics, A[k], w, low, high)
             direction = np.zeros(6)

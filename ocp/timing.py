@@ -1,9 +1,9 @@
 """`time_along`: the fastest time law along a given path that keeps every tension inside its limits.
 
-Along a path only s(t) is left to choose. The available wrench set at each s (`available_wrench`) and the wrench that the
-motion needs (`course`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds the fastest law inside
-all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the exact tension solver;
-what it misses between the grid points a finer grid and a little distance from the limits make good.
+Along a path only s(t) is left to choose. The available wrench set at each s (`available_wrench`) and the wrench that
+the motion needs (`course`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds the fastest law
+inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the exact tension
+solver; what it misses between the grid points a finer grid and a little distance from the limits make good.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ TOLERANCE = 1e-6  # [N], as the audit of plans has it
 LIMIT_TOLERANCE = 1e-6  # relative, of the other limits, likewise
 ATTEMPTS = 8
 MOST_INTERVALS = 6400
+FINER_TRIES = 2  # after a grid on which no law was found
 RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 COARSE = 1e-4  # of the weight or of a limit: what misses more needs a finer grid, what misses less some distance
 
@@ -43,12 +44,12 @@ class TimingStatus(StrEnum):
     """The audit saw no violation anywhere."""
 
     INFEASIBLE = "infeasible"
-    """At `Timing.at` no tensions inside their limits give the wrench that the path needs, whatever the speed, proven by
-    the certificate."""
+    """At `Timing.at` no tensions inside their limits give the wrench that the path needs, proven by the certificate:
+    whatever the speed inside its limits and the acceleration, or, at the ends, for the platform to rest there."""
 
     NOT_FOUND = "not-found"
-    """Every place of the path allows some speed, but no law was found that joins them; `Timing.at` is where it ended.
-    """
+    """Every place of the grid allows some speed, but no law was found that joins them, or none that the audit passes;
+    `Timing.at` is where the search ended or the audit saw most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +76,9 @@ class Timing:
         If not feasible: s of the certificate, or where the search ended.
     certificate
         If infeasible: proof along a wrench direction on which no allowed speed and acceleration helps. It is that of
-        `problem`, and the worst along the grid.
+        `problem`, and the one with the largest shortfall along the grid.
     problem
-        The tension problem of the speed and acceleration that come nearest, at `at`.
+        The tension problem at `at` for the speed and acceleration that come nearest; at the ends, for rest.
     blocked
         All grid points s at which there is such a proof.
     """
@@ -177,7 +178,7 @@ def time_along(
     carrier_acceleration_max: float | None = None,
     wind: tuple[float, float, float] | None = None,
 ) -> Timing:
-    """Find the fastest motion along a given path, from rest to rest, with every tension inside its limits.
+    """Find the fastest motion along a given path, from rest to lasting rest, with every tension inside its limits.
 
     Of the path only the geometry counts: lines and waypoints are taken as uniform, so that they rest nowhere; samples
     are waypoints unless carriers move with them. The tension limits are the facets of the available wrench set, the
@@ -311,26 +312,28 @@ def _search(course: Course, limits: Limits, margin: float, intervals: int) -> Ti
     """Solve, audit, and where the audit objects do so again on a finer grid or with more distance from the limits."""
     fastest, Rows = _toppra()
     weight = course.robot.force_scale
-    reserve, shrink = RESERVE * weight, 0.0
-    found = _without_law(TimingStatus.NOT_FOUND, course, margin, np.linspace(0, 1, intervals + 1), 0.0)
+    reserve, shrink, failures = RESERVE * weight, 0.0, 0
+    found = _without_law(TimingStatus.NOT_FOUND, course, margin, np.linspace(0, 1, intervals + 1), at=0.0)
     for _ in range(ATTEMPTS):
         s = np.linspace(0, 1, intervals + 1)
         plane = phase_plane(course, limits, s, margin + reserve, shrink)
         law = fastest(s, Rows(*plane.rows(weight), plane.x_max))
+        if failures == 0 and (law.x is None or not plane.rests_at_ends(weight)):
+            proven = proofs(course, limits, s, margin)
+            if proven:
+                worst = max(proven, key=lambda proof: proof.certificate.shortfall)
+                told = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
+                blocked = np.array([proof.s for proof in proven])
+                return _without_law(TimingStatus.INFEASIBLE, course, margin, s, blocked=blocked, **told)
         if law.unlimited:
             raise InputError(
                 "time_along: nothing limits the speed along this path; accepted: a path on which the platform's "
                 "motion takes tension, or limits of speed"
             )
         if law.x is None:
-            proven = proofs(course, limits, s, margin)
-            if proven:
-                worst = max(proven, key=lambda proof: proof.certificate.shortfall)
-                told = {"certificate": worst.certificate, "problem": worst.problem}
-                blocked = np.array([proof.s for proof in proven])
-                return _without_law(TimingStatus.INFEASIBLE, course, margin, s, worst.s, blocked=blocked, **told)
-            found = _without_law(TimingStatus.NOT_FOUND, course, margin, s, float(s[law.stuck or 0]))
-            if intervals == MOST_INTERVALS:
+            found = _without_law(TimingStatus.NOT_FOUND, course, margin, s, at=float(s[law.stuck or 0]))
+            failures += 1
+            if failures > FINER_TRIES:
                 return found
             intervals = min(2 * intervals, MOST_INTERVALS)
             continue
@@ -347,8 +350,8 @@ def _search(course: Course, limits: Limits, margin: float, intervals: int) -> Ti
     return found
 
 
-def _without_law(status: TimingStatus, course: Course, margin: float, s: np.ndarray, at: float, **told: Any) -> Timing:
-    return Timing(status, course, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), at=at, **told)
+def _without_law(status: TimingStatus, course: Course, margin: float, s: np.ndarray, **told: Any) -> Timing:
+    return Timing(status, course, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
 
 
 def _audit(timing: Timing, limits: Limits) -> tuple[float, float, float]:

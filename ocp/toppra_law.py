@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from toppra.algorithm import TOPPRA
@@ -22,6 +22,8 @@ from typing_extensions import override
 
 STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
+ROUNDING = 1e-12  # of a row along u: less is none
+FARTHEST = 1e9  # u and x in toppra's units; a limit beyond is none
 
 
 class Rows(NamedTuple):
@@ -81,13 +83,15 @@ class _Interval(AbstractGeometricPath):
 def fastest(s: np.ndarray, rows: Rows) -> Law:
     """The largest x at every s, (N,) rising from 0, from rest to rest."""
     # Measured in this unit of length, u and x are numbers that toppra's absolute tolerances suit.
-    unit = max(float(np.abs(rows.a).max(initial=0.0)), 1e-6) / STEEPNESS
-    x_max = np.minimum(rows.x_max * unit**2, 2 * UNLIMITED)
-    scaled = Rows(rows.a / unit, rows.b / unit**2, rows.c, x_max)
+    steepest = float(np.abs(rows.a).max(initial=0.0))
+    unit = steepest / STEEPNESS if steepest > ROUNDING else 1.0
+    never, scaled = _normalised(Rows(rows.a / unit, rows.b / unit**2, rows.c, rows.x_max * unit**2))
+    if never.any():
+        return Law(None, int(np.argmax(never)))
     grid = s * unit
     with _silence():
         algorithm = TOPPRA([_Limits(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
-        _, speeds, _, reach = algorithm.compute_parameterization(0.0, 0.0, return_data=True)
+        _, speeds, _, reach = _four(algorithm.compute_parameterization(0.0, 0.0, return_data=True))
     if speeds is None:
         lost = np.flatnonzero(np.isnan(reach).any(axis=1))
         return Law(None, int(lost[-1]) if lost.size else 0)
@@ -95,6 +99,21 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
         return Law(None, int(np.flatnonzero(np.isnan(speeds))[0]))
     x = speeds**2
     return Law(x / unit**2, None, bool(x.max() > UNLIMITED))
+
+
+def _normalised(rows: Rows) -> tuple[Any, Rows]:
+    """Where a limit cannot hold, (N,), and rows of length one: toppra takes two short ones for parallel."""
+    size = np.hypot(rows.a, rows.b)
+    idle = size * FARTHEST <= np.abs(rows.c)
+    per_size = 1.0 / np.where(idle, 1.0, size)
+    a, b = np.where(idle, 0.0, rows.a * per_size), np.where(idle, 0.0, rows.b * per_size)
+    c = np.where(idle, -1.0, rows.c * per_size)
+    return np.any(idle & (rows.c > 0), axis=1), Rows(a, b, c, np.minimum(rows.x_max, 2 * UNLIMITED))
+
+
+def _four(found: Any) -> tuple[Any, Any, Any, Any]:
+    """Of what toppra returns its hints say that there may be three or four."""
+    return found
 
 
 @contextmanager
