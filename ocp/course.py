@@ -33,7 +33,7 @@ LOOKS = 2001  # points at which the geometry is checked
 
 
 @dataclass(frozen=True)
-class Limits:
+class PathLimits:
     """What beside the tensions is limited; infinite: not."""
 
     speed: float  # of the platform [m/s]
@@ -134,7 +134,7 @@ class Course:
         c = needed(still, still)
         return Wrench(needed(still, first) - c, needed(first, second) - c, c)
 
-    def speed_limit(self, platform: Motion, carriers: Motion, limits: Limits) -> np.ndarray:
+    def speed_limit(self, platform: Motion, carriers: Motion, limits: PathLimits) -> np.ndarray:
         """The largest ds/dt that the limits of speed leave, (n,) [1/s]."""
         paces = [np.linalg.norm(platform.velocity[:, :3], axis=1) / limits.speed]
         if np.isfinite(limits.cable_speed).any():
@@ -144,7 +144,7 @@ class Course:
         with np.errstate(divide="ignore"):
             return 1.0 / np.max(paces, axis=0)
 
-    def carrier_rows(self, carriers: Motion, limits: Limits) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def carrier_rows(self, carriers: Motion, limits: PathLimits) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Limits of the carriers' accelerations as a u + b x + c <= 0, (n, SIDES) each, in parts of the limit.
 
         |P' u + P'' x| lies in the plane of P' and P''; a polygon inside the circle there stands for it.

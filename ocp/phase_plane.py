@@ -15,7 +15,7 @@ from ..solvers import Certificate, TensionProblem, certify
 from ..solvers.certificate import certificate_along
 from ..workspace.pose import masked_problem
 from .available_wrench import Facets, facets
-from .course import Course, Limits, Wrench
+from .course import Course, PathLimits, Wrench
 
 FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables lies in it
 
@@ -84,7 +84,7 @@ class Proof:
     certificate: Certificate
 
 
-def phase_plane(course: Course, limits: Limits, s: np.ndarray, margin: float, shrink: float = 0.0) -> PhasePlane:
+def phase_plane(course: Course, limits: PathLimits, s: np.ndarray, margin: float, shrink: float = 0.0) -> PhasePlane:
     """The limits at the places s, (N,), tensions `margin` [N] inside theirs, the others lowered by a share `shrink`.
 
     Raises
@@ -107,7 +107,7 @@ def phase_plane(course: Course, limits: Limits, s: np.ndarray, margin: float, sh
     return PhasePlane(wrench, available, x_max, lowered)
 
 
-def proofs(course: Course, limits: Limits, s: np.ndarray, margin: float) -> list[Proof]:
+def proofs(course: Course, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:
     """Proofs for the places among s, (N,), at which nothing is allowed.
 
     At the first and the last that is rest, which lasts, so that the platform does not accelerate there either.

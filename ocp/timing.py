@@ -8,7 +8,7 @@ solver; what it misses between the grid points a finer grid and a little distanc
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
@@ -22,7 +22,7 @@ from ..models.parsing import validate
 from ..models.robot import MobileCarrier, Name, NonNegative, Part, Positive, Vector3
 from ..solvers import Certificate, TensionProblem, certify, solve_batch
 from ..workspace.pose import masked_problem
-from .course import Course, Limits
+from .course import Course, PathLimits
 from .path import AnyPath, Curve, LinePath, Motion, SamplePath, TimedPath, WaypointPath
 from .phase_plane import phase_plane, proofs
 from .scenario import AUDIT_RATE, MOST_SAMPLES
@@ -173,7 +173,7 @@ def time_along(
     grid: int = 200,
     until: float | None = None,
     speed_max: float | None = None,
-    cable_speed_max: float | np.ndarray | None = None,
+    cable_speed_max: float | Sequence[float] | np.ndarray | None = None,
     carrier_speed_max: float | None = None,
     carrier_acceleration_max: float | None = None,
     wind: tuple[float, float, float] | None = None,
@@ -234,7 +234,7 @@ def time_along(
             "grid": grid,
             "until": until,
             "speed_max": speed_max,
-            "cable_speed_max": cable_speed_max,
+            "cable_speed_max": cable_speed_max.tolist() if isinstance(cable_speed_max, np.ndarray) else cable_speed_max,
             "carrier_speed_max": carrier_speed_max,
             "carrier_acceleration_max": carrier_acceleration_max,
             "wind": wind,
@@ -295,7 +295,7 @@ def _curve(path: AnyPath, *, alone: bool) -> Curve:
     return path
 
 
-def _limits(course: Course, request: _Request) -> Limits:
+def _limits(course: Course, request: _Request) -> PathLimits:
     """The limits of the request and those of the mobile carriers that move."""
     speed = {index: request.carrier_speed_max or np.inf for index in course.moving}
     acceleration = {index: request.carrier_acceleration_max or np.inf for index in course.moving}
@@ -305,10 +305,10 @@ def _limits(course: Course, request: _Request) -> Limits:
             speed[index] = min(speed[index], carrier.speed_max)
             acceleration[index] = min(acceleration[index], carrier.acceleration_max)
     of_cables = np.full(course.robot.m, np.inf if request.cable_speed_max is None else request.cable_speed_max)
-    return Limits(request.speed_max or np.inf, of_cables, speed, acceleration)
+    return PathLimits(request.speed_max or np.inf, of_cables, speed, acceleration)
 
 
-def _search(course: Course, limits: Limits, margin: float, intervals: int) -> Timing:
+def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -> Timing:
     """Solve, audit, and where the audit objects do so again on a finer grid or with more distance from the limits."""
     fastest, Rows = _toppra()
     weight = course.robot.force_scale
@@ -354,7 +354,7 @@ def _without_law(status: TimingStatus, course: Course, margin: float, s: np.ndar
     return Timing(status, course, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
 
 
-def _audit(timing: Timing, limits: Limits) -> tuple[float, float, float]:
+def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
     """The largest missing wrench [N], the largest relative excess of another limit, and s of the worse of the two."""
     course, robot, path = timing.course, timing.course.robot, timing.path
     duration = float(path.times[-1])

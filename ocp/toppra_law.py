@@ -91,7 +91,8 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
     grid = s * unit
     with _silence():
         algorithm = TOPPRA([_Limits(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
-        _, speeds, _, reach = _four(algorithm.compute_parameterization(0.0, 0.0, return_data=True))
+        found: Any = algorithm.compute_parameterization(0.0, 0.0, return_data=True)  # of three or four, its hints say
+    _, speeds, _, reach = found
     if speeds is None:
         lost = np.flatnonzero(np.isnan(reach).any(axis=1))
         return Law(None, int(lost[-1]) if lost.size else 0)
@@ -109,11 +110,6 @@ def _normalised(rows: Rows) -> tuple[Any, Rows]:
     a, b = np.where(idle, 0.0, rows.a * per_size), np.where(idle, 0.0, rows.b * per_size)
     c = np.where(idle, -1.0, rows.c * per_size)
     return np.any(idle & (rows.c > 0), axis=1), Rows(a, b, c, np.minimum(rows.x_max, 2 * UNLIMITED))
-
-
-def _four(found: Any) -> tuple[Any, Any, Any, Any]:
-    """Of what toppra returns its hints say that there may be three or four."""
-    return found
 
 
 @contextmanager

@@ -40,10 +40,10 @@ def test_a_thousand_awkward_problems_are_right():
 
 @pytest.mark.parametrize("seed", range(150))
 def test_awkward_tensions_are_those_of_enumeration(seed):
-    A, w, low, high = awkward_problem(10_000 + seed, m=1 + seed % 6)
-    problem = TensionProblem(A, w, low, high)
+    A, w, low, high, wish, weights = awkward_problem(10_000 + seed, m=1 + seed % 6)
+    problem = TensionProblem(A, w, low, high, wish, weights)
     solution = solve(problem)
-    expected = optimum_by_enumeration(A, w, low, high)
+    expected = optimum_by_enumeration(A, w, low, high, wish, weights)
     if solution.feasible and expected is not None:
         # The reference takes wrench errors up to 1e-9, which a nearly singular matrix makes visible in the tensions.
         asked = problem.tolerance(solution.tensions) / 1e-9
@@ -178,7 +178,7 @@ def test_wrong_arguments_are_told(change, message):
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_never_nan_never_outside_and_every_certificate_verifies(seed):
-    problem = TensionProblem(*awkward_problem(seed))
+    problem = TensionProblem(*awkward_problem(seed)[:4])
     solution = solve(problem)
     if solution.feasible:
         assert np.isfinite(solution.tensions).all()
@@ -206,7 +206,7 @@ def nearly_unavailable(seed):
     """
     rng = np.random.default_rng(seed)
     if seed % 2:
-        A, w, low, high = awkward_problem(seed)
+        A, w, low, high, *_ = awkward_problem(seed)
         found = certify(TensionProblem(A, w, low, high))
         d = A @ rng.normal(size=A.shape[1]) if found is None else found.direction
         at = np.where(d @ A > 0, high, low)
@@ -257,3 +257,51 @@ def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch
     monkeypatch.setattr(type(methods()["active-set"]), "direction", lambda self, problem: None)
     with pytest.raises(SolverError, match="active-set: says infeasible, but no certificate confirms it"):
         _ = solve(TensionProblem([[1.0, -1.0]], [60.0], 1, 60)).certificate
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, np.nan, np.inf, 1e30])
+@pytest.mark.parametrize("rho", [None, 1.0])
+def test_the_weight_of_a_single_cable_is_checked_too(weight, rho):
+    """One number for one cable: it once passed for "no weights"."""
+    for matrix in (np.ones((1, 1)), np.ones((20, 2, 1))):
+        batch = solve_batch(matrix, np.full(matrix.shape[-2], 0.5), 0.0, 1.0, weights=weight, rho=rho)
+        assert set(batch.count()) == {Status.INVALID}
+
+
+@pytest.mark.parametrize("rho", [1.0, 1e9])
+def test_the_residual_of_a_soft_row_is_that_of_its_tensions(rho):
+    """For rows that go alone as well: nearly no weight on one cable, no matrix at all, a huge limit."""
+    rng = np.random.default_rng(3)
+    A, low, high = rng.normal(size=(40, 2, 9)), np.zeros((40, 9)), np.ones((40, 9))
+    w = np.einsum("rim,rm->ri", A, rng.uniform(0, 1, (40, 9)))
+    A[::3] = 0.0
+    high[1::3, 2] = 1e9
+    batch = solve_batch(A, w, low, high, weights=10.0 ** rng.uniform(-10, 10, (40, 9)), rho=rho)
+    error = np.linalg.norm(np.einsum("rim,rm->ri", A, batch.tensions) - w, axis=1)
+    np.testing.assert_allclose(batch.residual, error, rtol=1e-6, atol=1e-14)
+
+
+def test_a_soft_row_solved_again_is_the_same_row():
+    A = np.random.default_rng(0).normal(size=(6, 8))
+    w = A @ np.full(8, 0.5)
+    batch = solve_batch(A, [w, 9 * w], 0.0, 1.0, rho=10.0)
+    for row in range(2):
+        again = batch.solution(row)
+        assert again.status == batch.status[row]
+        np.testing.assert_allclose(again.tensions, batch.tensions[row], atol=1e-9)
+
+
+@pytest.mark.parametrize("rho", [None, 1.0])
+def test_cables_that_are_all_fixed(rho):
+    """Nothing is left to choose."""
+    problem = TensionProblem(np.ones((2, 3)), [1.0, 1.0], 0.5, 0.5)
+    soft = solve(problem, "soft-wrench") if rho is None else solve(problem, "soft-wrench", rho=rho)
+    assert (soft.tensions == 0.5).all()
+    batch = solve_batch(problem.A, np.tile(problem.w, (20, 1)), 0.5, 0.5, rho=rho)
+    assert set(batch.count()) == {Status.INFEASIBLE if rho is None else Status.INACCURATE}
+
+
+def test_what_a_batch_returns_may_be_written():
+    batch = solve_batch(np.eye(2), np.ones((3, 2)), 0.0, 2.0)
+    batch.direction[0] = batch.shortfall[0] = batch.support[0] = 0.0
+    assert np.isnan(batch.direction[1]).all()

@@ -200,7 +200,7 @@ def test_carriers_moving_along_with_the_load_have_a_closed_form():
 def test_speeds_stay_inside_their_limits():
     robot = load("cogiro")
     free = time_along(robot, ROUND_TRIP)
-    limited = time_along(robot, ROUND_TRIP, speed_max=1.2, cable_speed_max=[1.0] * robot.m)
+    limited = time_along(robot, ROUND_TRIP, speed_max=1.2, cable_speed_max=np.ones(robot.m))
     assert limited.feasible
     assert limited.duration > free.duration
     times = np.linspace(0, limited.duration, 4001)

@@ -7,7 +7,7 @@ import math
 import numba
 import numpy as np
 
-from ..tolerances import FEASIBILITY, ROUNDING
+from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, INFEASIBLE, INVALID, OPTIMAL, UNSURE
 from .jit import GIVEN, VECTOR, jit
 from .lanes import lane_size, prepare, report
@@ -46,12 +46,14 @@ def _is_valid(A, w, lower, upper, ref, weights, length, n, m):
     for i in range(n):
         if not abs(w[i]) < 1e50:
             return False
+    heaviest, lightest = 0.0, np.inf
     for c in range(m):
         if not (lower[c] <= 1e50 and upper[c] >= -1e50 and lower[c] <= upper[c]):
             return False
         if not (abs(ref[c]) < 1e50 and 1e-20 <= weights[c] <= 1e20):
             return False
-    return True
+        heaviest, lightest = max(heaviest, weights[c]), min(lightest, weights[c])
+    return heaviest <= WEIGHTS_APART * lightest
 
 
 @jit()
@@ -80,7 +82,14 @@ def _alone_soft(A, w, lower, upper, ref, weights, length, soft, n, m, t, d, info
         return UNSURE
     t[:] = x[:m]
     e[:] = x[m:]
-    info[2] = math.sqrt((e * e).sum())
+    total = 0.0
+    for i in range(n):
+        missing = w[i]
+        for c in range(m):
+            missing -= A[i * m + c] * t[c]
+        missing /= length if n == 6 and i >= 3 else 1.0
+        total += missing * missing
+    info[2] = math.sqrt(total)
     asked, rounded = what_counts(A, w, lower, upper, ref, t, length, n, m)
     if info[2] <= FEASIBILITY * asked + ROUNDING * rounded:
         return OPTIMAL
@@ -107,7 +116,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
     Parameters
     ----------
     A, w, lower, upper, ref, weights, length :
-        As in `solve_packed`, all rows one after another. `weights` of one number stands for equal ones.
+        As in `solve_packed`, all rows one after another. An empty `weights` stands for equal ones.
     soft :
         1 / rho, the price of a squared wrench error beside squared tensions; 0 if the wrench must be met.
     per :
@@ -154,7 +163,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
                 lower[row * per[2] : row * per[2] + m],
                 upper[row * per[3] : row * per[3] + m],
                 ref[row * per[4] : row * per[4] + m],
-                weights[row * per[5] : row * per[5] + m] if weights.shape[0] > 1 else equal,
+                weights[row * per[5] : row * per[5] + m] if weights.shape[0] > 0 else equal,
                 length[row * per[6]],
                 soft,
                 n,
