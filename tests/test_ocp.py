@@ -528,7 +528,7 @@ WRONG = {
     "tilt in degrees": ({"path": CIRCLE, "base": {"kind": "free", "tilt_max": 10}}, "base.tilt_max: .*less than 1.5"),
     "path without kind": (
         {"path": CIRCLE, "base": {"kind": "free", "around": {"quad": {"pose": [0, 0, 0]}}}},
-        "base.around.quad.kind: is missing; accepted: one of circle, line, rest, samples, waypoints",
+        "base.around.quad.kind: is missing; accepted: one of circle, line, rest, samples, timed, waypoints",
     ),
     "same point twice": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -1], [0, 0, -2]]}, "duration": 2},
