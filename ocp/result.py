@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..models.parsing import to_yaml
-from ..writing import whole_file
+from ..writing import check_writable, whole_file
 from .audit import Audit
 from .scenario import Deviation, Scenario
 
@@ -56,6 +56,9 @@ class Plan:
         Wall time to build and to solve [s], over all attempts.
     iterations, message
         Of the last run of the solver; its own words.
+    iterates
+        Rows of (iteration, objective, infeasibility) of all runs of the solver, in order: where the iteration falls
+        back to 0 another run begins.
     """
 
     scenario: Scenario
@@ -66,6 +69,7 @@ class Plan:
     solve_s: float
     iterations: int = 0
     message: str = ""
+    iterates: tuple[tuple[int, float, float], ...] = ()
 
     @property
     def feasible(self) -> bool:
@@ -178,10 +182,45 @@ class Plan:
         return path
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Draw path, tensions and base offset as PNG files in `folder`; their paths."""
+        """Draw path, tensions, base offset and convergence as PNG files in `folder`; their paths.
+
+        There is no convergence where no solver ran: the task fixed the motion.
+        """
+        from ..figures import style
+        from ..figures.convergence import convergence
         from ..figures.plan import draw
 
-        return draw(self.trajectory, Path(folder))
+        drawn = draw(self.trajectory, Path(folder))
+        if self.iterates:
+            drawn.append(style.save(convergence(self.iterates), Path(folder) / "convergence.png"))
+        return drawn
+
+    def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
+        """Draw the robot in motion as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.
+
+        Cables are coloured by tension, and grey where no tensions exist.
+
+        Parameters
+        ----------
+        file
+            Ends in .gif or .mp4.
+        speed
+            Seconds of the motion in one second of the film; 1 is real time.
+        fps
+            Frames a second. GIF counts in hundredths of a second: it gets the nearest rate, at most 50, and the motion
+            keeps its speed.
+
+        Raises
+        ------
+        InputError
+            If the suffix, the speed or the rate are none that can be, or the place cannot be written to.
+        """
+        from ..figures import animation
+        from .scene import scene
+
+        path = check_writable(Path(file))
+        when = animation.timing(path, self.scenario.duration, speed, fps)
+        return animation.draw(scene(self, when.times), when, path)
 
     def report(self) -> str:
         """What a person wants to know first, as text."""
