@@ -80,7 +80,7 @@ def _write_gif(path: Path, draw: Draw, count: int, rate: float) -> None:
 
     shown = np.vstack([draw(k) for k in sorted({0, count // 2, count - 1})])
     colours = np.array(Image.fromarray(shown).quantize(256).getpalette()).reshape(-1, 3)
-    colours[colours.sum(axis=1).argmax()] = 255  # the paper, which was averaged with what is nearly white
+    colours[colours.min(axis=1) >= 248] = 255  # Pillow looks colours up in steps of 8: the paper would turn grey
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours.ravel().tolist())
 
