@@ -79,17 +79,28 @@ class Scene:
     t_max: np.ndarray
 
 
+def check_film(path: Path, speed: float, fps: float) -> float:
+    """The frame rate [1/s] that a film at `path` will have, before there is a motion to film.
+
+    Raises
+    ------
+    InputError
+        If the suffix, the speed or the frame rate are none that can be.
+    """
+    if not (speed > 0 and np.isfinite(speed)):
+        raise InputError(f"speed: {speed:g}; accepted: a number > 0, 1 is real time")
+    return film.frame_rate(path, fps)
+
+
 def timing(path: Path, duration: float, speed: float, fps: float) -> Timing:
     """When to look at a motion that lasts `duration` [s], for a film at `path`.
 
     Raises
     ------
     InputError
-        If the suffix, the speed or the frame rate are none that can be, or the film would be too long.
+        If `check_film` refuses it, or the film would be too long.
     """
-    if not (speed > 0 and np.isfinite(speed)):
-        raise InputError(f"speed: {speed:g}; accepted: a number > 0, 1 is real time")
-    rate = film.frame_rate(path, fps)
+    rate = check_film(path, speed, fps)
     count = duration * rate / speed + 1
     if count > MOST_FRAMES:
         raise InputError(

@@ -79,6 +79,6 @@ def _plain_labels(ax: Axes) -> None:
     """Label a logarithmic axis of less than a decade by plain numbers: it may have no power of ten to show."""
     from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 
-    ax.yaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_major_locator(MaxNLocator(6))
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))

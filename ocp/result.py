@@ -223,23 +223,28 @@ class Plan:
         return animation.draw(scene(self, when.times), when, path)
 
     def report(self) -> str:
-        """What a person wants to know first, as text."""
-        robot, task = self.scenario.robot, self.scenario.task
-        lines = [f"{robot.name}, {task.name}: {self.status.value.upper()}"]
-        if self.certificate is not None and self.audit.certificate is not None:
-            lines.append(f"  at t = {self.certificate['time']:.3f} s")
-            lines += [f"  {line}" for line in self.audit.certificate.in_words().splitlines()]
-        if self.tension_min is not None:
-            lines.append(f"  tensions {self.tension_min:.3f} N to {self.tension_max:.3f} N, margin {self.margin:.3f} N")
-        lines.append(f"  tracking error at most {self.tracking_error_max * 1e3:.3g} mm")
-        seen = self.audit.summary()
-        lines.append(
-            f"  audit at {seen['rate_hz']:g} Hz: worst violation {seen['worst_violation']:.3g} N at "
-            f"t = {seen['at_s']:.3f} s (up to {seen['tolerance']:.2g} N counts as none)"
-        )
-        lines += [f"  {sentence}" for sentence in seen["excess"]]
-        lines.append(f"  built in {self.build_s:.3f} s, solved in {self.solve_s:.3f} s")
-        return "\n".join(lines)
+        """What a person wants to know, as text: the verdict in the first line, then the facts that it rests on."""
+        from .report import as_text
+
+        return as_text(self)
+
+    def save_report(self, file: str | os.PathLike[str]) -> Path:
+        """Write the report as one HTML file with its figures inside, whole or not at all.
+
+        It loads nothing from anywhere, so that it can be mailed and kept. A method of its own, and not an argument of
+        `report`: what returns text writes no files, and `save_report` is found beside `save`.
+
+        Raises
+        ------
+        InputError
+            If the place cannot be written to.
+        """
+        from .report_page import page
+
+        path = Path(file)
+        with whole_file(path) as temporary:
+            temporary.write_text(page(self), encoding="utf-8")
+        return path
 
     def _output_rows(self) -> np.ndarray:
         """Rows of the audit that are saved: at equal times, and each of them audited."""
