@@ -40,11 +40,11 @@ def plan(
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
+    if animate is not None:
+        check_film(animate, speed, fps)
     for file in (target, report, animate):
         if file is not None:
             check_writable(file)
-    if animate is not None:
-        check_film(animate, speed, fps)
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         found = plan_motion(loaded, read, watch)
         found = replace(found, iterates=found.iterates or tuple(watch.rows))
@@ -60,7 +60,8 @@ def plan(
         print_json({**found.summary(), **files, "figures": [str(picture) for picture in pictures]})
     else:
         typer.echo(found.report())
+        typer.echo("  Written")
         for path in (*written.values(), *pictures):
-            typer.echo(f"  {path}")
+            typer.echo(f"    {path}")
     if not found.feasible:
         raise typer.Exit(1)

@@ -33,8 +33,8 @@ class Watch:
         if self.rows and iteration <= self.rows[-1][0]:
             self.attempt += 1
         self.rows.append((iteration, objective, infeasibility))
-        told = f"attempt {self.attempt}  iteration {iteration:<4} "
-        told += f"objective {objective:<10.4g} infeasibility {infeasibility:<8.1e}"
+        told = f"attempt {self.attempt}  iteration {iteration:<3}  "
+        told += f"objective {objective:<9.4g}  infeasibility {infeasibility:.1e}"
         self._shown.update(self._line, told=told)
 
     def now(self, what: str) -> None:
@@ -61,8 +61,7 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
     to = console or Console(stderr=True)
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        TextColumn("{task.fields[told]}", markup=False),
+        TextColumn("{task.description}\n{task.fields[told]}", markup=False),  # together too wide for 80 columns
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:

@@ -58,7 +58,7 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
     above.set_yscale("log")
     _scale_objective(below, np.concatenate([part[:, 1] for part in parts]) if parts else np.ones(1))
     if len(parts) > 1:
-        above.legend(fontsize="x-small", ncols=min(len(parts), 4), loc="best")
+        style.legend_below(canvas, above)
     return canvas
 
 

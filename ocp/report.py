@@ -71,13 +71,14 @@ def _why(plan: Plan) -> list[Fact]:
     facts: list[Fact] = []
     certificate, robot = plan.audit.certificate, plan.scenario.robot
     if certificate is not None:
+        pulled = ": the cables can but pull the other way"
         facts += [
             ("time", f"t = {plan.audit.certificate_time:.3f} s of {plan.scenario.duration:g} s"),
             ("constraint", _constraint(plan, certificate)),
             ("wrench direction", direction_in_words(certificate, robot)),
             ("as a vector", _vector(certificate)),
             ("needed", f"{_short(certificate.demand)} N along it"),
-            ("available", f"{_short(certificate.support)} N at most"),
+            ("available", f"{_short(certificate.support)} N at most" + pulled * (certificate.support < 0)),
             ("short by", f"{_short(certificate.shortfall)} N"),
         ]
     return facts + [("limit broken", sentence) for sentence in plan.audit.excess]

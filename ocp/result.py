@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..models.parsing import to_yaml
-from ..writing import check_writable, whole_file
+from ..writing import whole_file
 from .audit import Audit
 from .scenario import Deviation, Scenario
 
@@ -218,7 +218,7 @@ class Plan:
         from ..figures import animation
         from .scene import scene
 
-        path = check_writable(Path(file))
+        path = Path(file)
         when = animation.timing(path, self.scenario.duration, speed, fps)
         return animation.draw(scene(self, when.times), when, path)
 

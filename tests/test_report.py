@@ -1,5 +1,6 @@
 """What a plan shows a person: its report as text and HTML, its convergence, its film."""
 
+import shutil
 import time
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -13,7 +14,7 @@ from PIL import Image
 from rich.console import Console
 
 from towline.cli.watching import watching
-from towline.errors import InputError
+from towline.errors import InputError, TowlineError
 from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
 from towline.models import Dynamics, load
@@ -264,14 +265,11 @@ def test_gif_keeps_the_speed_though_it_counts_in_hundredths(impossible, tmp_path
 
 def test_mp4_by_ffmpeg_or_a_line_that_names_gif(impossible, tmp_path, monkeypatch):
     file = tmp_path / "film.mp4"
-    try:
+    if shutil.which("ffmpeg"):
         impossible.animate(file, fps=25)
-    except InputError as error:
-        assert "accepted without it: .gif" in str(error)
-    else:
         assert file.read_bytes()[4:8] == b"ftyp"
     monkeypatch.setitem(mpl.rcParams, "animation.ffmpeg_path", "/nowhere/ffmpeg")
-    with pytest.raises(InputError, match="ffmpeg, which is not installed; accepted without it: .gif"):
+    with pytest.raises(InputError, match=r"ffmpeg, which is not installed; accepted without it: \.gif"):
         impossible.animate(tmp_path / "other.mp4")
     assert not (tmp_path / "other.mp4").exists()
 
@@ -281,7 +279,7 @@ def test_a_broken_ffmpeg_is_one_line_and_leaves_no_file(tmp_path, monkeypatch):
     broken.write_text("#!/bin/sh\necho first >&2\necho 'no such codec' >&2\nexit 3\n")
     broken.chmod(0o755)
     monkeypatch.setitem(mpl.rcParams, "animation.ffmpeg_path", str(broken))
-    with pytest.raises(Exception, match="ffmpeg: stopped with exit code 3 .no such codec"):
+    with pytest.raises(TowlineError, match=r"ffmpeg: stopped with exit code 3 \(no such codec\)"):
         film.write(tmp_path / "film.mp4", lambda k: np.zeros((520, 700, 3), np.uint8), 50, 25)
     assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
 
@@ -306,8 +304,8 @@ def test_films_that_cannot_be_are_refused_in_one_line(impossible, file, options,
 
 
 def test_watching_shows_and_keeps_what_the_solver_tells():
-    """As wide as a terminal is by default: nothing is cut."""
-    screen = Console(file=StringIO(), force_terminal=True, width=120)
+    """On 80 columns nothing is cut."""
+    screen = Console(file=StringIO(), force_terminal=True, width=80)
     with watching("planning circle", console=screen) as watch:
         for row in ((0, 5.0, 1.0), (1, 3.25, 1e-3), (0, 3.5, 2e-2)):
             watch(*row)
