@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..models.robot import COORDINATES
 from ..solvers import Certificate, TensionProblem, certify, solve
 from ..workspace.pose import masked_problem
+from .limits import limits
 from .path import Motion
 from .scenario import AUDIT_RATE, Deviation, Scenario
 from .task import FreeBase
@@ -26,6 +27,7 @@ LIMIT_TOLERANCE = 1e-6  # relative, of the carriers' own limits
 PATH_TOLERANCE = 1e-7  # [m, rad], of the tube
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers start and end
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
+RATE_TOLERANCE = 1e-3  # relative, of tension rates: the audited tensions are the planned ones but for the wrench's rest
 LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 
 
@@ -46,7 +48,9 @@ class Audit:
     tracking_error
         Distance from the path at each time [m].
     excess
-        Other limits that do not hold (carriers, tube, ends, lengths that the drive keeps): sentences, empty if none.
+        Other limits that do not hold (carriers, tube, ends, lengths, those of `limits`): sentences, empty if none.
+    soft_excess
+        Soft limits that are passed, likewise.
     certificate, certificate_time
         The certificate with the largest shortfall and its time [s]; None if there is none.
     """
@@ -61,6 +65,7 @@ class Audit:
     tolerance: float
     tracking_error: np.ndarray  # (n,)
     excess: list[str] = field(default_factory=list)
+    soft_excess: list[str] = field(default_factory=list)
     certificate: Certificate | None = None
     certificate_time: float | None = None
 
@@ -82,6 +87,7 @@ class Audit:
             "at_s": float(self.times[self.worst]),
             "tolerance": self.tolerance,
             "excess": self.excess,
+            "soft_excess": self.soft_excess,
         }
 
 
@@ -103,6 +109,8 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         *_locked_excess(scenario, motion),
         *verdict.excess,
     ]
+    hard, soft = _limit_excess(scenario, times, motion, carriers, verdict.tensions)
+    excess += hard
     dof = len(robot.platform.dof)
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
@@ -115,6 +123,7 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         tolerance=UNDERACTUATED_TOLERANCE * robot.force_scale if robot.m < dof and scenario.count else TOLERANCE,
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
         excess=excess,
+        soft_excess=soft,
         certificate=verdict.certificate,
         certificate_time=None if verdict.at is None else float(times[verdict.at]),
     )
@@ -206,11 +215,11 @@ def _path_excess(scenario: Scenario, off_path: np.ndarray) -> list[str]:
     """Whether the platform leaves its tube, one sentence each for position and attitude."""
     tube, found = scenario.task.tube, []
     away = float(np.linalg.norm(off_path[:, :3], axis=1).max())
-    if away > tube.position + PATH_TOLERANCE:
-        found.append(f"platform: {away:.6g} m off its path exceeds the tube's {tube.position:g} m")
+    if away > tube.radius + PATH_TOLERANCE:
+        found.append(f"platform: {away:.6g} m off its path exceeds the tube's {tube.radius:g} m")
     turned = float(np.abs(off_path[:, 3:]).max())
-    if turned > tube.attitude + PATH_TOLERANCE:
-        found.append(f"platform: {turned:.6g} rad off its path exceeds the tube's {tube.attitude:g} rad")
+    if turned > tube.turn + PATH_TOLERANCE:
+        found.append(f"platform: {turned:.6g} rad off its path exceeds the tube's {tube.turn:g} rad")
     return found
 
 
@@ -240,6 +249,41 @@ def _length_excess(scenario: Scenario, motion: Motion, carriers: Motion) -> list
         f"cable {i + 1}: its length is up to {off[i]:.3g} m off the fixed {kept[i]:g} m"
         for i in np.flatnonzero(off > LENGTH_TOLERANCE)
     ]
+
+
+def _limit_excess(
+    scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, tensions: np.ndarray
+) -> tuple[list[str], list[str]]:
+    """Which of `limits` do not hold, the worst instant of each in a sentence: hard ones and soft ones."""
+    hard: list[str] = []
+    soft: list[str] = []
+    most = scenario.task.limits.tension_rate
+    rates = np.abs(np.diff(tensions, axis=0)) / np.diff(times)[:, None]
+    if most is not None and np.nanmax(rates, initial=0.0) > most * (1 + RATE_TOLERANCE):
+        row, cable = np.unravel_index(np.nanargmax(rates), rates.shape)
+        rate = rates[row, cable]
+        hard.append(f"tension_rate: cable {cable + 1} at t = {times[row]:.3f} s: {rate:.6g} N/s exceeds {most:g} N/s")
+    found = limits(scenario)
+    if not found.all:
+        return hard, soft
+    bodies = [np.hstack(motion), *(np.hstack([part[:, i] for part in carriers]) for i in range(carriers.pose.shape[1]))]
+    values = found.function.map(len(times))(*(body.T for body in bodies), tensions.T).full().T
+    at = 0
+    for limit in found.all:
+        mine = values[:, at : at + len(limit.labels)]
+        at += len(limit.labels)
+        beyond = np.nan_to_num(np.maximum(limit.low - mine, mine - limit.high))
+        tolerance = UNDERACTUATED_TOLERANCE if limit.equation else LIMIT_TOLERANCE
+        if beyond.max() <= tolerance * limit.scale:
+            continue
+        row, which = np.unravel_index(beyond.argmax(), beyond.shape)
+        value, bound = mine[row, which], limit.low if mine[row, which] < limit.low else limit.high
+        sentence = (
+            f"{limit.name}: {limit.labels[which]} at t = {times[row]:.3f} s: {value:.6g} {limit.unit}, "
+            f"accepted: {'at least' if bound == limit.low else 'at most'} {bound:g} {limit.unit}"
+        )
+        (hard if limit.soft is None else soft).append(sentence)
+    return hard, soft
 
 
 def _wished_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> np.ndarray | None:

@@ -43,6 +43,11 @@ class PathBase(Part):
         """How long the path takes by its own numbers [s]; None: as long as the task says."""
         return None
 
+    @property
+    def stretches(self) -> bool:
+        """Whether another duration means the same places, later or sooner."""
+        return False
+
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
         raise TypeError(f"{type(self).__name__} is no path")
@@ -53,6 +58,11 @@ class RestPath(PathBase):
 
     kind: Literal["rest"]
     pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+
+    @property
+    @override
+    def stretches(self) -> bool:
+        return True
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
@@ -70,6 +80,11 @@ class LinePath(PathBase):
         default="smooth",
         description="smooth: from rest to rest, acceleration and jerk zero there; uniform: constant speed",
     )
+
+    @property
+    @override
+    def stretches(self) -> bool:
+        return True
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
@@ -143,19 +158,26 @@ class WaypointPath(PathBase):
     def natural_duration(self) -> float | None:
         return None if self.times is None else self.times[-1]
 
+    @property
+    @override
+    def stretches(self) -> bool:
+        return self.times is None
+
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
         from scipy.interpolate import make_interp_spline
 
-        points = np.array(self.points)
-        if self.times is None:
-            steps = np.linalg.norm(np.diff(points, axis=0), axis=1)  # a radian counts as a metre
-            knots = np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
-        else:
-            knots = np.array(self.times)
+        points, knots = np.array(self.points), self.knots(duration)
         at_rest = [(derivative, np.zeros(6)) for derivative in (1, 2, 3)]
         spline = make_interp_spline(knots, points, k=7, bc_type=(at_rest, at_rest))
         return Motion(spline(times), spline(times, 1), spline(times, 2))
+
+    def knots(self, duration: float) -> np.ndarray:
+        """When the path is at its points [s]."""
+        if self.times is not None:
+            return np.array(self.times)
+        steps = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)  # a radian counts as a metre
+        return np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
 
 
 class SamplePath(PathBase):

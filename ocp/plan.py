@@ -6,13 +6,14 @@ import os
 import time
 from typing import Any
 
+from ..errors import InputError
 from ..models import Robot
 from . import transcription
 from .audit import Audit, audit
 from .result import Plan, PlanStatus
 from .scenario import Deviation, Scenario, lay_out
 from .task import Task, read_task
-from .transcription import Mesh, Outcome, Progress
+from .transcription import Mesh, Outcome, Progress, Solver
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
@@ -22,7 +23,12 @@ SHRINK = 2e-3  # of the carriers' speed and acceleration limits
 NO_SLACK = 1e-6  # of the weight: a motion that misses less at its nodes is a start for another try
 
 
-def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], progress: Progress | None = None) -> Plan:
+def plan(
+    robot: Robot,
+    task: Task | dict[str, Any] | str | os.PathLike[str],
+    progress: Progress | None = None,
+    start: Plan | None = None,
+) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
     The platform follows the task's path, exactly or inside a tube; the carriers hold, move as given, or are free inside
@@ -37,6 +43,8 @@ def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], pro
         A `Task`, a mapping with its keys, or the path of a YAML file.
     progress
         Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
+    start
+        A plan of the same robot for a similar task, to start from; None: the planner makes its own guess.
 
     Returns
     -------
@@ -50,10 +58,48 @@ def plan(robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str], pro
     InputError
         If the task is not valid or does not fit the robot; one line naming the field and the value.
     """
-    scenario = lay_out(robot, read_task(task))
-    if scenario.count == 0:
-        return _fixed_motion(scenario)
-    return _free_motion(scenario, progress)
+    return Planner(robot, task).plan(progress, start)
+
+
+class Planner:
+    """Plans one task, again if need be: programs and solvers are kept, and the last solution to start from.
+
+    Parameters
+    ----------
+    robot, task
+        As for `plan`.
+
+    Raises
+    ------
+    InputError
+        As `plan` does.
+    """
+
+    def __init__(self, robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str]):
+        self.scenario = lay_out(robot, read_task(task))
+        self._solvers: dict[Mesh, Solver] = {}
+
+    def plan(self, progress: Progress | None = None, start: Plan | None = None) -> Plan:
+        """Plan; from `start`, else from the last solution, else from a guess."""
+        if self.scenario.is_fixed:
+            return _fixed_motion(self.scenario)
+        return _free_motion(_Search(self.scenario, self._solvers, progress), _start(self.scenario, start))
+
+
+def _start(scenario: Scenario, start: Plan | None) -> Deviation | None:
+    """What a plan to start from deviates by, stretched to this scenario's duration."""
+    if start is None or start.deviation is None:
+        return None
+    theirs = start.deviation
+    if start.scenario.owners() != scenario.owners() or theirs.tensions.shape[1] != scenario.robot.m:
+        raise InputError(
+            f"start: is a plan of {start.scenario.robot.name!r} for {start.scenario.task.name!r} with other "
+            "coordinates free; accepted: one whose robot, tube and base leave the same coordinates free"
+        )
+    if scenario.duration_range is not None:
+        return theirs
+    stretch = scenario.duration / theirs.nodes[-1]
+    return Deviation(theirs.nodes * stretch, theirs.q, theirs.v / stretch, theirs.a / stretch**2, theirs.tensions)
 
 
 def _fixed_motion(scenario: Scenario) -> Plan:
@@ -67,18 +113,19 @@ def _fixed_motion(scenario: Scenario) -> Plan:
 class _Search:
     """Solves one scenario's programs, one after the other, and keeps the time that it took."""
 
-    def __init__(self, scenario: Scenario, progress: Progress | None):
-        self.scenario, self._progress = scenario, progress
+    def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
+        self.scenario, self._solvers, self._progress = scenario, solvers, progress
         self.build_s, self.solve_s = 0.0, 0.0
 
     def solve(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
-        """Build and solve the program of `mesh` from `guess`; None: from one that it makes."""
+        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
         start = time.perf_counter()
-        program = transcription.build(self.scenario, mesh)
-        nodes = program.nodes
-        start_at = transcription.initial_guess(self.scenario, nodes) if guess is None else guess.at(nodes)
+        if mesh not in self._solvers:
+            self._solvers[mesh] = Solver(transcription.build(self.scenario, mesh))
+        solver = self._solvers[mesh]
         built = time.perf_counter()
-        outcome = transcription.solve(program, start_at, self._progress)
+        at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
+        outcome = solver.solve(at, self._progress)
         self.build_s += built - start
         self.solve_s += time.perf_counter() - built
         return outcome
@@ -86,21 +133,27 @@ class _Search:
     def plan(self, status: PlanStatus, outcome: Outcome, seen: Audit) -> Plan:
         """What came of it."""
         told = (outcome.iterations, outcome.message)
-        return Plan(self.scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told)
+        scenario = self.scenario.lasting(outcome.duration)
+        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told)
+
+    def audit(self, outcome: Outcome) -> Audit:
+        """What the audit says of it."""
+        return audit(self.scenario.lasting(outcome.duration), outcome.deviation)
 
 
-def _free_motion(scenario: Scenario, progress: Progress | None) -> Plan:
+def _free_motion(search: _Search, start: Deviation | None) -> Plan:
     """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
-    search = _Search(scenario, progress)
+    scenario = search.scenario
     steps = scenario.task.steps
-    outcome = search.solve(Mesh(steps), None)
+    outcome = search.solve(Mesh(steps), start)
     if not outcome.success:
         closest = search.solve(Mesh(steps, elastic=True), None)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
-            return search.plan(PlanStatus.NOT_FOUND, closest, audit(scenario, closest.deviation))
+            seen = search.audit(closest)
+            return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, closest, seen)
         outcome = search.solve(Mesh(steps), closest.deviation)
     reserve, shrink = 0.0, 0.0
-    seen = audit(scenario, outcome.deviation)
+    seen = search.audit(outcome)
     for attempt in range(1, REFINEMENTS + 1):
         if seen.passed or not outcome.success:
             break
@@ -110,6 +163,6 @@ def _free_motion(scenario: Scenario, progress: Progress | None) -> Plan:
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if seen.excess else shrink
         outcome = search.solve(Mesh(steps, reserve * scenario.robot.force_scale, shrink), outcome.deviation)
-        seen = audit(scenario, outcome.deviation)
+        seen = search.audit(outcome)
     feasible = seen.passed and outcome.success
     return search.plan(PlanStatus.FEASIBLE if feasible else PlanStatus.NOT_FOUND, outcome, seen)

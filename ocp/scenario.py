@@ -12,10 +12,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..models import Dynamics, Robot
-from ..models.robot import MobileCarrier
+from ..models.robot import MobileCarrier, QuadrotorCarrier
 from . import spline
 from .path import AnyPath, Motion, RestPath
-from .task import FreeBase, GivenBase, HoldBase, Task
+from .task import DurationRange, FreeBase, GivenBase, HoldBase, Task
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
@@ -81,16 +81,26 @@ class Scenario:
     carrier_free: list[tuple[int, int]]
     limits: dict[int, Limits]
     carrier_paths: dict[int, AnyPath] = field(repr=False)
+    duration: float  # [s]; of a task that leaves it open: where the planner starts, then what it chose
 
     @property
-    def duration(self) -> float:
-        """[s]."""
-        return self.task.seconds
+    def duration_range(self) -> DurationRange | None:
+        """What the planner may choose the duration from; None if it is given."""
+        return self.task.duration if isinstance(self.task.duration, DurationRange) else None
+
+    def lasting(self, seconds: float) -> Scenario:
+        """The same with another duration [s]."""
+        return replace(self, duration=seconds)
 
     @property
     def count(self) -> int:
         """Number n of free coordinates."""
         return len(self.platform_free) + len(self.carrier_free)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the task leaves nothing to choose but tensions."""
+        return self.count == 0 and self.duration_range is None
 
     @property
     def output_samples(self) -> int:
@@ -162,12 +172,6 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     """
     where = f"task {task.name!r}"
     relative = _frame(robot, task, where)
-    for carrier in robot.carriers:
-        if carrier.kind == "quadrotor":
-            raise InputError(
-                f"{where}: robot {robot.name!r} hangs from {carrier.name!r} of kind quadrotor, whose thrust and "
-                "attitude the planner does not know; accepted: carriers of kind ground, prescribed, mobile"
-            )
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:
             raise InputError(
@@ -176,7 +180,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
             )
     if task.wind is not None and robot.platform.aero is None:
         raise InputError(f"{where}: wind: robot {robot.name!r} has no platform.aero; accepted: none")
-    opened = [*POSITION] * (task.tube.position > 0) + [*ATTITUDE] * (task.tube.attitude > 0)
+    opened = [*POSITION] * (task.tube.radius > 0) + [*ATTITUDE] * (task.tube.turn > 0)
     platform_free = [coordinate for coordinate in opened if robot.dof_mask[coordinate]]
     scenario = Scenario(
         robot=robot,
@@ -187,6 +191,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         carrier_free=_free_carriers(robot, task.base, where),
         limits=_limits(robot, task.base),
         carrier_paths=_carrier_paths(robot, task.base, where),
+        duration=task.seconds,
     )
     _check_times(task, where)
     return scenario
@@ -203,12 +208,20 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
 
 def _check_times(task: Task, where: str) -> None:
     """Refuse a task that does not last as long as its waypoints: beyond their times a spline is anything."""
-    if task.seconds * AUDIT_RATE > MOST_SAMPLES:
+    longest = task.duration.max if isinstance(task.duration, DurationRange) else task.seconds
+    if longest * AUDIT_RATE > MOST_SAMPLES:
         raise InputError(
-            f"{where}: duration: {task.seconds:g} s; accepted: at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the "
+            f"{where}: duration: {longest:g} s; accepted: at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the "
             f"audit looks {AUDIT_RATE:g} times a second"
         )
     paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
+    if isinstance(task.duration, DurationRange):
+        for name, path in paths.items():
+            if not path.stretches:
+                raise InputError(
+                    f"{where}: duration: is to be chosen, but {name} of kind {path.kind} has times of its own; "
+                    "accepted: a number [s], or paths of kind rest, line, waypoints without times"
+                )
     for name, path in paths.items():
         end = path.natural_duration if path.kind in ("waypoints", "samples") else None
         if end is not None and task.seconds > end * (1 + 1e-9):
@@ -249,6 +262,8 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
     for index, carrier in enumerate(robot.carriers):
         if carrier.kind == "prescribed":
             free += [(index, coordinate) for coordinate in (*POSITION, *([3, 4] if base.tilt_max > 0 else []))]
+        elif carrier.kind == "quadrotor":
+            free += [(index, coordinate) for coordinate in (*POSITION, 3, 4)]
         elif carrier.kind == "mobile" and robot.drive != "variable-length":
             free += [(index, coordinate) for coordinate in POSITION]
     if not free:
@@ -274,6 +289,16 @@ def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, Li
                 tilt=None,
                 turn_acceleration=None,
                 attitude=np.array(carrier.home[3:]),
+            )
+        elif isinstance(carrier, QuadrotorCarrier):
+            limits[index] = Limits(
+                acceleration=_tighter(acceleration, carrier.acceleration_max),
+                speed=_tighter(speed, carrier.speed_max),
+                low=np.full(3, -np.inf),
+                high=np.full(3, np.inf),
+                tilt=_tighter(free.tilt_max or None if free else None, carrier.tilt_max),
+                turn_acceleration=free.turn_acceleration_max if free else None,
+                attitude=None,
             )
         elif free and carrier.kind == "prescribed":
             limits[index] = Limits(

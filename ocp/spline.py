@@ -20,7 +20,7 @@ Values: TypeAlias = Any  # np.ndarray or a CasADi expression
 
 
 def defects(
-    h: float, start: tuple[Values, Values, Values], end: tuple[Values, Values, Values]
+    h: Values, start: tuple[Values, Values, Values], end: tuple[Values, Values, Values]
 ) -> tuple[Values, Values]:
     """How far (q', v') at the end is from what integration gives; zero on a motion."""
     q, v, a = start
@@ -28,12 +28,12 @@ def defects(
     return q_end - (q + h * v + h**2 / 6 * (2 * a + a_end)), v_end - (v + h / 2 * (a + a_end))
 
 
-def position_points(h: float, q: Values, v: Values, q_end: Values, v_end: Values) -> list[Values]:
+def position_points(h: Values, q: Values, v: Values, q_end: Values, v_end: Values) -> list[Values]:
     """The two inner Bernstein points of the cubic q; the outer two are q and q'."""
     return [q + h / 3 * v, q_end - h / 3 * v_end]
 
 
-def speed_point(h: float, v: Values, a: Values) -> Values:
+def speed_point(h: Values, v: Values, a: Values) -> Values:
     """The inner Bernstein point of the quadratic v; the outer two are v and v'."""
     return v + h / 2 * a
 

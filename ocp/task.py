@@ -4,24 +4,58 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..models.parsing import read_yaml, validate
 from ..models.robot import Name, NonNegative, Part, Pose, Positive, Vector3
 from .path import AnyPath
+from .task_limits import TaskLimits
+
+FREE_TURN = 1.2  # [rad], from the path's angles, short of where Euler angles lose their meaning
 
 
 class Tube(Part):
     """How far the platform may leave its path, and whether it may at the ends."""
 
-    position: NonNegative = Field(default=0.0, description="radius about the path [m]; 0: follow it exactly")
-    attitude: NonNegative = Field(default=0.0, description="each of roll, pitch, yaw [rad]; 0: follow them exactly")
+    position: NonNegative | Literal["free"] = Field(
+        default=0.0, description="radius about the path [m]; 0: follow it exactly; free: the path is only a first guess"
+    )
+    attitude: NonNegative | Literal["free"] = Field(
+        default=0.0, description="each of roll, pitch, yaw [rad]; 0: follow them exactly; free: up to 1.2 rad"
+    )
     ends: Literal["free", "exact"] = Field(
         default="free", description="exact: no deviation and no deviating speed at start and end"
     )
+    waypoints: Literal["free", "exact"] = Field(
+        default="free", description="exact: no deviation at the points of a path of kind waypoints either"
+    )
+
+    @property
+    def radius(self) -> float:
+        """Of the tube about the path [m]; infinite if the position is free."""
+        return np.inf if self.position == "free" else self.position
+
+    @property
+    def turn(self) -> float:
+        """How far each angle may leave the path's [rad]."""
+        return FREE_TURN if self.attitude == "free" else self.attitude
+
+
+class DurationRange(Part):
+    """A duration that the planner chooses."""
+
+    min: Positive = Field(description="[s]")
+    max: Positive = Field(description="[s]")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.min > self.max:
+            raise ValueError(f"min: {self.min:g} s is more than max: {self.max:g} s; accepted: min <= max")
+        return self
 
 
 class HoldBase(Part):
@@ -78,6 +112,12 @@ class Objective(Part):
     carrier_acceleration: Positive = Field(default=1.0, description="[m/s^2, rad/s^2]")
     carrier_offset: Positive = Field(default=10.0, description="carrier away from `around` or home [m, rad]")
     jerk: Positive = Field(default=10.0, description="of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth")
+    tension_rate: Positive | None = Field(default=None, description="of each tension [N/s]; null: costs nothing")
+    time: Positive | None = Field(default=None, description="duration that costs one, itself not squared [s]")
+    margin: Positive | None = Field(
+        default=None,
+        description="smallest distance of any tension from its limits that earns one, itself not squared [N]",
+    )
 
 
 class Task(Part):
@@ -85,11 +125,14 @@ class Task(Part):
 
     name: Name = "task"
     path: AnyPath = Field(description="what the platform follows")
-    duration: Positive | None = Field(default=None, description="[s]; none: the path's own")
+    duration: Positive | DurationRange | None = Field(
+        default=None, description="[s], or a range for the planner to choose from; none: the path's own"
+    )
     base: AnyBase = Field(default=HoldBase(kind="hold"), description="what the carriers do: hold, given or free")
     tube: Tube = Tube()
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
     wind: Vector3 | None = Field(default=None, description="constant, in {G} [m/s]; none: no air")
+    limits: TaskLimits = TaskLimits()
     steps: int = Field(default=100, ge=4, le=20_000, description="intervals of the transcription")
     objective: Objective = Objective()
     output_rate: Positive = Field(
@@ -98,13 +141,15 @@ class Task(Part):
 
     @property
     def seconds(self) -> float:
-        """How long the motion lasts [s].
+        """How long the motion lasts [s]; of a range its geometric mean, where the planner starts.
 
         Raises
         ------
         InputError
             If neither the task nor its path says so.
         """
+        if isinstance(self.duration, DurationRange):
+            return float(np.sqrt(self.duration.min * self.duration.max))
         seconds = self.duration if self.duration is not None else self.path.natural_duration
         if seconds is None:
             raise InputError(f"task {self.name!r}: duration: is missing; accepted: a number > 0 [s]")

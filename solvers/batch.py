@@ -49,7 +49,10 @@ class BatchSolution:
     time :
         Wall time of the call [s].
     problem :
-        A, w, t_min, t_max, t_ref, weights and length, broadcast.
+        A, w, t_min, t_max, t_ref, weights and length, broadcast. Views of what was given, where that was an array of
+        float64: not to be changed as long as `solution` may be asked.
+    rho :
+        As it was given.
     """
 
     tensions: Array  # (..., m)
@@ -60,6 +63,7 @@ class BatchSolution:
     support: Array  # (...)
     time: float
     problem: dict[str, Array]
+    rho: float | None = None
 
     statuses = _STATUSES
 
@@ -81,6 +85,8 @@ class BatchSolution:
     def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
         """Solve one row again by itself, for its certificate and all that a `TensionSolution` can tell.
 
+        With the method "active-set", or "soft-wrench" if `rho` was given.
+
         Raises
         ------
         InputError
@@ -93,7 +99,7 @@ class BatchSolution:
             raise InputError(f"index: is {shown(index)}; accepted: {accepted}") from None
         if np.ndim(picked):
             raise InputError(f"index: is {shown(index)}, {np.size(picked)} rows; accepted: {accepted}")
-        return solve(_row(self.problem, index))
+        return _alone(_row(self.problem, index), self.rho)
 
 
 def solve_batch(
@@ -167,7 +173,7 @@ def solve_batch(
     flat, per = [], np.zeros(7, np.int64)
     for position, (name, value) in enumerate(given.items()):
         if weights is None and name == "weights":
-            flat.append(np.ones(1))
+            flat.append(np.empty(0))
             continue
         own, tail = value.shape[: value.ndim - core[name]], value.shape[value.ndim - core[name] :]
         if np.prod(own, dtype=np.int64) != 1:
@@ -202,7 +208,8 @@ def solve_batch(
         unproven = (code == _OPTIMAL) | (code == _CODES[Status.INVALID]) | np.isnan(proof[:, 1])
         d[unproven], proof[unproven] = np.nan, np.nan
         for row in np.flatnonzero(code == _UNSURE):
-            solution = _one_by_one(row, lead, problem, rho)
+            index = tuple(int(i) for i in np.unravel_index(row, lead))
+            solution = _alone(_row(problem, index), rho)
             code[row] = _CODES[solution.status]
             if solution.tensions is not None:
                 t[row], residual[row] = solution.tensions, solution.residual
@@ -210,7 +217,7 @@ def solve_batch(
             if (certificate := solution.certificate) is not None:
                 d[row], proof[row] = certificate.direction, (certificate.support, certificate.shortfall)
     else:
-        d, proof = np.broadcast_to(np.nan, d.shape), np.broadcast_to(np.nan, proof.shape)
+        d[:], proof[:] = np.nan, np.nan
     return BatchSolution(
         t.reshape(*lead, m),
         code.reshape(lead),
@@ -220,13 +227,13 @@ def solve_batch(
         proof[:, 0].reshape(lead),
         time.perf_counter() - start,
         problem,
+        rho,
     )
 
 
-def _one_by_one(row: np.intp, lead: tuple[int, ...], problem: dict[str, Array], rho: float | None) -> TensionSolution:
-    """Solve a row that the kernels left open."""
-    stated = _row(problem, tuple(int(i) for i in np.unravel_index(row, lead)))
-    return solve(stated) if rho is None else solve(stated, method="soft-wrench", rho=rho)
+def _alone(problem: TensionProblem, rho: float | None) -> TensionSolution:
+    """Solve one row by the method of the batch."""
+    return solve(problem) if rho is None else solve(problem, method="soft-wrench", rho=rho)
 
 
 def _row(problem: dict[str, Array], index: int | tuple[int, ...]) -> TensionProblem:

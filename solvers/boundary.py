@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from . import compiled
 from .direct_daqp import bounded_least_norm
 from .problem import TensionProblem
 from .projection import project
@@ -25,7 +26,9 @@ def boundary_candidates(problem: TensionProblem, form: StandardForm) -> Iterator
     """Yield points s, shape (k,), that give the available wrench nearest to w, the best first.
 
     The projection of w is available without doubt, its tensions are at hand, and limits with a hair of room around
-    them give even an exact method something to find. Those tensions themselves, not of least norm, come last.
+    them give even an exact method something to find. Where the weights are eleven decades apart the daqp package finds
+    nothing there either, although w may be far from the boundary: then our own kernel is asked, loaded if need be. The
+    tensions of the projection themselves, not of least norm, come last.
     """
     nearest = (project(problem)[0] - form.origin)[form.moving] / form.unit
     b = form.Q @ nearest
@@ -34,4 +37,18 @@ def boundary_candidates(problem: TensionProblem, form: StandardForm) -> Iterator
         s = bounded_least_norm(upper, lower, form.Q, equalities=b.size).s
         if s is not None:
             yield s
+    for side in (form.b, b):
+        s = _by_kernel(form, side)
+        if s is not None:
+            yield s
     yield nearest
+
+
+def _by_kernel(form: StandardForm, b: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the s of least norm with Q s = b inside the limits, shape (k,), if the kernel finds it."""
+    rank, k = form.Q.shape
+    if rank == 0:
+        return None
+    packed = np.concatenate([form.Q.ravel(), b, form.lower, form.upper, np.zeros(k), np.ones(k), [1.0]])
+    s = np.empty(k)
+    return s if compiled.load().solve_packed(packed, rank, k, s) == 0 else None

@@ -50,9 +50,9 @@ def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[A
         wants_up = (gradient > noise) & (x < upper)
         wants_down = (gradient < -noise) & (x > lower)
         gain = np.where((wants_up | wants_down) & ~free & ~banned, np.abs(gradient) * per_unit, 0.0)
-        entering = int(np.argmax(gain))
-        if gain[entering] == 0.0:
+        if not gain.any():
             break
+        entering = int(np.argmax(gain))
         x_before, free_before = x.copy(), free.copy()
         free[entering] = True
         _settle(M, b, lower, upper, x, free)

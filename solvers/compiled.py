@@ -52,8 +52,12 @@ def _on_disk() -> bool:
 
 
 def _forget_old_code() -> None:
-    """Remove machine code that is older than any source of the room: Numba looks at a function's own file only."""
-    changed = max((source.stat().st_mtime for source in _ROOM.glob("*.py")), default=0.0)
+    """Remove machine code that is older than a source of the room: Numba looks at a function's own file only.
+
+    The tolerances are such a source too: their numbers are in the machine code.
+    """
+    sources = (*_ROOM.glob("*.py"), *_ROOM.parent.glob("tolerances.py"))
+    changed = max((source.stat().st_mtime for source in sources), default=0.0)
     for index in (_ROOM / "__pycache__").glob("*.nbi"):
         with suppress(OSError):
             if index.stat().st_mtime < changed:

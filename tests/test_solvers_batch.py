@@ -257,3 +257,51 @@ def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch
     monkeypatch.setattr(type(methods()["active-set"]), "direction", lambda self, problem: None)
     with pytest.raises(SolverError, match="active-set: says infeasible, but no certificate confirms it"):
         _ = solve(TensionProblem([[1.0, -1.0]], [60.0], 1, 60)).certificate
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, np.nan, np.inf, 1e30])
+@pytest.mark.parametrize("rho", [None, 1.0])
+def test_the_weight_of_a_single_cable_is_checked_too(weight, rho):
+    """One number for one cable: it once passed for "no weights"."""
+    for matrix in (np.ones((1, 1)), np.ones((20, 2, 1))):
+        batch = solve_batch(matrix, np.full(matrix.shape[-2], 0.5), 0.0, 1.0, weights=weight, rho=rho)
+        assert set(batch.count()) == {Status.INVALID}
+
+
+@pytest.mark.parametrize("rho", [1.0, 1e9])
+def test_the_residual_of_a_soft_row_is_that_of_its_tensions(rho):
+    """For rows that go alone as well: nearly no weight on one cable, no matrix at all, a huge limit."""
+    rng = np.random.default_rng(3)
+    A, low, high = rng.normal(size=(40, 2, 9)), np.zeros((40, 9)), np.ones((40, 9))
+    w = np.einsum("rim,rm->ri", A, rng.uniform(0, 1, (40, 9)))
+    A[::3] = 0.0
+    high[1::3, 2] = 1e9
+    batch = solve_batch(A, w, low, high, weights=10.0 ** rng.uniform(-10, 10, (40, 9)), rho=rho)
+    error = np.linalg.norm(np.einsum("rim,rm->ri", A, batch.tensions) - w, axis=1)
+    np.testing.assert_allclose(batch.residual, error, rtol=1e-6, atol=1e-14)
+
+
+def test_a_soft_row_solved_again_is_the_same_row():
+    A = np.random.default_rng(0).normal(size=(6, 8))
+    w = A @ np.full(8, 0.5)
+    batch = solve_batch(A, [w, 9 * w], 0.0, 1.0, rho=10.0)
+    for row in range(2):
+        again = batch.solution(row)
+        assert again.status == batch.status[row]
+        np.testing.assert_allclose(again.tensions, batch.tensions[row], atol=1e-9)
+
+
+@pytest.mark.parametrize("rho", [None, 1.0])
+def test_cables_that_are_all_fixed(rho):
+    """Nothing is left to choose."""
+    problem = TensionProblem(np.ones((2, 3)), [1.0, 1.0], 0.5, 0.5)
+    soft = solve(problem, "soft-wrench") if rho is None else solve(problem, "soft-wrench", rho=rho)
+    assert (soft.tensions == 0.5).all()
+    batch = solve_batch(problem.A, np.tile(problem.w, (20, 1)), 0.5, 0.5, rho=rho)
+    assert set(batch.count()) == {Status.INFEASIBLE if rho is None else Status.INACCURATE}
+
+
+def test_what_a_batch_returns_may_be_written():
+    batch = solve_batch(np.eye(2), np.ones((3, 2)), 0.0, 2.0)
+    batch.direction[0] = batch.shortfall[0] = batch.support[0] = 0.0
+    assert np.isnan(batch.direction[1]).all()

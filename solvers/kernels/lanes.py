@@ -108,10 +108,10 @@ def prepare(given, per, n, m, members, keep, W):
     A, w, lower, upper, ref, weights, length = given
     if not keep:
         _gather(A, per[0], n * m, members, W, matrix(SA, n, m))
-        if weights.shape[0] > 1:
+        if weights.shape[0] > 0:
             _gather(weights, per[5], m, members, W, cable(UNIT, m))
         _gather(length, per[6], 1, members, W, PER_LENGTH)
-        _prepare_matrix(weights.shape[0] > 1, n, m, W)
+        _prepare_matrix(weights.shape[0] > 0, n, m, W)
     _gather(w, per[1], n, members, W, wrench(SW, n, m))
     _gather(lower, per[2], m, members, W, cable(T_LOW, m))
     _gather(upper, per[3], m, members, W, cable(T_HIGH, m))

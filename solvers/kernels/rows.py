@@ -80,7 +80,14 @@ def _alone_soft(A, w, lower, upper, ref, weights, length, soft, n, m, t, d, info
         return UNSURE
     t[:] = x[:m]
     e[:] = x[m:]
-    info[2] = math.sqrt((e * e).sum())
+    total = 0.0
+    for i in range(n):
+        missing = w[i]
+        for c in range(m):
+            missing -= A[i * m + c] * t[c]
+        missing /= length if n == 6 and i >= 3 else 1.0
+        total += missing * missing
+    info[2] = math.sqrt(total)
     asked, rounded = what_counts(A, w, lower, upper, ref, t, length, n, m)
     if info[2] <= FEASIBILITY * asked + ROUNDING * rounded:
         return OPTIMAL
@@ -107,7 +114,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
     Parameters
     ----------
     A, w, lower, upper, ref, weights, length :
-        As in `solve_packed`, all rows one after another. `weights` of one number stands for equal ones.
+        As in `solve_packed`, all rows one after another. An empty `weights` stands for equal ones.
     soft :
         1 / rho, the price of a squared wrench error beside squared tensions; 0 if the wrench must be met.
     per :
@@ -154,7 +161,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
                 lower[row * per[2] : row * per[2] + m],
                 upper[row * per[3] : row * per[3] + m],
                 ref[row * per[4] : row * per[4] + m],
-                weights[row * per[5] : row * per[5] + m] if weights.shape[0] > 1 else equal,
+                weights[row * per[5] : row * per[5] + m] if weights.shape[0] > 0 else equal,
                 length[row * per[6]],
                 soft,
                 n,

@@ -1,0 +1,87 @@
+"""Which unknowns a node of the transcription has, and where they are in its column."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scenario import Scenario
+
+__all__ = ["Layout"]
+
+DURATION, MARGIN = "duration", "margin"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The column of a node: q, v, a (n each), tensions (m), missing wrench (6 or 0), one slack a soft limit, `carried`.
+
+    What all nodes share, the duration and the margin, each node carries a copy of, equal to the next one's: so the
+    program stays banded.
+    """
+
+    n: int
+    m: int
+    elastic: bool
+    soft: int
+    carried: tuple[str, ...]
+
+    @staticmethod
+    def of(scenario: Scenario, elastic: bool) -> Layout:
+        """The layout that a scenario needs."""
+        carried = [DURATION] * (scenario.duration_range is not None)
+        carried += [MARGIN] * (scenario.task.objective.margin is not None)
+        soft = 0 if elastic else len(scenario.task.limits.soft)
+        return Layout(scenario.count, scenario.robot.m, elastic, soft, tuple(carried))
+
+    @property
+    def q(self) -> slice:
+        """Free coordinates."""
+        return slice(0, self.n)
+
+    @property
+    def v(self) -> slice:
+        """Their rates."""
+        return slice(self.n, 2 * self.n)
+
+    @property
+    def a(self) -> slice:
+        """Their accelerations."""
+        return slice(2 * self.n, 3 * self.n)
+
+    @property
+    def tensions(self) -> slice:
+        """In units of the robot's force."""
+        return slice(3 * self.n, 3 * self.n + self.m)
+
+    @property
+    def missing(self) -> slice:
+        """Missing wrench, of an elastic program."""
+        start = 3 * self.n + self.m
+        return slice(start, start + 6 * self.elastic)
+
+    @property
+    def slacks(self) -> slice:
+        """How far soft limits are passed, in their scale."""
+        start = self.missing.stop
+        return slice(start, start + self.soft)
+
+    @property
+    def shared(self) -> slice:
+        """What all nodes share."""
+        start = self.slacks.stop
+        return slice(start, start + len(self.carried))
+
+    def at(self, name: str) -> int | None:
+        """Place of a shared unknown; None if there is none."""
+        return self.shared.start + self.carried.index(name) if name in self.carried else None
+
+    @property
+    def width(self) -> int:
+        """How many unknowns a node has."""
+        return self.shared.stop
+
+    def columns(self, x: np.ndarray) -> np.ndarray:
+        """A program's unknowns, a row for each node."""
+        return x.reshape(-1, self.width)
