@@ -52,14 +52,16 @@ class Scene:
     ----------
     anchors, attachments
         (k, m, 3).
-    position
-        Of the platform frame, which leaves the trail, (k, 3).
+    path, path_times
+        Origin of the platform's frame (n, 3) over times [s] of their own, fine enough for a smooth trail.
     carriers, names
         Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
     bodies
         For each carrier the indices of the cables that hang from it: three and more anchors are drawn as a body.
     boxes
         Corners (low, high) of reach boxes.
+    obstacles
+        For each place to keep out of the lines, (n, 3) each, that outline it.
     tensions
         (k, m) [N], nan where there are none.
     t_min, t_max
@@ -69,11 +71,13 @@ class Scene:
     title: str
     anchors: np.ndarray
     attachments: np.ndarray
-    position: np.ndarray
+    path: np.ndarray
+    path_times: np.ndarray
     carriers: np.ndarray
     names: list[str]
     bodies: list[np.ndarray]
     boxes: list[tuple[np.ndarray, np.ndarray]]
+    obstacles: list[list[np.ndarray]]
     tensions: np.ndarray
     t_min: np.ndarray
     t_max: np.ndarray
@@ -138,7 +142,7 @@ class _Stage:
         """The k-th frame, (height, width, 3) of bytes."""
         scene = self._scene
         self._canvas.restore_region(self._still)
-        self._trail.set_data_3d(*scene.position[: k + 1].T)
+        self._trail.set_data_3d(*scene.path[scene.path_times <= self._when.times[k] + 1e-9].T)
         self._platform.set_points(scene.attachments[k])
         for body, cables in zip(self._bodies, scene.bodies, strict=True):
             body.set_points(scene.anchors[k, cables])
@@ -165,7 +169,7 @@ class _Stage:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
         scene, ax = self._scene, self._axes
-        (path,) = ax.plot(*scene.position.T, color="#bbbbbb", linewidth=1.0, label="path of the platform")
+        (path,) = ax.plot(*scene.path.T, color="#bbbbbb", linewidth=1.0, label="path of the platform")
         named = [path]
         for index in range(len(scene.names)):
             (dotted,) = ax.plot(*scene.carriers[:, index].T, color="#999999", linewidth=0.8, linestyle=":")
@@ -179,13 +183,17 @@ class _Stage:
         if edges:
             reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
             named.append(ax.add_collection3d(reach))
-        ax.legend(handles=named, fontsize="x-small", loc="upper left")
         for axis in "xyz":
             getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7)
             getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
         corners = [corner for box in scene.boxes for corner in box]
-        seen = (scene.anchors, scene.attachments, scene.position, scene.carriers, np.array(corners))
+        seen = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
         equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in seen]))
+        outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
+        if outlines:
+            keep_out = Line3DCollection(outlines, colors=style.colour(1), linewidths=0.8, label="keep out")
+            named.append(ax.add_collection3d(keep_out, autolim=False))
+        ax.legend(handles=named, fontsize="x-small", loc="upper left")
         pace = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
         ax.set_title(f"{scene.title} ({pace})", fontsize=10)
         bar = self._figure.colorbar(
@@ -203,7 +211,7 @@ class _Stage:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
         scene, ax = self._scene, self._axes
-        (self._trail,) = ax.plot(*scene.position[:1].T, color=style.colour(0), linewidth=1.8, animated=True)
+        (self._trail,) = ax.plot(*scene.path[:1].T, color=style.colour(0), linewidth=1.8, animated=True)
         self._platform = _Body(ax, scene.attachments[0], style.colour(4), style.colour(0))
         self._bodies = [_Body(ax, scene.anchors[0, cables], "#dddddd", "#000000") for cables in scene.bodies]
         segments = np.stack([scene.anchors[0], scene.attachments[0]], axis=1)
@@ -235,6 +243,17 @@ class _Body:
         self._dots.set_data_3d(*points.T)
         if self._faces:
             self._hull.set_verts([points[face] for face in self._faces])
+
+
+def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndarray]:
+    """Outlines as far as they fit between two corners (2, 3): a wall may be much larger than the robot's room."""
+    low, high = corners
+    found = []
+    for lines in places:
+        points = np.vstack(lines)
+        if (points.max(axis=0) > low).all() and (points.min(axis=0) < high).all():
+            found += [np.clip(line, low, high) for line in lines]
+    return found
 
 
 def _faces(points: np.ndarray) -> list[np.ndarray]:

@@ -34,6 +34,7 @@ def sections(plan: Plan) -> list[Section]:
     titles = {"infeasible": "Why there is none", "not-found": "What the closest motion misses"}
     found = [
         Section(titles.get(plan.status.value, "Limits"), _why(plan)),
+        Section("Soft limits passed", [("limit", sentence) for sentence in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
@@ -182,25 +183,32 @@ def _motion(plan: Plan) -> list[Fact]:
 
 
 def _carriers(plan: Plan) -> list[Fact]:
-    """The largest speed and acceleration of each carrier that could move, against its limits."""
+    """The largest speed, acceleration and tilt of each carrier that could move, against its limits."""
     facts = []
     seen = plan.audit.carriers
     for index, carrier in enumerate(plan.scenario.robot.carriers):
         if carrier.kind == "ground":
             continue
         limit = plan.scenario.limits.get(index)
-        speed = _against(seen.velocity[:, index], limit and limit.speed, "m/s", plan.audit.times)
-        acceleration = _against(seen.acceleration[:, index], limit and limit.acceleration, "m/s^2", plan.audit.times)
-        still = not (seen.velocity[:, index].any() or seen.acceleration[:, index].any())
-        facts += [(carrier.name, "at rest")] if still else [(carrier.name, speed), ("", acceleration)]
+        speed, acceleration = (
+            np.linalg.norm(part[:, index, :3], axis=1) for part in (seen.velocity, seen.acceleration)
+        )
+        if not (seen.velocity[:, index].any() or seen.acceleration[:, index].any()):
+            facts.append((carrier.name, "at rest"))
+            continue
+        facts.append((carrier.name, _against(speed, limit and limit.speed, "m/s", plan.audit.times)))
+        facts.append(("", _against(acceleration, limit and limit.acceleration, "m/s^2", plan.audit.times)))
+        if limit is not None and limit.tilt is not None:
+            upright = np.cos(seen.pose[:, index, 3]) * np.cos(seen.pose[:, index, 4])
+            tilt = np.degrees(np.arccos(np.clip(upright, -1, 1)))
+            facts.append(("", _against(tilt, float(np.degrees(limit.tilt)), "degrees of tilt", plan.audit.times)))
     return facts
 
 
 def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarray) -> str:
-    sizes = np.linalg.norm(values[:, :3], axis=1)
-    row = int(sizes.argmax())
-    bound = "no limit" if limit is None else f"limit {limit:g} {unit}"
-    return f"up to {_short(sizes[row])} {unit} at t = {times[row]:.3f} s ({bound})"
+    row = int(values.argmax())
+    bound = "no limit" if limit is None else f"limit {limit:.4g} {unit.partition(' ')[0]}"
+    return f"up to {_short(values[row])} {unit} at t = {times[row]:.3f} s ({bound})"
 
 
 def _audit(plan: Plan) -> list[Fact]:

@@ -20,7 +20,8 @@ from towline.figures.convergence import convergence, runs
 from towline.models import Dynamics, load
 from towline.ocp import PlanStatus, plan
 from towline.ocp.report import direction_in_words, sections, verdict
-from towline.ocp.scene import scene
+from towline.ocp.scene import outline, scene
+from towline.ocp.task_limits import Block, Capsule, Sphere
 from towline.solvers import TensionProblem, certify
 
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.2 * np.pi}
@@ -117,6 +118,12 @@ def test_report_of_a_plan_that_was_not_found_does_not_claim_a_proof(impossible):
     assert facts(lost)["What the closest motion misses", "limit broken"] == "quad: speed 3 m/s exceeds 1 m/s"
     only = replace(lost, audit=replace(lost.audit, certificate=None, certificate_time=None))
     assert verdict(only).endswith("NOT-FOUND, 1 other limit broken")
+
+
+def test_soft_limits_that_are_passed_are_told_of_a_feasible_plan(free):
+    passed = replace(free, audit=replace(free.audit, soft_excess=["cable_speed: cable 1: 2 m/s"]))
+    assert facts(passed)["Soft limits passed", "limit"] == "cable_speed: cable 1: 2 m/s"
+    assert "Soft limits passed" not in free.report()
 
 
 def test_directions_in_words():
@@ -233,6 +240,36 @@ def test_scene_has_the_cables_where_the_dynamics_has_them(name):
     np.testing.assert_allclose(np.linalg.norm(shown.anchors - shown.attachments, axis=2), lengths, rtol=1e-12)
     np.testing.assert_array_equal(shown.tensions, found.audit.tensions[rows])
     assert shown.names == [carrier.name for carrier in robot.carriers if carrier.kind != "ground"]
+
+
+def test_places_to_keep_out_of_are_outlined_on_their_surface():
+    ball = Sphere(kind="sphere", centre=(1, 2, 3), radius=0.5)
+    for line in outline(ball):
+        np.testing.assert_allclose(np.linalg.norm(line - [1, 2, 3], axis=1), 0.5)
+    block = Block(kind="box", min=(0, 0, 0), max=(1, 2, 3))
+    assert len(outline(block)) == 12
+    np.testing.assert_array_equal(np.vstack(outline(block)).max(axis=0), [1, 2, 3])
+    for end in ((1, 1, 2), (0, 0, 0)):  # a capsule may be a ball
+        pipe = Capsule(kind="capsule", start=(0, 0, 0), end=end, radius=0.2)
+        points = np.vstack(outline(pipe))
+        share = np.clip(points @ end / max(np.dot(end, end), 1), 0, 1)
+        away = np.linalg.norm(points - share[:, None] * np.array(end), axis=1)
+        assert away.max() == pytest.approx(0.2)
+
+
+def test_carriers_that_tilt_tell_so_and_obstacles_are_in_the_film(tmp_path):
+    post = {"name": "<b>$post", "kind": "box", "min": [0.7, 0.7, -9], "max": [1.2, 1.2, 9]}
+    base = {**FREE, "tilt_max": 0.3, "turn_acceleration_max": 5}
+    path = {**CIRCLE, "rate": 3}
+    found = plan(load("wang-flying"), {"path": path, "base": base, "steps": 20, "limits": {"keep_out": [post]}})
+    tilt = facts(found)["Carriers", "quad"].split("; ")[2]
+    pose = found.audit.carriers.pose[:, 0]
+    largest = np.degrees(np.arccos((np.cos(pose[:, 3]) * np.cos(pose[:, 4])).min()))
+    assert number(tilt.removeprefix("up to ")) == pytest.approx(largest, rel=1e-3)
+    assert tilt.endswith("(limit 17.19 degrees)")
+    assert [len(lines) for lines in scene(found, np.zeros(1)).obstacles] == [12]
+    with Image.open(found.animate(tmp_path / "post.gif", fps=5)) as picture:
+        assert picture.n_frames == 11
 
 
 def test_gif_has_the_frames_that_were_asked_for(free, tmp_path):
