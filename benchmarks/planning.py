@@ -163,7 +163,8 @@ def rockit(steps: int) -> Timing:
 
     start = time.perf_counter()
     problem = _Shooting(steps)
-    ocp = Ocp(T=problem.seconds)
+    make: Any = Ocp  # its types say that T is a whole number and that a state may be None
+    ocp = make(T=problem.seconds)
     x, u = ocp.state(18), ocp.control(9)
     wanted = ocp.parameter(6, grid="control+")
     ocp.set_value(wanted, problem.path.pose.T)
