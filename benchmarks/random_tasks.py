@@ -18,8 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import TowlineError
-from ..models import Robot, load
+from ..models import Dynamics, Robot, load
 from ..ocp import Plan, PlanStatus, Task, plan
+from ..solvers import solve
 from ..workspace.pose import masked_problem
 
 ROBOTS = ("wang-flying", "wang-ctmrts-6", "ipanema-1", "cogiro", "planar-4", "wang-flying-quadrotor")
@@ -95,74 +96,92 @@ def wrong(found: Plan) -> str:
 
 
 def random_task(seed: int) -> tuple[str, Task]:
-    """Return a robot's name and a task for it: path, duration, tube, base, limits and objective of any kind."""
+    """Return a robot's name and a task for it: path, duration, tube, base, limits and objective of any kind.
+
+    Where the planner has something to choose, the platform can rest at the points that make the path, with its carriers
+    at home. Every fifth task leaves nothing to choose and goes anywhere.
+    """
     rng = np.random.default_rng(seed)
     name = ROBOTS[seed % len(ROBOTS)]
     robot = load(name)
     anchors = robot.anchors + robot.carrier_home[robot.carrier_of_cable, :3]
     size = float(np.clip(np.ptp(anchors, axis=0).max(), 0.5, 3.0))
-    task: dict[str, Any] = {
-        "name": f"random-{seed}",
-        "path": _path(rng, robot, 0.25 * size),
-        "steps": 40,
-        "margin": float(rng.choice([0.0, 0.1])),
-    }
-    stretches = task["path"]["kind"] in ("line", "waypoints")
-    duration = float(rng.uniform(2.0, 6.0))
-    base = _base(rng, robot)
-    task["base"] = base
-    if stretches and rng.random() < 0.3 and base["kind"] != "given":
-        task["duration"] = {"min": 0.5 * duration, "max": 2.0 * duration}
-        task["objective"] = {"time": 1.0}
-    elif task["path"]["kind"] != "circle":
+    fixed = seed % 5 == 0
+    path = _path(rng, robot, 0.25 * size, anywhere=fixed)
+    task: dict[str, Any] = {"name": f"random-{seed}", "path": path, "steps": 40}
+    stretches = path["kind"] in ("line", "waypoints")
+    duration = float(rng.uniform(3.0, 8.0))
+    if stretches:
         task["duration"] = duration
-    if rng.random() < 0.4:
+    if fixed:
+        task["base"] = _fixed_base(rng, robot)
+        return name, Task.model_validate(task)
+    task["margin"] = float(rng.choice([0.0, 0.05]))
+    task["base"] = _base(rng, robot)
+    if stretches and rng.random() < 0.3:
+        task["duration"] = {"min": 0.5 * duration, "max": 3.0 * duration}
+        task["objective"] = {"time": 1.0}
+    if rng.random() < 0.5:
         task["tube"] = {"position": float(rng.choice([0.02, 0.1])) * size, "attitude": float(rng.choice([0.0, 0.1]))}
     if rng.random() < 0.3:
         task["limits"] = {"platform_speed": float(rng.uniform(2.0, 5.0)), "tension_rate": 1e4}
     return name, Task.model_validate(task)
 
 
-def _path(rng: np.random.Generator, robot: Robot, reach: float) -> dict[str, Any]:
+def _path(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool) -> dict[str, Any]:
     """A path about the platform's home, in the coordinates that it has."""
-    home = robot.home
+    dynamics, home = Dynamics(robot), robot.home
+    rest = np.zeros(6)
 
-    def near() -> list[float]:
-        pose = home.copy()
-        pose[:3] += rng.uniform(-reach, reach, 3) * robot.dof_mask[:3]
-        pose[3:] += rng.uniform(-0.05, 0.05, 3) * robot.dof_mask[3:]
-        return pose.tolist()
+    def near() -> np.ndarray:
+        for attempt in range(100):
+            pose = home.copy()
+            pose[:3] += rng.uniform(-reach, reach, 3) * 0.97**attempt * robot.dof_mask[:3]
+            pose[3:] += rng.uniform(-0.05, 0.05, 3) * robot.dof_mask[3:]
+            if anywhere or _can_rest(dynamics, pose, rest):
+                break
+        return pose
 
     kind = rng.choice(["line", "waypoints", "circle"])
-    if kind == "line":
-        return {"kind": "line", "start": near(), "end": near()}
+    if kind == "circle" and robot.dof_mask[:2].all():
+        radius = 0.5 * float(np.linalg.norm((near() - home)[:2]))
+        rate = float(rng.choice([-1, 1]) * rng.uniform(0.3, 1.0))
+        return {
+            "kind": "circle",
+            "centre": home[:3].tolist(),
+            "radius": radius,
+            "rate": rate,
+            "attitude": home[3:].tolist(),
+        }
     if kind == "waypoints":
-        return {"kind": "waypoints", "points": [near(), near(), near()]}
-    if not robot.dof_mask[:2].all():
-        return {"kind": "line", "start": near(), "end": near()}
-    radius, rate = float(rng.uniform(0.2, 0.6) * reach), float(rng.choice([-1, 1]) * rng.uniform(0.5, 1.5))
-    return {
-        "kind": "circle",
-        "centre": home[:3].tolist(),
-        "radius": radius,
-        "rate": rate,
-        "attitude": home[3:].tolist(),
-    }
+        return {"kind": "waypoints", "points": [near().tolist() for _ in range(3)]}
+    return {"kind": "line", "start": near().tolist(), "end": near().tolist()}
 
 
-def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """What the carriers do: those that can move are free, now and then held or moved."""
-    moving = [carrier for carrier in robot.carriers if carrier.kind != "ground"]
-    if not moving:
-        return {"kind": "hold"}
-    if any(carrier.kind == "quadrotor" for carrier in moving) or rng.random() < 0.6:
-        return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}
-    if rng.random() < 0.5 or moving[0].kind == "mobile":
+def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray) -> bool:
+    robot = dynamics.robot
+    A, w = dynamics.wrench_matrix(pose), dynamics.required_wrench(pose, rest, rest)
+    spare = 0.05 * (robot.t_max - robot.t_min)
+    return solve(masked_problem(dynamics, A, w, robot.t_min + 0.1, robot.t_max - spare)).feasible
+
+
+def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """Carriers at rest at home, or a single one that moves as given."""
+    carrier = robot.carriers[0]
+    if carrier.kind != "prescribed" or rng.random() < 0.5:
         return {"kind": "hold"}
     start = robot.carrier_home[0]
     end = start + np.r_[rng.uniform(-1, 1, 3), 0.0, 0.0, 0.0]
     path = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
-    return {"kind": "given", "paths": {moving[0].name: path}}
+    return {"kind": "given", "paths": {carrier.name: path}}
+
+
+def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """What the carriers do: those that can move are free, quadrotors always, others mostly."""
+    kinds = {carrier.kind for carrier in robot.carriers}
+    if "quadrotor" in kinds or (kinds & {"prescribed", "mobile"} and rng.random() < 0.8):
+        return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}
+    return {"kind": "hold"}
 
 
 if __name__ == "__main__":

@@ -1,0 +1,30 @@
+"""Random tasks: what a plan says of itself is so. All 200 are `python -m towline.benchmarks.random_tasks`."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from towline.benchmarks.random_tasks import ROBOTS, attempt, random_task, wrong
+from towline.models import load
+from towline.ocp import PlanStatus, plan
+
+
+@pytest.mark.parametrize("seed", range(2 * len(ROBOTS)))
+def test_a_random_task_ends_in_a_plan_or_a_proof(seed):
+    assert attempt(seed).told in (PlanStatus.FEASIBLE, PlanStatus.INFEASIBLE)
+
+
+def test_the_check_can_see():
+    """A plan with a tension beyond its limit, or tensions of another motion, is found out."""
+    name, task = random_task(2)
+    found = plan(load(name), task)
+    assert found.feasible
+    assert wrong(found) == ""
+    audit = found.audit
+    for change in (-1e3, 1e-3):
+        tensions = audit.tensions.copy()
+        tensions[7, 0] += change
+        assert wrong(replace(found, audit=replace(audit, tensions=np.clip(tensions, -1e3, 1e9)))).startswith(
+            "wrong: feasible"
+        )
