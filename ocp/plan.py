@@ -123,6 +123,7 @@ class _Search:
         if mesh not in self._solvers:
             self._solvers[mesh] = Solver(transcription.build(self.scenario, mesh))
         solver = self._solvers[mesh]
+        solver.prepare(guess)
         built = time.perf_counter()
         at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
         outcome = solver.solve(at, self._progress)

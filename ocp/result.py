@@ -198,6 +198,12 @@ class Plan:
             f"  audit at {seen['rate_hz']:g} Hz: worst violation {seen['worst_violation']:.3g} N at "
             f"t = {seen['at_s']:.3f} s (up to {seen['tolerance']:.2g} N counts as none)"
         )
+        if (drift := self.audit.drift) is not None:
+            lines.append(
+                f"  under the planned tensions alone: {drift.window_position * 1e3:.3g} mm and "
+                f"{drift.window_attitude * 1e3:.3g} mrad off after {drift.window:.2g} s on the plan, "
+                f"{drift.position * 1e3:.3g} mm and {drift.attitude * 1e3:.3g} mrad over all of it"
+            )
         lines += [f"  {sentence}" for sentence in seen["excess"]]
         lines.append(f"  built in {self.build_s:.3f} s, solved in {self.solve_s:.3f} s")
         return "\n".join(lines)
