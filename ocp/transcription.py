@@ -33,6 +33,7 @@ from .scenario import ATTITUDE, POSITION, Deviation, Limits, Scenario
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
+MET = 1e-8  # what constraints of a program may miss, in its units
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 Row = tuple[str, float, float]  # name, lower and upper bound
 
@@ -70,6 +71,12 @@ class Program:
         q, v, a = (columns[:, part] for part in (layout.q, layout.v, layout.a))
         return Deviation(self.shares * self.duration(x), q, v, a, tensions)
 
+    def violation(self, x: np.ndarray, g: np.ndarray) -> float:
+        """How far x and its constraints g are beyond their bounds at most; infinite if they are no numbers."""
+        beyond = [self.lower - x, x - self.upper, self.lower_g - g, g - self.upper_g]
+        worst = float(np.concatenate(beyond).max())
+        return worst if np.isfinite(worst) else np.inf
+
     def pack(self, deviation: Deviation) -> np.ndarray:
         """The x that a deviation at the nodes stands for, slacks zero."""
         layout = self.layout
@@ -88,7 +95,7 @@ class Outcome:
 
     deviation: Deviation
     duration: float  # [s]
-    success: bool
+    success: bool  # whether all constraints are met; the message tells whether it is an optimum too
     message: str
     iterations: int
     slack: float  # largest missing wrench at a node [N], zero in the rigid program
@@ -238,11 +245,13 @@ class Solver:
             raise KeyboardInterrupt
         self._last = result if statistics["success"] else None
         x = result["x"].full().ravel()
+        # A minimum time is often found long before IPOPT is sure that there is no shorter one.
+        met = program.violation(x, result["g"].full().ravel()) <= MET
         missing = program.layout.columns(x)[:, program.layout.missing]
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
-            success=bool(statistics["success"]) and bool(np.isfinite(x).all()),
+            success=(bool(statistics["success"]) or met) and bool(np.isfinite(x).all()),
             message=str(statistics["return_status"]),
             iterations=int(statistics["iter_count"]),
             slack=float(np.linalg.norm(missing, axis=1).max(initial=0.0) * program.scenario.robot.force_scale),
