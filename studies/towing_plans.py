@@ -25,7 +25,10 @@ SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes
 TAUT = 0.1  # [N]: paper C wants tensions above zero
 SECONDS = 2.0  # of a motion with least effort
 SPAN = DurationRange(min=0.1, max=4.0)  # [s], of a motion in least time
-OBJECTIVES = {"effort": Objective(), "time": Objective(time=0.01, jerk=30.0, carrier_acceleration=2.0, carrier_offset=0.5)}
+OBJECTIVES = {
+    "effort": Objective(),
+    "time": Objective(time=0.01, jerk=30.0, carrier_acceleration=2.0, carrier_offset=0.5),
+}
 
 
 def robot(name: str, drive: Drive) -> Robot:

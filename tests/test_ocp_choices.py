@@ -49,7 +49,7 @@ def test_durations_stay_in_their_range():
         assert low - 1e-6 <= found.scenario.duration <= high + 1e-6
         assert found.trajectory["time"].values[-1] == pytest.approx(found.scenario.duration)
     slow = plan(hoist(), {**LIFT, "steps": 40, "objective": {"jerk": 1e-3}, "duration": {"min": 0.8, "max": 2.5}})
-    assert slow.scenario.duration == pytest.approx(2.5, rel=1e-6)  # smooth is slow
+    assert slow.scenario.duration == pytest.approx(2.5, rel=1e-5)  # smooth is slow
 
 
 def test_exact_waypoints_are_passed_though_the_tube_is_used():
@@ -115,12 +115,16 @@ def test_a_plan_to_start_from_saves_iterations():
 
 
 WRONG = {
-    "range": ({"duration": {"min": 2, "max": 1}}, "duration.*min: 2 s is more than max: 1 s"),
+    "range": ({"duration": {"min": 2, "max": 1}}, "task: duration: min: 2 s is more than max: 1 s"),
     "range of a circle": (
         {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
         "duration: is to be chosen, but path of kind circle has times of its own",
     ),
-    "tube": ({"tube": {"position": "loose"}}, "tube.position: .*'loose'"),
+    "tube": ({"tube": {"position": "loose"}}, "tube.position: accepted: a number, not text, or .*'free', got 'loose'$"),
+    "range of what": (
+        {"duration": {"min": 2, "mx": 3}},
+        "duration.(max: is missing|mx: is not a known key, did you mean 'max')",
+    ),
     "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min: 2 is more than max: 1"),
     "soft": (
         {"limits": {"cable_speed": 1, "soft": {"cable_sped": 0.1}}},

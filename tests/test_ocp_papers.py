@@ -58,7 +58,7 @@ CASES = [
     ("wang-ctmrts", "variable-length", "effort", 25),
     ("wang-ctmrts", "variable-length", "time", 25),
     ("wang-ctmrts", "both", "effort", 25),
-    ("wang-ctmrts", "both", "time", 12),
+    ("wang-ctmrts-6", "both", "time", 12),
     ("wang-ctmrts-4", "fixed-length", "effort", 25),
     ("wang-ctmrts-4", "variable-length", "time", 12),
     ("wang-ctmrts-5", "both", "effort", 25),
