@@ -134,6 +134,7 @@ def _path(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool) 
     rest = np.zeros(6)
 
     def near() -> np.ndarray:
+        pose = home.copy()
         for attempt in range(100):
             pose = home.copy()
             pose[:3] += rng.uniform(-reach, reach, 3) * 0.97**attempt * robot.dof_mask[:3]

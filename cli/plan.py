@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -47,7 +46,6 @@ def plan(
             check_writable(file)
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         found = plan_motion(loaded, read, watch)
-        found = replace(found, iterates=found.iterates or tuple(watch.rows))
         written = {"file": found.save(target)}
         watch.now("drawing")
         pictures = found.plot(figures) if figures else []

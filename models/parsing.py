@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import io
+import re
 import stat
 import warnings
 from functools import cache
@@ -93,7 +94,7 @@ def validate(data: dict[str, Any], model: type[Model], where: str) -> Model:
 
 def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     """One line for pydantic's first complaint: where, field, what is accepted, the value, and how many follow."""
-    details = error.errors(include_url=False)
+    details = _without_branches(error.errors(include_url=False))
     first = details[0]
     field, holder = _walk(first["loc"], _schema(model))
     key = str(first["loc"][-1]) if first["loc"] else ""
@@ -121,6 +122,35 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     others = [other for other in details[1:] if other["type"] != "too_short"]
     more = f" (and {len(others)} more)" if others else ""
     return ": ".join(part for part in (where, _printable(field), _printable(message)) if part) + more
+
+
+_TYPE = re.compile(r"(function-(after|before|plain|wrap)|literal|constrained-\w+)\[.*\]$")  # as pydantic names it
+
+
+def _without_branches(details: list[Any]) -> list[Any]:
+    """Pydantic's complaints with one for each choice of types instead of one for each type.
+
+    It names the types in the place. A mapping is meant for the type that takes one; of a plain value all types say what
+    they would have.
+    """
+    told: list[Any] = []
+    while details:
+        first = details[0]
+        place = first["loc"]
+        at = next((i for i, key in enumerate(place) if _TYPE.match(str(key))), None)
+        if at is None:
+            told.append(first)
+            details = details[1:]
+            continue
+        branches = [one for one in details if one["loc"][:at] == place[:at]]
+        details = [one for one in details if one["loc"][:at] != place[:at]]
+        taking = [one for one in branches if one["type"] not in ("float_type", "literal_error")]
+        if isinstance(first["input"], dict) and taking:
+            told += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in taking]
+        else:
+            plain = [one["msg"][:1].lower() + one["msg"][1:] for one in branches if not one["type"].startswith("model")]
+            told.append(first | {"loc": place[:at], "msg": ", or ".join(dict.fromkeys(plain))})
+    return told
 
 
 @cache

@@ -7,7 +7,7 @@ give inside their limits less the task's margin.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,13 +16,15 @@ from ..errors import InputError
 from ..models.robot import COORDINATES
 from ..solvers import Certificate, TensionProblem, certify, solve
 from ..workspace.pose import masked_problem
+from .drift import Drift, drift
 from .limits import limits
 from .path import Motion
 from .scenario import AUDIT_RATE, Deviation, Scenario
 from .task import FreeBase
 
 TOLERANCE = 1e-6  # [N]
-UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer cables than degrees of freedom
+UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
+INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
 LIMIT_TOLERANCE = 1e-6  # relative, of the carriers' own limits
 PATH_TOLERANCE = 1e-7  # [m, rad], of the tube
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers start and end
@@ -53,6 +55,9 @@ class Audit:
         Soft limits that are passed, likewise.
     certificate, certificate_time
         The certificate with the largest shortfall and its time [s]; None if there is none.
+    drift
+        Where the planned tensions alone would take the platform; None for robots that can follow any motion exactly,
+        and where there are no tensions.
     """
 
     rate: float
@@ -68,6 +73,7 @@ class Audit:
     soft_excess: list[str] = field(default_factory=list)
     certificate: Certificate | None = None
     certificate_time: float | None = None
+    drift: Drift | None = None
 
     @property
     def passed(self) -> bool:
@@ -80,7 +86,7 @@ class Audit:
         return int(self.violation.argmax())
 
     def summary(self) -> dict[str, Any]:
-        """{"rate_hz", "worst_violation" [N], "at_s", "tolerance" [N], "excess"}, ready for JSON."""
+        """{"rate_hz", "worst_violation" [N], "at_s", "tolerance" [N], "excess", "soft_excess", "drift"} for JSON."""
         return {
             "rate_hz": self.rate,
             "worst_violation": float(self.violation.max()),
@@ -88,7 +94,13 @@ class Audit:
             "tolerance": self.tolerance,
             "excess": self.excess,
             "soft_excess": self.soft_excess,
+            "drift": None if self.drift is None else {k: _number(v) for k, v in self.drift._asdict().items()},
         }
+
+
+def _number(value: float) -> float | None:
+    """JSON has no infinity."""
+    return value if np.isfinite(value) else None
 
 
 def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
@@ -99,7 +111,9 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
     _refuse_zero_lengths(scenario, times, motion, carriers)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
     w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.task.wind)
-    verdict = _distribute(scenario, A, w, _wished_tensions(deviation, times, robot.m))
+    few = _few_cables(scenario, A)
+    tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if few and scenario.count else TOLERANCE
+    verdict = _distribute(scenario, A, w, _wished_tensions(deviation, times, robot.m), few, tolerance)
     off_path = scenario.off_path(times, motion, carriers)
     excess = [
         *_carrier_excess(scenario, carriers),
@@ -111,7 +125,7 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
     ]
     hard, soft = _limit_excess(scenario, times, motion, carriers, verdict.tensions)
     excess += hard
-    dof = len(robot.platform.dof)
+    followed = few and np.isfinite(verdict.tensions).all()
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
         times=times,
@@ -120,13 +134,31 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         tensions=verdict.tensions,
         tensions_unlimited=(np.linalg.pinv(A, rcond=1e-9) @ w[..., None])[..., 0],
         violation=verdict.violation,
-        tolerance=UNDERACTUATED_TOLERANCE * robot.force_scale if robot.m < dof and scenario.count else TOLERANCE,
+        tolerance=tolerance,
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
         excess=excess,
         soft_excess=soft,
         certificate=verdict.certificate,
         certificate_time=None if verdict.at is None else float(times[verdict.at]),
+        drift=drift(scenario, times, motion, carriers, verdict.tensions) if followed else None,
     )
+
+
+def _few_cables(scenario: Scenario, A: np.ndarray) -> bool:
+    """Whether somewhere the wrench matrices (n, 6, m) have fewer independent columns than the platform has freedoms."""
+    robot = scenario.robot
+    dof = len(robot.platform.dof)
+    if robot.m < dof:
+        return True
+    values = np.linalg.svd(_scaled(scenario, A), compute_uv=False)
+    return bool((values[:, dof - 1] < INDEPENDENT * values[:, 0]).any())
+
+
+def _scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
+    """Wrenches (n, 6, ...) with moments over `Robot.length` and without what the platform does not feel."""
+    robot = scenario.robot
+    scale = robot.dof_mask / np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    return wrenches * scale.reshape(6, *[1] * (wrenches.ndim - 2))
 
 
 def _audits_per_output(scenario: Scenario) -> int:
@@ -142,25 +174,29 @@ class _Verdict(NamedTuple):
     excess: list[str]  # limits that are missed though what few cables cannot follow is tolerated
 
 
-def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.ndarray | None) -> _Verdict:
+def _distribute(
+    scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.ndarray | None, few: bool, tolerance: float
+) -> _Verdict:
     """Tensions of every instant, or how much is missing; the certificate of the worst.
 
     Where the tensions nearest to the wished ones, without limits, happen to lie inside the limits they are the answer:
     a batch of pseudo-inverses finds those. The exact solver judges the others one by one.
+
+    Of few cables, whose columns do not span all wrenches, a wrench outside of what they span is expected to miss a
+    little. Inside of it nothing may: there the limits count as for any robot.
     """
     robot, (low, high) = scenario.robot, scenario.bounds()
-    scale = robot.dof_mask / np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
-    scaled_A, scaled_w = A * scale[:, None], w * scale
+    scaled_A, scaled_w = _scaled(scenario, A), _scaled(scenario, w)
     wish = np.zeros((len(w), robot.m)) if wished is None else wished
     missing = scaled_w - np.einsum("nij,nj->ni", scaled_A, wish)
-    tensions = wish + (np.linalg.pinv(scaled_A, rcond=1e-9) @ missing[..., None])[..., 0]
+    tensions = wish + (np.linalg.pinv(scaled_A, rcond=INDEPENDENT if few else 1e-9) @ missing[..., None])[..., 0]
     violation = np.linalg.norm(scaled_w - np.einsum("nij,nj->ni", scaled_A, tensions), axis=1)
     inside = ((tensions >= low) & (tensions <= high)).all(axis=1)
-    exact = violation <= EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1))
+    good = violation <= (tolerance if few else EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1)))
     worst: Certificate | None = None
     at: int | None = None
     beyond = 0.0
-    for k in np.flatnonzero(~(inside & exact)):
+    for k in np.flatnonzero(~(inside & good)):
         problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
         solution = solve(problem)
         certificate = solution.certificate
@@ -172,9 +208,8 @@ def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.nda
         else:
             closest = certificate.closest
             violation[k] = np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w)
-            if certificate.singular and robot.m < len(robot.platform.dof):
+            if few:
                 tensions[k] = closest
-                # What lies outside the range of A is expected of few cables; whether the rest is available is not told.
                 inside_range = certify(_inside_range(problem))
                 if inside_range is not None:
                     certificate, beyond = inside_range, max(beyond, inside_range.shortfall)
@@ -184,9 +219,29 @@ def _distribute(scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.nda
     return _Verdict(tensions, violation, worst, at, limits)
 
 
+def at_rest(scenario: Scenario, seen: Audit) -> Audit | None:
+    """The same with the certificate of an end where all is at rest, if no tensions hold the platform there.
+
+    What is impossible at rest is so for every duration.
+    """
+    low, high = scenario.bounds()
+    for row in (0, -1):
+        motions = [part[row] for part in (*seen.motion, *seen.carriers)]
+        if any(np.abs(motions[k]).max() > END_TOLERANCE for k in (1, 2, 4, 5)):
+            continue
+        A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
+        w = scenario.dynamics.required_wrench(*motions, wind=scenario.task.wind)
+        certificate = certify(masked_problem(scenario.dynamics, A, w, low, high))
+        if certificate is not None:
+            return replace(seen, certificate=certificate, certificate_time=float(seen.times[row]))
+    return None
+
+
 def _inside_range(problem: TensionProblem) -> TensionProblem:
-    """The same problem with the part of w that lies in the range of A."""
-    w = problem.scaled_A @ np.linalg.lstsq(problem.scaled_A, problem.scaled_w, rcond=1e-9)[0] / problem.row_scale
+    """The same problem with the part of w that lies in what the columns of A span."""
+    U, values, _ = np.linalg.svd(problem.scaled_A, full_matrices=False)
+    span = U[:, values > INDEPENDENT * values[0]]
+    w = span @ (span.T @ problem.scaled_w) / problem.row_scale
     return TensionProblem(problem.A, w, problem.t_min, problem.t_max, length=problem.length)
 
 

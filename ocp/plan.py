@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..models import Robot
 from . import transcription
-from .audit import Audit, audit
+from .audit import Audit, at_rest, audit
 from .result import Plan, PlanStatus
 from .scenario import Deviation, Scenario, lay_out
 from .task import Task, read_task
@@ -116,6 +116,13 @@ class _Search:
     def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
         self.scenario, self._solvers, self._progress = scenario, solvers, progress
         self.build_s, self.solve_s = 0.0, 0.0
+        self._iterates: list[tuple[int, float, float]] = []
+
+    def _seen(self, iteration: int, objective: float, infeasibility: float) -> None:
+        """Keep what an iteration came to, and tell whoever asked."""
+        self._iterates.append((iteration, objective, infeasibility))
+        if self._progress is not None:
+            self._progress(iteration, objective, infeasibility)
 
     def solve(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
         """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
@@ -123,9 +130,10 @@ class _Search:
         if mesh not in self._solvers:
             self._solvers[mesh] = Solver(transcription.build(self.scenario, mesh))
         solver = self._solvers[mesh]
+        solver.prepare(guess)
         built = time.perf_counter()
         at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-        outcome = solver.solve(at, self._progress)
+        outcome = solver.solve(at, self._seen)
         self.build_s += built - start
         self.solve_s += time.perf_counter() - built
         return outcome
@@ -134,11 +142,24 @@ class _Search:
         """What came of it."""
         told = (outcome.iterations, outcome.message)
         scenario = self.scenario.lasting(outcome.duration)
-        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told)
+        rows = tuple(self._iterates)
+        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told, iterates=rows)
 
     def audit(self, outcome: Outcome) -> Audit:
         """What the audit says of it."""
         return audit(self.scenario.lasting(outcome.duration), outcome.deviation)
+
+
+def _closest(search: _Search, closest: Outcome) -> Plan:
+    """What the elastic program says: all is well after all, or there can be no plan, or none was found."""
+    seen = search.audit(closest)
+    if seen.passed:
+        return search.plan(PlanStatus.FEASIBLE, closest, seen)
+    if search.scenario.count == 0:
+        proven = at_rest(search.scenario.lasting(closest.duration), seen)
+        if proven is not None:
+            return search.plan(PlanStatus.INFEASIBLE, closest, proven)
+    return search.plan(PlanStatus.NOT_FOUND, closest, seen)
 
 
 def _free_motion(search: _Search, start: Deviation | None) -> Plan:
@@ -149,8 +170,7 @@ def _free_motion(search: _Search, start: Deviation | None) -> Plan:
     if not outcome.success:
         closest = search.solve(Mesh(steps, elastic=True), None)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
-            seen = search.audit(closest)
-            return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, closest, seen)
+            return _closest(search, closest)
         outcome = search.solve(Mesh(steps), closest.deviation)
     reserve, shrink = 0.0, 0.0
     seen = search.audit(outcome)

@@ -213,11 +213,17 @@ def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarr
 
 def _audit(plan: Plan) -> list[Fact]:
     seen = plan.audit
-    return [
+    facts = [
         ("rate", f"{seen.rate:.6g} Hz, {len(seen.times)} instants, by code that is not the planner's"),
         ("worst violation", f"{float(seen.violation.max()):.3g} N at t = {seen.times[seen.worst]:.3f} s"),
         ("counts as none", f"up to {seen.tolerance:.2g} N"),
     ]
+    if (drift := seen.drift) is not None:
+        away = f"{drift.window_position * 1e3:.3g} mm, {drift.window_attitude * 1e3:.3g} mrad"
+        facts.append((f"pulled as planned for {drift.window:.2g} s", f"{away} off the plan at most"))
+        whole = f"{drift.position * 1e3:.3g} mm, {drift.attitude * 1e3:.3g} mrad"
+        facts.append(("pulled as planned throughout", f"{whole} off the plan at most"))
+    return facts
 
 
 def _computation(plan: Plan) -> list[Fact]:

@@ -1,0 +1,74 @@
+"""Three plans of paper F's robot, one for each of the motions that section VI simulates.
+
+The paper's platform circles with r = 1 m, which no cables that only pull can do under a quadrotor that hovers or flies
+straight (`flying_circle`). What can be done instead:
+
+- VI.B, the circle in {G}, with the quadrotor free to move beside its hovering point;
+- VI.A, the helix in {G}, with the quadrotor free to leave its straight line;
+- VI.C, a circle of 0.15 m in {A}, with the quadrotor moving and pitching as given.
+
+The paper draws VI.C's flight and pitch and prints no numbers. Assumed here: VI.A's line at its mean velocity, pitching
+by `PITCH` sin(0.2 pi t), and along x the surge that a quadrotor has when its thrust pitches: ddx = g tan(pitch).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..ocp import Task
+from ..ocp.path import CirclePath, LinePath, SamplePath
+from ..ocp.task import FreeBase, GivenBase
+from . import flying_circle
+
+START, END, SECONDS = np.array([-20.0, -30.0, 40.0]), np.array([40.0, 20.0, 102.45]), 10.0  # VI.A [m], [s]
+RATE = 0.2 * np.pi  # [rad/s]
+BELOW = 1.0  # of the circle's centre under the quadrotor [m]
+PITCH = 0.1  # [rad], assumed
+GRAVITY = 9.81
+Vector = tuple[float, float, float]
+
+
+def circle() -> Task:
+    """VI.B: the circle about a hovering point, the quadrotor free."""
+    return flying_circle.tasks()[1]
+
+
+def helix() -> Task:
+    """VI.A: the helix about a straight flight, the quadrotor free."""
+    path = CirclePath(
+        kind="circle",
+        centre=_vector(START - [0, 0, BELOW]),
+        radius=1.0,
+        rate=RATE,
+        drift=_vector((END - START) / SECONDS),
+    )
+    flight = LinePath(kind="line", start=(*START, 0, 0, 0), end=(*END, 0, 0, 0), timing="uniform")
+    base = FreeBase(kind="free", around={"quad": flight}, acceleration_max=3.0)
+    return Task(name="helix-free", path=path, base=base, duration=SECONDS)
+
+
+def pitching() -> Task:
+    """VI.C: a small circle in the frame of a quadrotor that moves and pitches."""
+    times = np.linspace(0.0, SECONDS, 101)
+    pitch = PITCH * np.sin(RATE * times)
+    flight = START + times[:, None] * (END - START) / SECONDS
+    flight[:, 0] += surge(times)
+    still = np.zeros_like(times)
+    poses = np.column_stack([flight, still, pitch, still])
+    given = SamplePath(kind="samples", times=tuple(times), poses=tuple(map(tuple, poses)))
+    path = CirclePath(kind="circle", frame="quad", centre=(0, 0, -BELOW), radius=0.15, rate=RATE)
+    return Task(name="circle-pitching", path=path, base=GivenBase(kind="given", paths={"quad": given}))
+
+
+def surge(times: np.ndarray) -> np.ndarray:
+    """How far along x the pitch throws the quadrotor off its line [m]: ddx = g tan(pitch), to third order in pitch.
+
+    tan(P s) = P s + (P s)^3 / 3 with s = sin(RATE t) and s^3 = (3 sin(RATE t) - sin(3 RATE t)) / 4.
+    """
+    first, third = PITCH + PITCH**3 / 4, -(PITCH**3) / 12
+    return -GRAVITY / RATE**2 * (first * np.sin(RATE * times) + third / 9 * np.sin(3 * RATE * times))
+
+
+def _vector(values: np.ndarray) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,72 @@
+"""Paper C's robots carry their load from one pose to another, in each of the three drive modes.
+
+Both poses are rest poses of the load: there the cables, pulling with their weight's share, hold it. A robot with fewer
+than six cables can rest in no others, so they are computed (`models.statics.equilibria`): from the lengths that the
+paper fixes, 1.2 m, with the robot-ends at home and shifted together; or, where winches change the lengths, from 1.25 m
+and 1.1 m. What happens in between, the load's attitude included, is for the planner to choose.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ..models import Robot, load
+from ..models.statics import equilibria
+from ..ocp import Task
+from ..ocp.path import AnyPath, LinePath
+from ..ocp.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
+
+Drive = Literal["fixed-length", "variable-length", "both"]
+Aim = Literal["effort", "time"]
+FIXED, LONG, SHORT = 1.2, 1.25, 1.1  # lengths [m]
+SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes
+TAUT = 0.1  # [N]: paper C wants tensions above zero
+SECONDS = 2.0  # of a motion with least effort
+SPAN = DurationRange(min=0.1, max=4.0)  # [s], of a motion in least time
+OBJECTIVES = {
+    "effort": Objective(),
+    "time": Objective(time=0.01, jerk=30.0, carrier_acceleration=2.0, carrier_offset=0.5),
+}
+
+
+def robot(name: str, drive: Drive) -> Robot:
+    """A robot of the library with another drive and cables of 1.2 m."""
+    data = load(name).model_dump(mode="json")
+    cables = [{**cable, "length": FIXED} for cable in data["cables"]]
+    return Robot.model_validate({**data, "drive": drive, "cables": cables})
+
+
+def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
+    """Carry the load of `mover` between two poses where it rests."""
+    home = mover.carrier_home
+    stays = mover.drive == "variable-length"
+    there = home if stays else home + np.concatenate([SHIFT, np.zeros(3)])
+    lengths = (FIXED, FIXED) if mover.drive == "fixed-length" else (LONG, SHORT)
+    start, end = (
+        equilibria(mover, np.full(mover.m, length), places)[0].pose
+        for length, places in zip(lengths, (home, there), strict=True)
+    )
+    base: AnyBase = HoldBase(kind="hold")
+    if not stays:
+        around: dict[str, AnyPath] = {
+            carrier.name: LinePath(kind="line", start=_pose(home[i]), end=_pose(there[i]))
+            for i, carrier in enumerate(mover.carriers)
+        }
+        base = FreeBase(kind="free", ends="exact", around=around)
+    return Task(
+        name=f"{mover.drive}-{aim}",
+        path=LinePath(kind="line", start=_pose(start), end=_pose(end)),
+        tube=Tube(position="free", attitude="free", ends="exact"),
+        base=base,
+        duration=SECONDS if aim == "effort" else SPAN,
+        margin=TAUT,
+        steps=steps,
+        objective=OBJECTIVES[aim],
+    )
+
+
+def _pose(values: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    x, y, z, roll, pitch, yaw = (float(value) for value in values)
+    return x, y, z, roll, pitch, yaw

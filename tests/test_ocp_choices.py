@@ -1,0 +1,153 @@
+"""What a task leaves open: durations, ways between points, margins; against closed forms and linear programs."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from towline.errors import InputError
+from towline.models import Dynamics, Robot, load
+from towline.ocp import plan
+
+GRAVITY = 9.81
+FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
+CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.6, "rate": 0.2 * np.pi}
+
+
+def hoist(t_max_per_weight=2.0):
+    """A point mass on one vertical cable: -g <= ddz <= (t_max / weight - 1) g."""
+    data = load("point-mass-3").model_dump(mode="json")
+    weight = data["platform"]["mass"] * GRAVITY
+    cable = {**data["cables"][0], "anchor": [0, 0, 3], "t_min": 0, "t_max": t_max_per_weight * weight}
+    return Robot.model_validate({**data, "cables": [cable]})
+
+
+LIFT = {
+    "path": {"kind": "line", "start": [0, 0, 0.5], "end": [0, 0, 1.5]},
+    "tube": {"position": "free", "ends": "exact"},
+    "objective": {"time": 0.001, "jerk": 1e4},
+    "duration": {"min": 0.1, "max": 3},
+}
+
+
+@pytest.mark.parametrize("t_max_per_weight", [1.5, 2.0, 4.0])
+def test_minimum_time_is_that_of_full_force_and_none(t_max_per_weight):
+    """Up with a = (t_max / weight - 1) g, then free fall: T^2 = 2 d (1/a + 1/g). A node more or less is 1 %."""
+    found = plan(hoist(t_max_per_weight), {**LIFT, "steps": 80})
+    assert found.feasible, found.report()
+    up = (t_max_per_weight - 1) * GRAVITY
+    shortest = np.sqrt(2 * (1 / up + 1 / GRAVITY))
+    assert shortest * (1 - 1e-6) <= found.scenario.duration <= 1.01 * shortest
+    np.testing.assert_allclose(found.audit.motion.pose[[0, -1], 2], [0.5, 1.5], atol=1e-9)
+    np.testing.assert_allclose(found.audit.motion.velocity[[0, -1]], 0, atol=1e-9)
+
+
+def test_durations_stay_in_their_range():
+    for low, high, chosen in ((1.0, 2.0, 1.0), (0.1, 3.0, 0.6386)):
+        found = plan(hoist(), {**LIFT, "steps": 40, "duration": {"min": low, "max": high}})
+        assert found.feasible, found.report()
+        assert found.scenario.duration == pytest.approx(chosen, rel=0.01)
+        assert low - 1e-6 <= found.scenario.duration <= high + 1e-6
+        assert found.trajectory["time"].values[-1] == pytest.approx(found.scenario.duration)
+    slow = plan(hoist(), {**LIFT, "steps": 40, "objective": {"jerk": 1e-3}, "duration": {"min": 0.8, "max": 2.5}})
+    assert slow.scenario.duration == pytest.approx(2.5, rel=1e-5)  # smooth is slow
+
+
+def test_exact_waypoints_are_passed_though_the_tube_is_used():
+    path = {"kind": "waypoints", "points": [[0, 0, -1], [0.25, 0, -1.1], [0, 0.2, -1.2], [0, 0, -1]]}
+    tube = {"position": 0.1, "ends": "exact", "waypoints": "exact"}
+    found = plan(
+        load("wang-flying"),
+        {"path": path, "duration": 4, "steps": 37, "tube": tube, "objective": {"deviation": 10, "tension": 1}},
+    )
+    assert found.feasible, found.report()
+    knots = found.scenario.task.path.knots(4.0)
+    there, _ = found.scenario.motion(knots, found.deviation)
+    np.testing.assert_allclose(there.pose[:, :3], path["points"], atol=1e-9)
+    assert found.tracking_error_max > 1e-3
+
+
+def test_margin_is_the_largest_that_there_is():
+    """At a resting pose a linear program knows it: max s with A t = w and t at least s inside its limits."""
+    robot = load("ipanema-1")
+    path = {"kind": "rest", "pose": [0.2, 0.1, 1]}
+    objective = {"margin": 1e-3, "tension": 1e4}
+    found = plan(robot, {"path": path, "duration": {"min": 1, "max": 1.2}, "steps": 5, "objective": objective})
+    assert found.feasible, found.report()
+    dynamics = Dynamics(robot)
+    pose = np.array([*path["pose"], 0, 0, 0])
+    A, w = dynamics.wrench_matrix(pose), dynamics.required_wrench(pose, np.zeros(6), np.zeros(6))
+    m = robot.m
+    beside = np.vstack([np.hstack([-np.eye(m), np.ones((m, 1))]), np.hstack([np.eye(m), np.ones((m, 1))])])
+    best = linprog(
+        [*np.zeros(m), -1],
+        A_ub=beside,
+        b_ub=np.concatenate([-robot.t_min, robot.t_max]),
+        A_eq=np.hstack([A, np.zeros((6, 1))]),
+        b_eq=w,
+        bounds=[(None, None)] * (m + 1),
+    )
+    assert found.margin == pytest.approx(-best.fun, rel=1e-4)
+
+
+def test_tension_rates_hold_in_the_saved_trajectory():
+    robot = load("wang-flying")
+    task = {"path": CIRCLE, "base": FREE, "steps": 40}
+
+    def fastest(found):
+        values = found.trajectory["tensions"].values
+        return np.abs(np.diff(values, axis=0)).max() / found.trajectory["time"].values[1]
+
+    before = fastest(plan(robot, task))
+    found = plan(robot, {**task, "limits": {"tension_rate": 0.5 * before}})
+    assert found.feasible, found.report()
+    assert fastest(found) <= 0.5 * before * (1 + 1e-3)
+
+
+def test_a_plan_to_start_from_saves_iterations():
+    robot = load("wang-flying")
+    task = {"path": CIRCLE, "base": FREE, "steps": 40}
+    first = plan(robot, task)
+    near = {**task, "path": {**CIRCLE, "radius": 0.62}}
+    cold, warm = plan(robot, near), plan(robot, near, start=first)
+    assert warm.feasible
+    assert warm.iterations < cold.iterations
+    np.testing.assert_allclose(warm.audit.carriers.pose, cold.audit.carriers.pose, atol=1e-3)
+
+
+WRONG = {
+    "range": ({"duration": {"min": 2, "max": 1}}, "task: duration: min: 2 s is more than max: 1 s"),
+    "range of a circle": (
+        {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
+        "duration: is to be chosen, but path of kind circle has times of its own",
+    ),
+    "tube": ({"tube": {"position": "loose"}}, "tube.position: accepted: a number, not text, or .*'free', got 'loose'$"),
+    "range of what": (
+        {"duration": {"min": 2, "mx": 3}},
+        "duration.(max: is missing|mx: is not a known key, did you mean 'max')",
+    ),
+    "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min: 2 is more than max: 1"),
+    "soft": (
+        {"limits": {"cable_speed": 1, "soft": {"cable_sped": 0.1}}},
+        "soft: 'cable_sped' is none of this task's limits; accepted: cable_speed",
+    ),
+    "box": (
+        {"limits": {"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [1, 0, 1]}]}},
+        r"keep_out.*is not below max",
+    ),
+    "speed": ({"limits": {"platform_speed": -1}}, "limits.platform_speed: .*greater than 0, got -1"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_choices_are_one_line(case):
+    task, message = WRONG[case]
+    with pytest.raises(InputError, match=message) as caught:
+        plan(hoist(), {**LIFT, **task})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_plan_of_another_robot_is_no_start():
+    lifted = plan(hoist(), {**LIFT, "steps": 10})
+    with pytest.raises(InputError, match="start: is a plan of 'point-mass-3'") as caught:
+        plan(load("wang-flying"), {"path": CIRCLE, "base": FREE}, start=lifted)
+    assert "\n" not in str(caught.value)
