@@ -33,5 +33,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,dev,mujoco]"
+	$(INSTALL) ".[bench,dev,mujoco,timing]"
 	touch $@

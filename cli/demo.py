@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_json, watching
+from .options import JsonOption, print_json
+from .watching import watching
 
 
 def demo(
@@ -17,7 +18,7 @@ def demo(
     """Fly paper F's circle: impossible while the quadrotor hovers, possible when it moves."""
     from ..studies import flying_circle
 
-    with watching("planning the circle with the base free") as progress:
+    with watching("planning the circle with the base free", quiet=as_json) as progress:
         result = flying_circle.run(folder, progress)
     written = [str(path) for path in (*result.pictures, *result.files)]
     if as_json:

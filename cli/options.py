@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,8 +10,6 @@ from ..errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
-
-    from ..ocp.transcription import Progress
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot of the library, or a robot file (YAML).")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
@@ -54,19 +50,3 @@ def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.n
     if not fits or not np.isfinite(np.array(values)).all():
         raise InputError(f"{option}: {text!r}; accepted: {expected}")
     return np.array(values) if rows else np.array(values[0])
-
-
-@contextmanager
-def watching(what: str) -> Iterator[Progress]:
-    """Show a solver's iterations on standard error while the block runs, if a person is watching."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    with console.status(what) as status:
-
-        def progress(iteration: int, objective: float, infeasibility: float) -> None:
-            status.update(
-                f"{what}: iteration {iteration}, objective {objective:.4g}, infeasibility {infeasibility:.1e}"
-            )
-
-        yield progress

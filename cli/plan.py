@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .options import JsonOption, RobotArgument, print_json, watching
+from .options import JsonOption, RobotArgument, print_json
+from .watching import watching
 
 
 def plan(
@@ -19,9 +21,18 @@ def plan(
     figures: Annotated[
         Path | None, typer.Option("--figures", help="Folder to draw path, tensions and base in.")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, to open anywhere.")
+    ] = None,
+    animate: Annotated[
+        Path | None, typer.Option("--animate", help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="Of the film: 1 is real time.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Frames a second of the film.")] = 20.0,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or say why there is none."""
+    from ..figures.animation import check_film
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task
@@ -29,16 +40,28 @@ def plan(
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
-    check_writable(target)
-    with watching(f"planning {read.name}") as progress:
-        found = plan_motion(loaded, read, progress)
-    file = found.save(target)
-    pictures = found.plot(figures) if figures else []
+    if animate is not None:
+        check_film(animate, speed, fps)
+    for file in (target, report, animate):
+        if file is not None:
+            check_writable(file)
+    with watching(f"planning {read.name}", quiet=as_json) as watch:
+        found = plan_motion(loaded, read, watch)
+        found = replace(found, iterates=found.iterates or tuple(watch.rows))
+        written = {"file": found.save(target)}
+        watch.now("drawing")
+        pictures = found.plot(figures) if figures else []
+        if report is not None:
+            written["report"] = found.save_report(report)
+        if animate is not None:
+            written["animation"] = found.animate(animate, speed, fps)
     if as_json:
-        print_json({**found.summary(), "file": str(file), "figures": [str(picture) for picture in pictures]})
+        files = {name: str(path) for name, path in written.items()}
+        print_json({**found.summary(), **files, "figures": [str(picture) for picture in pictures]})
     else:
         typer.echo(found.report())
-        for path in (file, *pictures):
-            typer.echo(f"  {path}")
+        typer.echo("  Written")
+        for path in (*written.values(), *pictures):
+            typer.echo(f"    {path}")
     if not found.feasible:
         raise typer.Exit(1)

@@ -1,1 +1,1 @@
-"""Matplotlib figures of datasets: this room reads names, units and limits from an `xarray.Dataset` and nothing else."""
+"""Matplotlib figures and films of datasets and plain arrays: this room knows no robot, no task and no plan."""

@@ -65,8 +65,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
     for ax, (title, trajectory) in zip(panels, trajectories.items(), strict=True):
         notes = _draw_tensions(ax, trajectory)
         ax.set_title("\n".join([*([title] if title else []), "; ".join(notes)]), fontsize=9)
-    handles, labels = panels[0].get_legend_handles_labels()
-    canvas.legend(handles, labels, fontsize="small", ncols=6, loc="outside lower center", frameon=False)
+    style.legend_below(canvas, panels[0])
     return canvas
 
 
@@ -76,12 +75,13 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
     ax = style.axes(canvas, "time [s]", "carrier from platform [m]")
     time = trajectory["time"].values
     apart = trajectory["carrier_pose"].values[:, :, :3] - trajectory["pose"].values[:, None, :3]
+    sideways = np.linalg.norm(apart[:, :, :2], axis=2)
+    highest = float(max(sideways.max(), apart[:, :, 2].max()))
     for index, name in enumerate(trajectory["carrier"].values):
-        horizontal = np.linalg.norm(apart[:, index, :2], axis=1)
-        ax.plot(time, horizontal, color=style.colour(index), label=f"{name}: horizontal")
+        ax.plot(time, sideways[:, index], color=style.colour(index), label=f"{name}: horizontal")
         ax.plot(time, apart[:, index, 2], "--", color=style.colour(index), label=f"{name}: height")
-    ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())))
-    ax.legend(fontsize="small")
+    ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())), top=1.08 * max(highest, 1e-3))
+    style.legend_below(canvas, ax)
     return canvas
 
 

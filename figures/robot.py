@@ -65,7 +65,7 @@ def draw(sketch: RobotSketch) -> Figure:
     ax.scatter(*sketch.com, s=24, color=style.colour(1), label="CoM")
     ax.add_collection3d(_platform(sketch.attachments))
     for low, high in sketch.boxes:
-        for edge in _edges(low, high):
+        for edge in box_edges(low, high):
             ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
     for position, name in zip(sketch.carriers, sketch.names, strict=True):
         ax.text(*position, name, fontsize=7)
@@ -92,7 +92,7 @@ def _platform(attachments: np.ndarray) -> Any:
     return Poly3DCollection([attachments[order]], facecolor=style.colour(4), edgecolor=style.colour(0), alpha=0.5)
 
 
-def _edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
+def box_edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
     """The twelve edges of a box, (2, 3) each."""
     corners = np.array([[(low, high)[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
     return [corners[[i, i | 1 << k]] for i in range(8) for k in range(3) if not i >> k & 1]

@@ -44,8 +44,31 @@ def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] =
     return ax
 
 
+def legend_below(canvas: Figure, ax: Axes) -> None:
+    """The legend of `ax` below everything, in as many rows as the figure's width asks for, equally long."""
+    handles, labels = ax.get_legend_handles_labels()
+    longest = max((len(label) for label in labels), default=0)
+    most = max(int(canvas.get_figwidth() / (0.45 + 0.07 * longest)), 1)
+    rows = max(-(-len(labels) // most), 1)
+    columns = max(-(-len(labels) // rows), 1)
+    canvas.legend(handles, labels, fontsize="small", ncols=columns, loc="outside lower center", frameon=False)
+
+
 def save(canvas: Figure, path: Path) -> Path:
     """Save as PNG, whole or not at all."""
     with whole_file(path) as temporary:
         canvas.savefig(temporary, dpi=DPI, format="png")
     return path
+
+
+def svg(canvas: Figure) -> str:
+    """The figure as the text of an SVG image, letters as shapes: no font is needed, equal figures give equal text."""
+    import io
+
+    from matplotlib import rc_context
+
+    stream = io.StringIO()
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with rc_context({"svg.fonttype": "path", "svg.hashsalt": "towline"}):
+        canvas.savefig(stream, format="svg", metadata=nothing)
+    return stream.getvalue()

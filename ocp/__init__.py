@@ -1,7 +1,18 @@
-"""Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans."""
+"""Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; timing."""
 
 from .plan import Planner, plan
 from .result import Plan, PlanStatus
 from .task import Task, read_task
+from .timing import Timing, TimingStatus, time_along
 
-__all__ = ["Plan", "PlanStatus", "Planner", "Task", "plan", "read_task"]
+__all__ = [
+    "Plan",
+    "PlanStatus",
+    "Planner",
+    "Task",
+    "Timing",
+    "TimingStatus",
+    "plan",
+    "read_task",
+    "time_along",
+]

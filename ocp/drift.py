@@ -70,7 +70,7 @@ def _run(
     stride: int,
     step: float,
 ) -> np.ndarray:
-    """Poses (count, k, 6) after each of `count` steps over 2 `stride` samples, from the plan's states at `rows` (k,)."""
+    """Poses (count, k, 6) after each of `count` steps over 2 `stride` samples, from the plan's states at `rows`."""
     h = 2 * stride * step
 
     def slope(state: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -94,7 +94,7 @@ def _run(
 
 
 def _apart(poses: np.ndarray, planned: np.ndarray) -> tuple[float, float]:
-    """Largest distance [m] and largest difference of an Euler angle [rad] of poses (n, 6); infinite if any is no number."""
+    """Largest distance [m] and largest difference of an Euler angle [rad]; infinite if one is no number."""
     off = poses - planned
     off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
     if not np.isfinite(off).all():

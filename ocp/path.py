@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -10,11 +11,14 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import override
 
-from ..models.robot import Finite, NonNegative, Part, Pose, Vector3
+from ..models.robot import Finite, NonNegative, Part, Pose, Positive, Vector3
 
 
 class Motion(NamedTuple):
-    """Poses over time and their derivatives; times come first, coordinates (x, y, z, roll, pitch, yaw) last."""
+    """Poses over time and their derivatives; times come first, coordinates (x, y, z, roll, pitch, yaw) last.
+
+    Where a path is taken as a curve, the fraction s of it stands for the time and derivatives are by s.
+    """
 
     pose: np.ndarray  # (n, 6) [m, rad]
     velocity: np.ndarray  # (n, 6) [m/s, rad/s]
@@ -23,6 +27,12 @@ class Motion(NamedTuple):
     def plus(self, deviation: Iterable[np.ndarray]) -> Motion:
         """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""
         return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))
+
+    def timed(self, sd: np.ndarray, sdd: np.ndarray) -> Motion:
+        """The motion over time of a curve by s, from ds/dt [1/s] and d2s/dt2 [1/s^2] at each of its points, (n,)."""
+        shape = (-1, *[1] * (self.pose.ndim - 1))
+        sd, sdd = np.reshape(sd, shape), np.reshape(sdd, shape)
+        return Motion(self.pose, self.velocity * sd, self.velocity * sdd + self.acceleration * sd**2)
 
 
 def _with_level_attitude(value: object) -> object:
@@ -51,6 +61,15 @@ class PathBase(Part):
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
         raise TypeError(f"{type(self).__name__} is no path")
+
+    def by_fraction(self, s: np.ndarray, until: float | None = None) -> Motion:
+        """Pose and derivatives by s, the fraction of the path's own time: from 0 to 1.
+
+        `until` is when the path ends by its own time [s]; None: after its natural duration, or 1 s.
+        """
+        whole = until or self.natural_duration or 1.0
+        motion = self.at(np.asarray(s) * whole, whole)
+        return Motion(motion.pose, motion.velocity * whole, motion.acceleration * whole**2)
 
 
 class RestPath(PathBase):
@@ -133,7 +152,7 @@ class CirclePath(PathBase):
 
 
 class WaypointPath(PathBase):
-    """A spline of degree 7 through given poses, from rest to rest, acceleration and jerk zero there too.
+    """A spline through given poses.
 
     Angles are taken as they are: from 3.1 to -3.1 rad is a turn of 6.2 rad, not of 0.08.
     """
@@ -142,6 +161,11 @@ class WaypointPath(PathBase):
     points: tuple[PoseOrPosition, ...] = Field(min_length=2, description="two poses or positions or more [m, rad]")
     times: tuple[Finite, ...] | None = Field(
         default=None, description="when to be there, from 0 on, rising [s]; none: by distance over the duration"
+    )
+    timing: Literal["smooth", "uniform"] = Field(
+        default="smooth",
+        description="smooth: of degree 7, from rest to rest, acceleration and jerk zero there; uniform: the natural "
+        "cubic, which does not rest anywhere",
     )
 
     @model_validator(mode="after")
@@ -165,9 +189,12 @@ class WaypointPath(PathBase):
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        from scipy.interpolate import make_interp_spline
+        from scipy.interpolate import CubicSpline, make_interp_spline
 
         points, knots = np.array(self.points), self.knots(duration)
+        if self.timing == "uniform":
+            natural = CubicSpline(knots, points, bc_type="natural")
+            return Motion(natural(times), natural(times, 1), natural(times, 2))
         at_rest = [(derivative, np.zeros(6)) for derivative in (1, 2, 3)]
         spline = make_interp_spline(knots, points, k=7, bc_type=(at_rest, at_rest))
         return Motion(spline(times), spline(times, 1), spline(times, 2))
@@ -207,7 +234,72 @@ class SamplePath(PathBase):
         return Motion(spline(times), spline(times, 1), spline(times, 2))
 
 
-AnyPath = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
+Curve = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
+
+
+class TimedPath(PathBase):
+    """A path with a time law of its own: d2s/dt2 is constant between the given points of it, then it rests at its end.
+
+    `time_along` makes such.
+    """
+
+    kind: Literal["timed"]
+    along: Curve = Field(description="the path; s is the fraction of its own time")
+    until: Positive | None = Field(
+        default=None, description="when it ends by its own time [s]; none: after its natural duration"
+    )
+    s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, rising")
+    speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
+
+    @model_validator(mode="after")
+    def _law_fits(self) -> Self:
+        if len(self.s) != len(self.speeds):
+            raise ValueError(
+                f"speeds must be one for each s, but there are {len(self.speeds)} speeds and {len(self.s)} s"
+            )
+        if self.s[0] != 0 or self.s[-1] != 1:
+            raise ValueError(f"s must go from 0 to 1, but it goes from {self.s[0]:g} to {self.s[-1]:g}")
+        for index, (before, after) in enumerate(pairwise(self.s)):
+            if after <= before:
+                raise ValueError(f"s must rise, but s[{index + 1}] = {after:g} follows {before:g}")
+        for index, (before, after) in enumerate(pairwise(self.speeds)):
+            if before == after == 0:
+                raise ValueError(f"speeds[{index}] and speeds[{index + 1}] are both 0; accepted: no two in a row")
+        if self.frame != self.along.frame:
+            raise ValueError(f"frame: {self.frame!r} is not that of along; accepted: {self.along.frame!r}")
+        return self
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """When the path is at each s, (n,) [s]."""
+        speeds = np.array(self.speeds)
+        return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (speeds[1:] + speeds[:-1]))])
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return float(self.times[-1])
+
+    def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
+        knots, s, speeds = self.times, np.array(self.s), np.array(self.speeds)
+        k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+        rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (2 * (s[k + 1] - s[k]))
+        since = np.minimum(times, knots[-1]) - knots[k]
+        # The last instant belongs to the motion, as the first does: d2s/dt2 counts there too.
+        over = times > knots[-1] * (1 + 1e-12)
+        at = s[k] + since * (speeds[k] + since * rate / 2)
+        return np.minimum(at, 1.0), np.where(over, 0.0, speeds[k] + since * rate), np.where(over, 0.0, rate)
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        s, sd, sdd = self.law(times)
+        return self.along.by_fraction(s, self.until).timed(sd, sdd)
+
+
+AnyPath = Annotated[
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath, Field(discriminator="kind")
+]
 
 
 def _check_times(times: tuple[float, ...], count: int) -> None:

@@ -56,6 +56,9 @@ class Plan:
         Wall time to build and to solve [s], over all attempts.
     iterations, message
         Of the last run of the solver; its own words.
+    iterates
+        Rows of (iteration, objective, infeasibility) of all runs of the solver, in order: where the iteration falls
+        back to 0 another run begins.
     """
 
     scenario: Scenario
@@ -66,6 +69,7 @@ class Plan:
     solve_s: float
     iterations: int = 0
     message: str = ""
+    iterates: tuple[tuple[int, float, float], ...] = ()
 
     @property
     def feasible(self) -> bool:
@@ -178,35 +182,69 @@ class Plan:
         return path
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Draw path, tensions and base offset as PNG files in `folder`; their paths."""
+        """Draw path, tensions, base offset and convergence as PNG files in `folder`; their paths.
+
+        There is no convergence where no solver ran: the task fixed the motion.
+        """
+        from ..figures import style
+        from ..figures.convergence import convergence
         from ..figures.plan import draw
 
-        return draw(self.trajectory, Path(folder))
+        drawn = draw(self.trajectory, Path(folder))
+        if self.iterates:
+            drawn.append(style.save(convergence(self.iterates), Path(folder) / "convergence.png"))
+        return drawn
+
+    def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
+        """Draw the robot in motion as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.
+
+        Cables are coloured by tension, and grey where no tensions exist.
+
+        Parameters
+        ----------
+        file
+            Ends in .gif or .mp4.
+        speed
+            Seconds of the motion in one second of the film; 1 is real time.
+        fps
+            Frames a second. GIF counts in hundredths of a second: it gets the nearest rate, at most 50, and the motion
+            keeps its speed.
+
+        Raises
+        ------
+        InputError
+            If the suffix, the speed or the rate are none that can be, or the place cannot be written to.
+        """
+        from ..figures import animation
+        from .scene import scene
+
+        path = Path(file)
+        when = animation.timing(path, self.scenario.duration, speed, fps)
+        return animation.draw(scene(self, when.times), when, path)
 
     def report(self) -> str:
-        """What a person wants to know first, as text."""
-        robot, task = self.scenario.robot, self.scenario.task
-        lines = [f"{robot.name}, {task.name}: {self.status.value.upper()}"]
-        if self.certificate is not None and self.audit.certificate is not None:
-            lines.append(f"  at t = {self.certificate['time']:.3f} s")
-            lines += [f"  {line}" for line in self.audit.certificate.in_words().splitlines()]
-        if self.tension_min is not None:
-            lines.append(f"  tensions {self.tension_min:.3f} N to {self.tension_max:.3f} N, margin {self.margin:.3f} N")
-        lines.append(f"  tracking error at most {self.tracking_error_max * 1e3:.3g} mm")
-        seen = self.audit.summary()
-        lines.append(
-            f"  audit at {seen['rate_hz']:g} Hz: worst violation {seen['worst_violation']:.3g} N at "
-            f"t = {seen['at_s']:.3f} s (up to {seen['tolerance']:.2g} N counts as none)"
-        )
-        if (drift := self.audit.drift) is not None:
-            lines.append(
-                f"  under the planned tensions alone: {drift.window_position * 1e3:.3g} mm and "
-                f"{drift.window_attitude * 1e3:.3g} mrad off after {drift.window:.2g} s on the plan, "
-                f"{drift.position * 1e3:.3g} mm and {drift.attitude * 1e3:.3g} mrad over all of it"
-            )
-        lines += [f"  {sentence}" for sentence in seen["excess"]]
-        lines.append(f"  built in {self.build_s:.3f} s, solved in {self.solve_s:.3f} s")
-        return "\n".join(lines)
+        """What a person wants to know, as text: the verdict in the first line, then the facts that it rests on."""
+        from .report import as_text
+
+        return as_text(self)
+
+    def save_report(self, file: str | os.PathLike[str]) -> Path:
+        """Write the report as one HTML file with its figures inside, whole or not at all.
+
+        It loads nothing from anywhere, so that it can be mailed and kept. A method of its own, and not an argument of
+        `report`: what returns text writes no files, and `save_report` is found beside `save`.
+
+        Raises
+        ------
+        InputError
+            If the place cannot be written to.
+        """
+        from .report_page import page
+
+        path = Path(file)
+        with whole_file(path) as temporary:
+            temporary.write_text(page(self), encoding="utf-8")
+        return path
 
     def _output_rows(self) -> np.ndarray:
         """Rows of the audit that are saved: at equal times, and each of them audited."""

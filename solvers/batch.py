@@ -184,7 +184,7 @@ def solve_batch(
     tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
     code = np.full(rows, _UNSURE, np.int8)
     kernels = compiled.load()
-    share = threads or min(os.cpu_count() or 1, max(1, rows // ROWS_WORTH_A_THREAD))
+    share = threads or min(_processors(), max(1, rows // ROWS_WORTH_A_THREAD))
     # Whole vectors for each thread, so that a row meets the same company whoever solves it.
     block = max(kernels.WIDTH, -(-rows // (kernels.WIDTH * share)) * kernels.WIDTH)
 
@@ -234,6 +234,11 @@ def solve_batch(
 def _alone(problem: TensionProblem, rho: float | None) -> TensionSolution:
     """Solve one row by the method of the batch."""
     return solve(problem) if rho is None else solve(problem, method="soft-wrench", rho=rho)
+
+
+def _processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _row(problem: dict[str, Array], index: int | tuple[int, ...]) -> TensionProblem:

@@ -15,7 +15,7 @@ from .problem import TensionProblem
 from .projection import project
 from .standard_form import StandardForm
 
-__all__ = ["boundary_candidates"]
+__all__ = ["boundary_candidates", "nearest_available"]
 
 # How much the limits give way, in units of s; every tension is put back inside its limits afterwards, so this much
 # wrench error remains.
@@ -27,11 +27,9 @@ def boundary_candidates(problem: TensionProblem, form: StandardForm) -> Iterator
 
     The projection of w is available without doubt, its tensions are at hand, and limits with a hair of room around
     them give even an exact method something to find. Where the weights are eleven decades apart the daqp package finds
-    nothing there either, although w may be far from the boundary: then our own kernel is asked, loaded if need be. The
-    tensions of the projection themselves, not of least norm, come last.
+    nothing there either, although w may be far from the boundary: then our own kernel is asked, loaded if need be.
     """
-    nearest = (project(problem)[0] - form.origin)[form.moving] / form.unit
-    b = form.Q @ nearest
+    b = form.Q @ nearest_available(problem, form)
     for room in _ROOM:
         upper, lower = np.append(form.upper + room, b), np.append(form.lower - room, b)
         s = bounded_least_norm(upper, lower, form.Q, equalities=b.size).s
@@ -41,7 +39,11 @@ def boundary_candidates(problem: TensionProblem, form: StandardForm) -> Iterator
         s = _by_kernel(form, side)
         if s is not None:
             yield s
-    yield nearest
+
+
+def nearest_available(problem: TensionProblem, form: StandardForm) -> NDArray[np.float64]:
+    """Return an s, shape (k,), inside the limits that gives the available wrench nearest to w, whatever its cost."""
+    return (project(problem)[0] - form.origin)[form.moving] / form.unit
 
 
 def _by_kernel(form: StandardForm, b: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -5,11 +5,14 @@ in some 25 s. A call without the kernels costs about 0.07 ms more: a process tha
 off without them, and one that would have to compile them needs many more before that pays.
 """
 
+import hashlib
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
+
+from ..writing import whole_file
 
 __all__ = ["CALLS_WORTH_COMPILING", "CALLS_WORTH_LOADING", "count_a_call", "load", "solve_packed"]
 
@@ -52,13 +55,18 @@ def _on_disk() -> bool:
 
 
 def _forget_old_code() -> None:
-    """Remove machine code that is older than a source of the room: Numba looks at a function's own file only.
+    """Remove machine code that is of other sources than those that lie here: Numba looks at a function's own file only.
 
     The tolerances are such a source too: their numbers are in the machine code.
     """
-    sources = (*_ROOM.glob("*.py"), *_ROOM.parent.glob("tolerances.py"))
-    changed = max((source.stat().st_mtime for source in sources), default=0.0)
-    for index in (_ROOM / "__pycache__").glob("*.nbi"):
-        with suppress(OSError):
-            if index.stat().st_mtime < changed:
-                index.unlink()
+    folder = _ROOM / "__pycache__"
+    sources = sorted((*_ROOM.glob("*.py"), *_ROOM.parent.glob("tolerances.py")))
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    seal = folder / "sources.sha256"
+    with suppress(OSError):
+        if not seal.exists() or seal.read_text() != digest:
+            folder.mkdir(exist_ok=True)
+            for index in folder.glob("*.nb[ic]"):
+                index.unlink(missing_ok=True)
+            with whole_file(seal) as place:
+                place.write_text(digest)

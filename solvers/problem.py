@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .tolerances import FEASIBILITY, ROUNDING
+from .tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 __all__ = ["TensionProblem"]
 
@@ -44,7 +44,8 @@ class TensionProblem:
         Tensions to stay near [N], shape (m,) or one number; they need not lie inside the limits. None = 0, which asks
         for the least norm.
     weights :
-        Weights omega of the cables in the cost, from 1e-20 to 1e20, shape (m,) or one number. None = 1.
+        Weights omega of the cables in the cost, from 1e-20 to 1e20 and at most 1e14 apart, shape (m,) or one number.
+        None = 1.
     length :
         Characteristic length [m], from 1e-20 to 1e20, by which moment rows (3 to 5, when n = 6) are divided wherever
         newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes which
@@ -103,6 +104,11 @@ class TensionProblem:
         omega = np.ones(m) if weights is None else _per_cable("weights", weights, m)
         out_of_range = (omega < _LIGHTEST) | (omega > _HEAVIEST)
         _reject_at("weights", omega, out_of_range, f"numbers > 0, from {_LIGHTEST:g} to {_HEAVIEST:g}")
+        if omega.max() > WEIGHTS_APART * omega.min():
+            raise InputError(
+                f"weights: are from {omega.min():g} to {omega.max():g}; accepted: the largest at most "
+                f"{WEIGHTS_APART:g} times the least"
+            )
 
         parts = (matrix.ravel(), wrench, lower, upper, wish, omega)
         packed = np.concatenate((*parts, [_positive_length(length)]))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .active_set import ActiveSet
 from .analytic_centre import AnalyticCentre
-from .boundary import boundary_candidates
+from .boundary import boundary_candidates, nearest_available
 from .centroid import Centroid
 from .certificate import Certificate, certify
 from .closed_form import ClosedForm
@@ -19,6 +19,7 @@ from .improved_closed_form import ImprovedClosedForm
 from .inputs import required, shown
 from .linear_programs import LargestMargin, LeastSum, MinMax
 from .log_barrier import LogBarrier
+from .margin import capacity_margin
 from .method import Method, Proposal
 from .min_norm import MinNorm
 from .p_norm import PNorm
@@ -150,10 +151,17 @@ def _explain(problem: TensionProblem, form: StandardForm, method: Method, propos
         return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
         return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
-    for s in boundary_candidates(problem, form) if method.exact and not proposal.final else ():
-        tensions = form.tensions(problem, s)
+    if method.exact and not proposal.final:
+        for s in boundary_candidates(problem, form):
+            tensions = form.tensions(problem, s)
+            if _gives_wrench(problem, tensions):
+                return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
+        tensions = form.tensions(problem, nearest_available(problem, form))
         if _gives_wrench(problem, tensions):
-            return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
+            # On the boundary there is nothing to choose; farther inside there is, and these were not chosen by cost.
+            if abs(capacity_margin(problem).value) <= problem.tolerance(tensions):
+                return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
+            return _Verdict(Status.INACCURATE, tensions, detail="gives the wrench, at what may not be the least cost")
     return _Verdict(Status.FAILED if tensions is None else Status.INACCURATE, tensions, detail=proposal.detail)
 
 

@@ -1,6 +1,6 @@
 """The numbers by which this room judges, in one place. All are relative and have no unit."""
 
-__all__ = ["DOUBTFUL", "FEASIBILITY", "NEGLIGIBLE", "RANK", "ROUNDING"]
+__all__ = ["DOUBTFUL", "FEASIBILITY", "NEGLIGIBLE", "RANK", "ROUNDING", "WEIGHTS_APART"]
 
 # Wrench error that still counts as none, relative to what the problem asks (see `TensionProblem.tolerance`). Tensions
 # are called optimal only below it and a certificate is believed only above it, so the two answers cannot both be given.
@@ -21,3 +21,6 @@ DOUBTFUL = 1e-10
 # rounding: times an infinite tension limit they would void every certificate. It is larger than RANK, so that a
 # direction which the rank cut calls unreachable is not reached by the certificate's own count either.
 NEGLIGIBLE = 1e-11
+
+# The heaviest weight of a problem, relative to the lightest: beyond it least squares have no digits left.
+WEIGHTS_APART = 1e14

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
 
 from towline.models import available, load
 from towline.models.files import LIBRARY
@@ -156,6 +157,79 @@ def test_plan_writes_a_file_and_figures(tmp_path):
     saved = xr.load_dataset(tmp_path / report["file"])
     assert saved["tensions"].shape[1] == 6
     assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == ["base.png", "path.png", "tensions.png"]
+
+
+FREE_TASK = """\
+name: circle
+path: {kind: circle, centre: [0, 0, -1], radius: 0.5, rate: 3}
+base: {kind: free, acceleration_max: 3, ends: periodic}
+"""
+
+
+def test_plan_writes_a_report_and_a_film(tmp_path):
+    (tmp_path / "circle.yaml").write_text(FREE_TASK)
+    files = ("--report", "out/plan.html", "--animate", "out/plan.gif", "--speed", "0.5", "--fps", "10")
+    done = run("plan", "wang-flying", "circle.yaml", *files, "--figures", "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    answer = json.loads(done.stdout)
+    assert (answer["report"], answer["animation"]) == ("out/plan.html", "out/plan.gif")
+    page = (tmp_path / "out" / "plan.html").read_text()
+    assert page.startswith("<!DOCTYPE html>")
+    assert f"{answer['tension_min']:.4g} N in cable" in page
+    assert "How the solver came to it" in page
+    assert "convergence.png" in [Path(picture).name for picture in answer["figures"]]
+    with Image.open(tmp_path / "out" / "plan.gif") as film:
+        seconds = 2 * 2 * np.pi / 3
+        assert film.n_frames == int(10 * seconds) + 1
+    told = run("plan", "wang-flying", "circle.yaml", "--report", "plan.html", cwd=tmp_path)
+    assert told.stderr == ""  # nobody watches
+    assert told.stdout.startswith("wang-flying, circle: FEASIBLE")
+    assert told.stdout.endswith("\n  Written\n    wang-flying-circle.nc\n    plan.html\n")
+
+
+def test_plan_refuses_a_wrong_film_before_it_plans(tmp_path):
+    (tmp_path / "circle.yaml").write_text(FREE_TASK)
+    for options, message in (
+        (["--animate", "film.avi"], "accepted: .gif, .mp4"),
+        (["--animate", "film.gif", "--fps", "0"], "fps: 0; accepted"),
+        (["--animate", "film.gif", "--speed", "-1"], "speed: -1; accepted"),
+        (["--report", "/proc/nowhere/plan.html"], "cannot be written"),
+    ):
+        done = run("plan", "wang-flying", "circle.yaml", *options, cwd=tmp_path)
+        assert done.returncode == 2
+        assert len(done.stderr.strip().splitlines()) == 1
+        assert message in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["circle.yaml"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+def test_plan_shows_progress_on_a_terminal_and_only_there(tmp_path):
+    import pty
+
+    def watched(*options):
+        """What a person sees who watches standard error."""
+        ours, theirs = pty.openpty()
+        environment = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+        environment.pop("NO_COLOR", None)
+        command = [str(TOWLINE), "plan", "wang-flying", str(tmp_path / "circle.yaml"), *options]
+        with subprocess.Popen(command, stderr=theirs, stdout=subprocess.DEVNULL, cwd=tmp_path, env=environment) as run:
+            os.close(theirs)
+            seen = b""
+            try:
+                while piece := os.read(ours, 65536):
+                    seen += piece
+            except OSError:
+                pass  # how Linux tells that the other end is closed
+        os.close(ours)
+        assert run.returncode == 0
+        return seen.decode()
+
+    (tmp_path / "circle.yaml").write_text(FREE_TASK)
+    seen = watched()
+    for part in ("planning circle", "attempt 1", "iteration", "objective", "infeasibility"):
+        assert part in seen
+    assert watched("--json") == ""
 
 
 def test_plan_that_is_infeasible_exits_1(tmp_path):

@@ -16,8 +16,8 @@ def blocks(language):
     return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
-def test_python_example_runs(tmp_path):
-    (example,) = blocks("python")
+def test_python_examples_run(tmp_path):
+    example = "\n".join(blocks("python"))
     done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "optimal" in done.stdout

@@ -40,10 +40,10 @@ def test_a_thousand_awkward_problems_are_right():
 
 @pytest.mark.parametrize("seed", range(150))
 def test_awkward_tensions_are_those_of_enumeration(seed):
-    A, w, low, high = awkward_problem(10_000 + seed, m=1 + seed % 6)
-    problem = TensionProblem(A, w, low, high)
+    A, w, low, high, wish, weights = awkward_problem(10_000 + seed, m=1 + seed % 6)
+    problem = TensionProblem(A, w, low, high, wish, weights)
     solution = solve(problem)
-    expected = optimum_by_enumeration(A, w, low, high)
+    expected = optimum_by_enumeration(A, w, low, high, wish, weights)
     if solution.feasible and expected is not None:
         # The reference takes wrench errors up to 1e-9, which a nearly singular matrix makes visible in the tensions.
         asked = problem.tolerance(solution.tensions) / 1e-9
@@ -178,7 +178,7 @@ def test_wrong_arguments_are_told(change, message):
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_never_nan_never_outside_and_every_certificate_verifies(seed):
-    problem = TensionProblem(*awkward_problem(seed))
+    problem = TensionProblem(*awkward_problem(seed)[:4])
     solution = solve(problem)
     if solution.feasible:
         assert np.isfinite(solution.tensions).all()
@@ -206,7 +206,7 @@ def nearly_unavailable(seed):
     """
     rng = np.random.default_rng(seed)
     if seed % 2:
-        A, w, low, high = awkward_problem(seed)
+        A, w, low, high, *_ = awkward_problem(seed)
         found = certify(TensionProblem(A, w, low, high))
         d = A @ rng.normal(size=A.shape[1]) if found is None else found.direction
         at = np.where(d @ A > 0, high, low)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..tolerances import FEASIBILITY, ROUNDING
+from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, INFEASIBLE, OPTIMAL, SLACK, UNSURE
 from .jit import jit
 from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
@@ -137,6 +137,7 @@ def _prepare_matrix(weighted, n, m, W):
             omega = load(W, unit + c)
             heaviest, lightest = maximum(heaviest, omega), minimum(lightest, omega)
             good = good & (omega >= 1e-20) & (omega <= 1e20)
+        good = good & (heaviest <= WEIGHTS_APART * lightest)
         weighted = any_of(lightest < heaviest)
         if weighted:
             for c in range(m):

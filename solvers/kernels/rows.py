@@ -7,7 +7,7 @@ import math
 import numba
 import numpy as np
 
-from ..tolerances import FEASIBILITY, ROUNDING
+from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, INFEASIBLE, INVALID, OPTIMAL, UNSURE
 from .jit import GIVEN, VECTOR, jit
 from .lanes import lane_size, prepare, report
@@ -46,12 +46,14 @@ def _is_valid(A, w, lower, upper, ref, weights, length, n, m):
     for i in range(n):
         if not abs(w[i]) < 1e50:
             return False
+    heaviest, lightest = 0.0, np.inf
     for c in range(m):
         if not (lower[c] <= 1e50 and upper[c] >= -1e50 and lower[c] <= upper[c]):
             return False
         if not (abs(ref[c]) < 1e50 and 1e-20 <= weights[c] <= 1e20):
             return False
-    return True
+        heaviest, lightest = max(heaviest, weights[c]), min(lightest, weights[c])
+    return heaviest <= WEIGHTS_APART * lightest
 
 
 @jit()

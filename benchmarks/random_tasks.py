@@ -1,0 +1,169 @@
+"""Random planning tasks over six robots: what becomes of each, and whether that is true.
+
+    python -m towline.benchmarks.random_tasks [--count 200] [--start 0]
+
+Each task is told by its seed. A plan that is called feasible has passed its audit; one that is called infeasible has a
+certificate, which is verified here once more, or leaves a limit of its carriers, which the task fixed; "not found" is
+counted. Exit code 1 if more than 5 % are not found, or anything is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import TowlineError
+from ..models import Robot, load
+from ..ocp import Plan, PlanStatus, Task, plan
+from ..workspace.pose import masked_problem
+
+ROBOTS = ("wang-flying", "wang-ctmrts-6", "ipanema-1", "cogiro", "planar-4", "wang-flying-quadrotor")
+MOST_NOT_FOUND = 0.05
+
+
+class Outcome(NamedTuple):
+    """What became of the task of one seed."""
+
+    seed: int
+    robot: str
+    told: str  # a `PlanStatus`, or "wrong: ..." with why
+    seconds: float
+
+
+def main() -> None:
+    """Run and report."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--start", type=int, default=0, help="the first seed")
+    options = parser.parse_args()
+    if options.count < 1 or options.start < 0:
+        parser.error(f"--count: {options.count}, --start: {options.start}; accepted: from 1 on, from 0 on")
+    outcomes = []
+    for seed in range(options.start, options.start + options.count):
+        outcomes.append(attempt(seed))
+        if outcomes[-1].told not in (PlanStatus.FEASIBLE, PlanStatus.INFEASIBLE):
+            print(f"seed {seed}, {outcomes[-1].robot}: {outcomes[-1].told}", flush=True)
+    counts = Counter(outcome.told.split(":")[0] for outcome in outcomes)
+    times = [outcome.seconds for outcome in outcomes]
+    print(f"{dict(counts)}; median {np.median(times):.2f} s, longest {max(times):.1f} s")
+    sys.exit(counts["wrong"] > 0 or counts[PlanStatus.NOT_FOUND] > MOST_NOT_FOUND * len(outcomes))
+
+
+def attempt(seed: int) -> Outcome:
+    """Plan the task of a seed and check what the plan says of itself."""
+    name, task = random_task(seed)
+    start = time.perf_counter()
+    try:
+        found = plan(load(name), task)
+        told = wrong(found) or found.status.value
+    except TowlineError as error:
+        told = f"wrong: {error}"
+    return Outcome(seed, name, told, time.perf_counter() - start)
+
+
+def wrong(found: Plan) -> str:
+    """Return what a plan says of itself that is not so; empty if nothing."""
+    audit, robot = found.audit, found.scenario.robot
+    low, high = robot.t_min, robot.t_max
+    if found.status is PlanStatus.FEASIBLE:
+        tensions = audit.tensions
+        if not ((tensions >= low) & (tensions <= high)).all():
+            return "wrong: feasible, but a tension is beyond its limits"
+        A = found.scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
+        w = found.scenario.dynamics.required_wrench(*audit.motion, *audit.carriers, wind=found.scenario.task.wind)
+        missing = ((np.einsum("nij,nj->ni", A, tensions) - w) * robot.dof_mask)[:, :3]
+        if np.linalg.norm(missing, axis=1).max() > max(audit.tolerance, 1e-6):
+            return "wrong: feasible, but the tensions do not give the force"
+        return "" if not audit.excess else "wrong: feasible, but a limit is left"
+    if found.status is PlanStatus.INFEASIBLE and not audit.excess:
+        certificate, at = audit.certificate, audit.certificate_time
+        if certificate is None or at is None:
+            return "wrong: infeasible, but nothing proves it"
+        row = int(np.argmin(np.abs(audit.times - at)))
+        pose, carriers = audit.motion.pose[row], audit.carriers.pose[row]
+        A = found.scenario.dynamics.wrench_matrix(pose, carriers)
+        motions = [part[row] for part in (*audit.motion, *audit.carriers)]
+        w = found.scenario.dynamics.required_wrench(*motions, wind=found.scenario.task.wind)
+        problem = masked_problem(found.scenario.dynamics, A, w, *found.scenario.bounds())
+        return "" if certificate.verify(problem) else "wrong: infeasible, but its certificate proves nothing"
+    return ""
+
+
+def random_task(seed: int) -> tuple[str, Task]:
+    """Return a robot's name and a task for it: path, duration, tube, base, limits and objective of any kind."""
+    rng = np.random.default_rng(seed)
+    name = ROBOTS[seed % len(ROBOTS)]
+    robot = load(name)
+    anchors = robot.anchors + robot.carrier_home[robot.carrier_of_cable, :3]
+    size = float(np.clip(np.ptp(anchors, axis=0).max(), 0.5, 3.0))
+    task: dict[str, Any] = {
+        "name": f"random-{seed}",
+        "path": _path(rng, robot, 0.25 * size),
+        "steps": 40,
+        "margin": float(rng.choice([0.0, 0.1])),
+    }
+    stretches = task["path"]["kind"] in ("line", "waypoints")
+    duration = float(rng.uniform(2.0, 6.0))
+    base = _base(rng, robot)
+    task["base"] = base
+    if stretches and rng.random() < 0.3 and base["kind"] != "given":
+        task["duration"] = {"min": 0.5 * duration, "max": 2.0 * duration}
+        task["objective"] = {"time": 1.0}
+    elif task["path"]["kind"] != "circle":
+        task["duration"] = duration
+    if rng.random() < 0.4:
+        task["tube"] = {"position": float(rng.choice([0.02, 0.1])) * size, "attitude": float(rng.choice([0.0, 0.1]))}
+    if rng.random() < 0.3:
+        task["limits"] = {"platform_speed": float(rng.uniform(2.0, 5.0)), "tension_rate": 1e4}
+    return name, Task.model_validate(task)
+
+
+def _path(rng: np.random.Generator, robot: Robot, reach: float) -> dict[str, Any]:
+    """A path about the platform's home, in the coordinates that it has."""
+    home = robot.home
+
+    def near() -> list[float]:
+        pose = home.copy()
+        pose[:3] += rng.uniform(-reach, reach, 3) * robot.dof_mask[:3]
+        pose[3:] += rng.uniform(-0.05, 0.05, 3) * robot.dof_mask[3:]
+        return pose.tolist()
+
+    kind = rng.choice(["line", "waypoints", "circle"])
+    if kind == "line":
+        return {"kind": "line", "start": near(), "end": near()}
+    if kind == "waypoints":
+        return {"kind": "waypoints", "points": [near(), near(), near()]}
+    if not robot.dof_mask[:2].all():
+        return {"kind": "line", "start": near(), "end": near()}
+    radius, rate = float(rng.uniform(0.2, 0.6) * reach), float(rng.choice([-1, 1]) * rng.uniform(0.5, 1.5))
+    return {
+        "kind": "circle",
+        "centre": home[:3].tolist(),
+        "radius": radius,
+        "rate": rate,
+        "attitude": home[3:].tolist(),
+    }
+
+
+def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """What the carriers do: those that can move are free, now and then held or moved."""
+    moving = [carrier for carrier in robot.carriers if carrier.kind != "ground"]
+    if not moving:
+        return {"kind": "hold"}
+    if any(carrier.kind == "quadrotor" for carrier in moving) or rng.random() < 0.6:
+        return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}
+    if rng.random() < 0.5 or moving[0].kind == "mobile":
+        return {"kind": "hold"}
+    start = robot.carrier_home[0]
+    end = start + np.r_[rng.uniform(-1, 1, 3), 0.0, 0.0, 0.0]
+    path = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
+    return {"kind": "given", "paths": {moving[0].name: path}}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""What a person sees while a solver works: attempt, iteration, objective and infeasibility, live on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+
+class Watch:
+    """Takes a solver's progress and shows it.
+
+    Attributes
+    ----------
+    rows
+        All that was told: (iteration, objective, infeasibility).
+    attempt
+        Counts the runs of the solver: another one begins where the iteration falls back.
+    """
+
+    def __init__(self, shown: Progress, what: str):
+        self.rows: list[tuple[int, float, float]] = []
+        self.attempt = 1
+        self._shown = shown
+        self._line: TaskID = shown.add_task(what, told="preparing", total=None)
+
+    def __call__(self, iteration: int, objective: float, infeasibility: float) -> None:
+        """Show one iteration."""
+        if self.rows and iteration <= self.rows[-1][0]:
+            self.attempt += 1
+        self.rows.append((iteration, objective, infeasibility))
+        told = f"attempt {self.attempt}  iteration {iteration:<3}  "
+        told += f"objective {objective:<9.4g}  infeasibility {infeasibility:.1e}"
+        self._shown.update(self._line, told=told)
+
+    def now(self, what: str) -> None:
+        """Say what is done next, without iterations."""
+        self._shown.update(self._line, description=what, told="")
+
+
+@contextmanager
+def watching(what: str, quiet: bool = False, console: Console | None = None) -> Iterator[Watch]:
+    """Show a solver's iterations while the block runs, if a person is watching: on a terminal, and not `quiet`.
+
+    Parameters
+    ----------
+    what
+        What is being done.
+    quiet
+        Show nothing, whoever watches: standard output is for a program (`--json`).
+    console
+        Where to; None: standard error.
+    """
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    to = console or Console(stderr=True)
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}\n{task.fields[told]}", markup=False),  # together too wide for 80 columns
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
+        yield Watch(shown, what)

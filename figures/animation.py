@@ -1,0 +1,287 @@
+"""The robot in motion: cables coloured by tension, platform, carriers and the trail of the platform, in 3-D.
+
+What does not move is drawn once; each frame begins with a copy of it and adds what moves. With a new drawing each, a
+frame would take ten times as long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from . import film, style
+from .plan import equal_scales, few_ticks
+from .robot import box_edges
+
+if TYPE_CHECKING:
+    from matplotlib.colors import Colormap, Normalize
+
+SIZE = (7.0, 5.2)  # [inches]
+DPI = 100  # an even number of pixels each way, which MP4 asks for
+MOST_FRAMES = 3000
+NO_TENSIONS = "#999999"
+
+
+class Timing(NamedTuple):
+    """When the frames are.
+
+    Attributes
+    ----------
+    times
+        Of the motion, one a frame (k,) [s].
+    rate
+        Frames a second of the film.
+    speed
+        Seconds of the motion in one of the film.
+    """
+
+    times: np.ndarray
+    rate: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A robot at each frame; everything in {G} [m].
+
+    Attributes
+    ----------
+    anchors, attachments
+        (k, m, 3).
+    path, path_times
+        Origin of the platform's frame (n, 3) over times [s] of their own, fine enough for a smooth trail.
+    carriers, names
+        Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
+    bodies
+        For each carrier the indices of the cables that hang from it: three and more anchors are drawn as a body.
+    boxes
+        Corners (low, high) of reach boxes.
+    obstacles
+        For each place to keep out of the lines, (n, 3) each, that outline it.
+    tensions
+        (k, m) [N], nan where there are none.
+    t_min, t_max
+        (m,) [N].
+    """
+
+    title: str
+    anchors: np.ndarray
+    attachments: np.ndarray
+    path: np.ndarray
+    path_times: np.ndarray
+    carriers: np.ndarray
+    names: list[str]
+    bodies: list[np.ndarray]
+    boxes: list[tuple[np.ndarray, np.ndarray]]
+    obstacles: list[list[np.ndarray]]
+    tensions: np.ndarray
+    t_min: np.ndarray
+    t_max: np.ndarray
+
+
+def check_film(path: Path, speed: float, fps: float) -> float:
+    """The frame rate [1/s] that a film at `path` will have, before there is a motion to film.
+
+    Raises
+    ------
+    InputError
+        If the suffix, the speed or the frame rate are none that can be.
+    """
+    if not (speed > 0 and np.isfinite(speed)):
+        raise InputError(f"speed: {speed:g}; accepted: a number > 0, 1 is real time")
+    return film.frame_rate(path, fps)
+
+
+def timing(path: Path, duration: float, speed: float, fps: float) -> Timing:
+    """When to look at a motion that lasts `duration` [s], for a film at `path`.
+
+    Raises
+    ------
+    InputError
+        If `check_film` refuses it, or the film would be too long.
+    """
+    rate = check_film(path, speed, fps)
+    count = duration * rate / speed + 1
+    if count > MOST_FRAMES:
+        raise InputError(
+            f"{path}: {count:.0f} frames; accepted: at most {MOST_FRAMES}, with a lower fps than {fps:g} or a higher "
+            f"speed than {speed:g}"
+        )
+    return Timing(np.arange(int(count + 1e-9)) * speed / rate, rate, speed)
+
+
+def draw(scene: Scene, when: Timing, path: Path) -> Path:
+    """Draw the film into `path`, whole or not at all; see `film.write`."""
+    stage = _Stage(scene, when)
+    return film.write(path, stage.frame, len(when.times), when.rate)
+
+
+class _Stage:
+    """What stands still, drawn once, and the artists that move."""
+
+    def __init__(self, scene: Scene, when: Timing):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
+
+        self._scene, self._when = scene, when
+        self._map, self._norm = _tension_colours(scene)
+        self._figure = style.figure(*SIZE)
+        self._figure.set_dpi(DPI)
+        self._canvas = FigureCanvasAgg(self._figure)
+        self._axes: Any = self._figure.add_subplot(projection=Axes3D.name)
+        self._draw_surroundings()
+        self._make_actors()
+        self._canvas.draw()
+        self._still: Any = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def frame(self, k: int) -> np.ndarray:
+        """The k-th frame, (height, width, 3) of bytes."""
+        scene = self._scene
+        self._canvas.restore_region(self._still)
+        self._trail.set_data_3d(*scene.path[scene.path_times <= self._when.times[k] + 1e-9].T)
+        self._platform.set_points(scene.attachments[k])
+        for body, cables in zip(self._bodies, scene.bodies, strict=True):
+            body.set_points(scene.anchors[k, cables])
+        for label, place in zip(self._labels, scene.carriers[k], strict=True):
+            label.set_position_3d(place)
+        self._cables.set_segments(np.stack([scene.anchors[k], scene.attachments[k]], axis=1))
+        there = np.isfinite(scene.tensions[k]).all()
+        self._cables.set_color(self._map(self._norm(scene.tensions[k])) if there else NO_TENSIONS)
+        self._cables.set_linestyle("-" if there else "--")
+        self._clock.set_text(f"t = {self._when.times[k]:.2f} s" + ("" if there else "\nno tensions\ninside the limits"))
+        for artist in (self._trail, *self._shapes(), self._cables, *self._labels):
+            if hasattr(artist, "do_3d_projection"):
+                artist.do_3d_projection()
+            self._axes.draw_artist(artist)
+        self._figure.draw_artist(self._clock)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _shapes(self) -> list[Any]:
+        return [artist for body in (*self._bodies, self._platform) for artist in body.artists]
+
+    def _draw_surroundings(self) -> None:
+        """Axes, the whole path, the carriers' paths, boxes, and the colour bar with the limits."""
+        from matplotlib import cm
+        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+        scene, ax = self._scene, self._axes
+        (path,) = ax.plot(*scene.path.T, color="#bbbbbb", linewidth=1.0, label="path of the platform")
+        named = [path]
+        for index in range(len(scene.names)):
+            (dotted,) = ax.plot(*scene.carriers[:, index].T, color="#999999", linewidth=0.8, linestyle=":")
+            dotted.set_label("path of a carrier")
+            if len(named) == 1 and np.ptp(scene.carriers[:, index], axis=0).max() > 1e-9:
+                named.append(dotted)
+        resting = np.setdiff1d(np.arange(scene.anchors.shape[1]), np.concatenate([*scene.bodies, np.array([], int)]))
+        if resting.size:
+            ax.plot(*scene.anchors[0, resting].T, "o", color="#000000", markersize=3.5)
+        edges = [edge for low, high in scene.boxes for edge in box_edges(low, high)]
+        if edges:
+            reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
+            named.append(ax.add_collection3d(reach))
+        for axis in "xyz":
+            getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7)
+            getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+        corners = [corner for box in scene.boxes for corner in box]
+        seen = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
+        equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in seen]))
+        outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
+        if outlines:
+            keep_out = Line3DCollection(outlines, colors=style.colour(1), linewidths=0.8, label="keep out")
+            named.append(ax.add_collection3d(keep_out, autolim=False))
+        ax.legend(handles=named, fontsize="x-small", loc="upper left")
+        pace = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
+        ax.set_title(f"{scene.title} ({pace})", fontsize=10)
+        bar = self._figure.colorbar(
+            cm.ScalarMappable(self._norm, self._map), ax=ax, shrink=0.7, pad=0.12, label="tension [N]"
+        )
+        told = []
+        for name, limits in (("t_min", scene.t_min), ("t_max", scene.t_max)):
+            for limit in np.unique(limits):
+                if self._norm.vmin <= limit <= self._norm.vmax:
+                    bar.ax.axhline(limit, color="#000000", linestyle="--", linewidth=1.4)
+                told.append(f"{name} = {limit:g} N")
+        bar.ax.set_title("\n".join(told) if len(told) <= 4 else "dashed: limits", fontsize=8)
+
+    def _make_actors(self) -> None:
+        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+        scene, ax = self._scene, self._axes
+        (self._trail,) = ax.plot(*scene.path[:1].T, color=style.colour(0), linewidth=1.8, animated=True)
+        self._platform = _Body(ax, scene.attachments[0], style.colour(4), style.colour(0))
+        self._bodies = [_Body(ax, scene.anchors[0, cables], "#dddddd", "#000000") for cables in scene.bodies]
+        segments = np.stack([scene.anchors[0], scene.attachments[0]], axis=1)
+        self._cables: Any = ax.add_collection3d(Line3DCollection(segments, linewidths=2.2, animated=True))
+        self._labels = [
+            ax.text(*place, f" {name}", fontsize=8, animated=True)
+            for place, name in zip(scene.carriers[0], scene.names, strict=True)
+        ]
+        self._clock = self._figure.text(0.98, 0.03, "", fontsize=10, ha="right", animated=True)
+
+
+class _Body:
+    """Points that move together: dots, and the faces of their hull where they have one."""
+
+    def __init__(self, ax: Any, points: np.ndarray, face: str, edge: str):
+        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+        self._faces = _faces(points)
+        (self._dots,) = ax.plot(*points.T, "o", color=edge, markersize=3.5, animated=True)
+        self.artists: list[Any] = [self._dots]
+        if self._faces:
+            outline = edge if len(self._faces) == 1 else "none"  # triangles of one face would show their diagonals
+            corners = [points[face_of] for face_of in self._faces]
+            self._hull = Poly3DCollection(corners, facecolor=face, edgecolor=outline, alpha=0.6, animated=True)
+            self.artists.insert(0, ax.add_collection3d(self._hull))
+
+    def set_points(self, points: np.ndarray) -> None:
+        """Move."""
+        self._dots.set_data_3d(*points.T)
+        if self._faces:
+            self._hull.set_verts([points[face] for face in self._faces])
+
+
+def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndarray]:
+    """Outlines as far as they fit between two corners (2, 3): a wall may be much larger than the robot's room."""
+    low, high = corners
+    found = []
+    for lines in places:
+        points = np.vstack(lines)
+        if (points.max(axis=0) > low).all() and (points.min(axis=0) < high).all():
+            found += [np.clip(line, low, high) for line in lines]
+    return found
+
+
+def _faces(points: np.ndarray) -> list[np.ndarray]:
+    """Indices of the corners of each face of the hull of `points` (k, 3); none if they lie on a line."""
+    from scipy.spatial import ConvexHull
+
+    arms = points - points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(arms)
+    rank = int((sizes > 1e-6 * max(float(sizes[0]), 1e-9)).sum())
+    if rank < 2:
+        return []
+    if rank == 2:
+        return [ConvexHull(arms @ axes[:2].T).vertices]
+    return list(ConvexHull(points).simplices)
+
+
+def _tension_colours(scene: Scene) -> tuple[Colormap, Normalize]:
+    """Colours for all tensions that there are; limits far from them would make them all look alike."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, Normalize
+
+    there = scene.tensions[np.isfinite(scene.tensions)]
+    low, high = float(scene.t_min.min()), float(scene.t_max.max())
+    if there.size:
+        least, most = float(there.min()), float(there.max())
+        near = max(most - least, 0.1 * most)
+        low = low if least - low <= near else least
+        high = high if high - most <= near else most
+    # The palest colours of the map cannot be seen as thin lines on white.
+    visible = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 256)))
+    return visible, Normalize(low, max(high, low + 1e-3))

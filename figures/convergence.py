@@ -1,0 +1,84 @@
+"""How a solver came to its answer: infeasibility and objective over its iterations, every run of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Iterate = tuple[int, float, float]  # iteration, objective, infeasibility
+FLOOR = 1e-16  # a logarithmic axis has no place for an infeasibility of exactly zero
+
+
+def runs(iterates: Sequence[Iterate]) -> list[np.ndarray]:
+    """Split rows of (iteration, objective, infeasibility) where the iteration falls back: one array (k, 3) a run."""
+    rows = np.array(iterates, dtype=float).reshape(-1, 3)
+    starts = np.flatnonzero(np.diff(rows[:, 0]) <= 0) + 1
+    return [run for run in np.split(rows, starts) if len(run)]
+
+
+def convergence(iterates: Sequence[Iterate]) -> Figure:
+    """Infeasibility above, objective below, over the iterations of all runs counted through; a colour each run.
+
+    Parameters
+    ----------
+    iterates
+        Rows of (iteration, objective, infeasibility) in the order in which the solver told them. Where the iteration
+        falls back to 0 another run begins: a finer mesh, or tighter limits, or a program with slacks.
+    """
+    canvas = style.figure(5.0, 4.4)
+    above = style.axes(canvas, "", "infeasibility [-]", (2, 1, 1))
+    below = style.axes(canvas, "iteration, all runs counted through", "objective [-]", (2, 1, 2))
+    parts = runs(iterates)
+    starts = np.cumsum([0, *(len(part) for part in parts)])
+    for index, (part, start) in enumerate(zip(parts, starts, strict=False)):
+        at = start + np.arange(len(part))
+        look = {
+            "color": style.colour(index),
+            "linestyle": style.line_style(index),
+            "marker": ".",
+            "markersize": 5,
+            "linewidth": 1.3,
+            "label": f"run {index + 1}",
+        }
+        above.plot(at, np.maximum(part[:, 2], FLOOR), **look)
+        below.plot(at, part[:, 1], **look)
+    for ax in (above, below):
+        for _, start in pairwise(starts[:-1]):
+            ax.axvline(start - 0.5, color="#999999", linewidth=0.8, linestyle=":")
+        ax.set_xlim(-0.5, max(float(starts[-1]), 1.0) - 0.5)
+    above.set_yscale("log")
+    _scale_objective(below, np.concatenate([part[:, 1] for part in parts]) if parts else np.ones(1))
+    if len(parts) > 1:
+        style.legend_below(canvas, above)
+    return canvas
+
+
+def _scale_objective(ax: Axes, values: np.ndarray) -> None:
+    """Logarithmic, if every objective is above zero; else linear only as near to zero as the smallest of them."""
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    if not sizes.size:
+        return
+    if (values[np.isfinite(values)] > 0).all():
+        ax.set_yscale("log")
+        if sizes.max() < 10 * sizes.min():
+            _plain_labels(ax)
+    else:
+        ax.set_yscale("symlog", linthresh=float(sizes.min()))
+
+
+def _plain_labels(ax: Axes) -> None:
+    """Label a logarithmic axis of less than a decade by plain numbers: it may have no power of ten to show."""
+    from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+
+    ax.yaxis.set_major_locator(MaxNLocator(6))
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))

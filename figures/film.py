@@ -1,0 +1,119 @@
+"""Moving pictures as files: GIF by Pillow, MP4 by ffmpeg; the file's suffix decides."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, TowlineError
+from ..writing import whole_file
+
+SUFFIXES = (".gif", ".mp4")
+TICK = 0.01  # [s]: GIF counts its delays in hundredths
+SHORTEST = 2  # ticks: browsers slow a GIF with shorter delays down
+FASTEST = 120.0  # [1/s] of MP4: screens show no more
+Draw = Callable[[int], np.ndarray]  # the k-th frame, (height, width, 3) of bytes
+
+
+def frame_rate(path: Path, wanted: float) -> float:
+    """The rate [1/s] nearest to `wanted` that the format of `path` has, before any work is done for it.
+
+    Raises
+    ------
+    InputError
+        If the suffix is of no format, the rate is none that it can have, or ffmpeg is needed and missing.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"{path}: suffix {path.suffix!r}; accepted: {', '.join(SUFFIXES)}")
+    fastest = 1 / (SHORTEST * TICK) if suffix == ".gif" else FASTEST
+    if not 0.1 <= wanted <= fastest:
+        raise InputError(f"fps: {wanted:g}; accepted: 0.1 to {fastest:g} frames a second in {suffix}")
+    if suffix == ".gif":
+        return 1 / (TICK * round(1 / (TICK * wanted)))
+    ffmpeg(path)
+    return wanted
+
+
+def ffmpeg(path: Path) -> str:
+    """The program that makes MP4, as matplotlib finds it (its setting `animation.ffmpeg_path`).
+
+    Raises
+    ------
+    InputError
+        If there is none: then a GIF is what can be made.
+    """
+    from matplotlib import rcParams
+
+    found = shutil.which(rcParams["animation.ffmpeg_path"])
+    if found is None:
+        raise InputError(f"{path}: MP4 needs the program ffmpeg, which is not installed; accepted without it: .gif")
+    return found
+
+
+def write(path: Path, draw: Draw, count: int, rate: float) -> Path:
+    """Write `count` frames at `rate` (from `frame_rate`), whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the place cannot be written to.
+    TowlineError
+        If ffmpeg breaks; with its last line.
+    """
+    with whole_file(path) as temporary:
+        if path.suffix.lower() == ".gif":
+            _write_gif(temporary, draw, count, rate)
+        else:
+            _write_mp4(temporary, draw, count, rate, ffmpeg(path))
+    return path
+
+
+def _write_gif(path: Path, draw: Draw, count: int, rate: float) -> None:
+    """One palette for all frames: quicker than one each, and colours do not flicker."""
+    from PIL import Image
+
+    shown = np.vstack([draw(k) for k in sorted({0, count // 2, count - 1})])
+    colours = np.array(Image.fromarray(shown).quantize(256).getpalette()).reshape(-1, 3)
+    colours[colours.min(axis=1) >= 248] = 255  # Pillow looks colours up in steps of 8: the paper would turn grey
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours.ravel().tolist())
+
+    def frames() -> Iterator[Image.Image]:
+        for k in range(count):
+            yield Image.fromarray(draw(k)).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    drawn = frames()
+    delay = round(1000 / rate)  # [ms]
+    next(drawn).save(path, format="GIF", save_all=True, append_images=drawn, duration=delay, loop=0)
+
+
+def _write_mp4(path: Path, draw: Draw, count: int, rate: float, program: str) -> None:
+    """Pipe raw frames into ffmpeg: H.264 with the pixel format that every browser and phone plays."""
+    from matplotlib import rcParams
+
+    height, width, _ = draw(0).shape
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{rate:.6f}", "-i", "-"]
+    coded = ["-an", "-vcodec", rcParams["animation.codec"], "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    command = [program, "-loglevel", "error", "-y", *raw, *coded, "-f", "mp4", str(path)]
+    with tempfile.TemporaryFile() as told:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=told) as process:
+            try:
+                assert process.stdin is not None
+                for k in range(count):
+                    process.stdin.write(np.ascontiguousarray(draw(k)))
+                process.stdin.close()
+            except BrokenPipeError:
+                pass  # its exit code and its last line say why
+            except BaseException:
+                process.kill()
+                raise
+        if process.returncode:
+            told.seek(0)
+            lines = told.read().decode(errors="replace").strip().splitlines() or ["no message"]
+            raise TowlineError(f"ffmpeg: stopped with exit code {process.returncode} ({lines[-1]})")

@@ -1,0 +1,109 @@
+"""The report of a plan as one HTML file: `report`'s facts as tables, figures inside, nothing to load.
+
+Whatever comes from a file (names, sources, a solver's message) passes `html.escape`; the figures are images of their
+own, in which nothing can run.
+"""
+
+from __future__ import annotations
+
+import base64
+from html import escape
+from string import Template
+from typing import TYPE_CHECKING
+
+from ..figures import plan as figures
+from ..figures import style
+from ..figures.convergence import convergence
+from ..models.parsing import to_yaml
+from .report import Section, sections, verdict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .result import Plan
+
+PAGE = Template("""\
+<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>$title</title>
+<style>
+:root { color-scheme: light; }
+body { font: 16px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 46rem; margin: 0 auto;
+  padding: 0.5rem 1rem 3rem; overflow-wrap: anywhere; }
+h1 { font-size: 1.5rem; margin: 0.8rem 0 0.3rem; }
+h2 { font-size: 1.1rem; margin: 1.6rem 0 0.3rem; }
+.verdict { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: #f6f6f6; margin: 0.6rem 0; }
+table { border-collapse: collapse; width: 100%; }
+th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid #ddd; }
+th { font-weight: 600; width: 9.5rem; }
+tr.more th, tr.more td { border-top: 0; padding-top: 0; }
+figure { margin: 1.2rem 0; }
+img { max-width: 100%; height: auto; display: block; margin: auto; }
+figcaption, footer, .source { color: #555; font-size: 0.9rem; }
+pre { overflow-x: auto; font-size: 0.8rem; background: #f6f6f6; padding: 0.6rem; overflow-wrap: normal; }
+</style>
+</head>
+<body>
+<h1>$title</h1>
+<p class="verdict"><strong>$status</strong>: $verdict</p>
+$tables
+$figures
+$files
+<footer>towline $version</footer>
+</body>
+</html>
+""")
+# Told apart with any kind of colour vision, and the word stands beside them.
+COLOURS = {"feasible": style.colour(0), "infeasible": style.colour(1), "not-found": style.colour(5)}
+
+
+def page(plan: Plan) -> str:
+    """The whole page."""
+    from .. import __version__
+
+    robot, task = plan.scenario.robot, plan.scenario.task
+    decisive = verdict(plan).partition(f"{plan.status.value.upper()}, ")[2]
+    return PAGE.substitute(
+        title=escape(f"{robot.name}: {task.name}"),
+        status=escape(plan.status.value),
+        colour=COLOURS[plan.status.value],
+        verdict=escape(decisive),
+        tables="\n".join(_table(section) for section in sections(plan)),
+        figures="\n".join(_figure(caption, drawn) for caption, drawn in _drawings(plan).items()),
+        files=_file("The robot's file", to_yaml(robot)) + "\n" + _file("The task", to_yaml(task)),
+        version=escape(__version__),
+    )
+
+
+def _table(section: Section) -> str:
+    """One section; a fact without a name goes on with the one before it."""
+    rows = [
+        f'<tr{"" if name else " class=more"}><th scope="row">{escape(name)}</th><td>{escape(fact)}</td></tr>'
+        for name, fact in section.facts
+    ]
+    return f"<h2>{escape(section.title)}</h2>\n<table>\n" + "\n".join(rows) + "\n</table>"
+
+
+def _drawings(plan: Plan) -> dict[str, Figure]:
+    trajectory = plan.trajectory
+    drawn = {
+        "Tensions against their limits": figures.tensions(trajectory),
+        "Path of the platform and places of the carriers": figures.path(trajectory),
+        "Carriers beside and above the platform": figures.base_offset(trajectory),
+    }
+    if plan.iterates:
+        drawn["How the solver came to it"] = convergence(plan.iterates)
+    return drawn
+
+
+def _figure(caption: str, drawn: Figure) -> str:
+    image = base64.b64encode(style.svg(drawn).encode()).decode()
+    source = f"data:image/svg+xml;base64,{image}"
+    return f'<figure><img alt="{escape(caption)}" src="{source}"><figcaption>{escape(caption)}</figcaption></figure>'
+
+
+def _file(title: str, text: str) -> str:
+    return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"

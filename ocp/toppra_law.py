@@ -1,0 +1,124 @@
+"""The fastest time law under half-spaces in (d2s/dt2, (ds/dt)^2), by toppra. This file alone imports that package.
+
+With u = d2s/dt2 and x = (ds/dt)^2, which changes by 2 u ds, the fastest law is a sequence of linear programs in two
+variables: backwards, which x can still come to rest at the end; forwards, the largest u. Between two grid points u is
+constant and the limits of both points hold (the Interpolation scheme). Source: H. Pham, Q.-C. Pham, "A new approach to
+time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+from toppra.algorithm import TOPPRA
+from toppra.constraint import LinearConstraint
+from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
+from toppra.interpolator import AbstractGeometricPath
+from typing_extensions import override
+
+STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
+UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
+ROUNDING = 1e-12  # of a row along u: less is none
+FARTHEST = 1e9  # u and x in toppra's units; a limit beyond is none
+
+
+class Rows(NamedTuple):
+    """Limits a u + b x + c <= 0 at N points, (N, K) each, in parts of what they limit, and the largest x, (N,)."""
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    x_max: np.ndarray
+
+
+class Law(NamedTuple):
+    """What came of it: x at the grid points, or the index of the last one from which the end cannot be reached."""
+
+    x: np.ndarray | None
+    stuck: int | None
+    unlimited: bool = False
+
+
+class _Limits(LinearConstraint):
+    """Rows and bounds as they are, in toppra's canonical form."""
+
+    def __init__(self, rows: Rows):
+        super().__init__()
+        self.identical = True
+        self._rows = rows
+
+    @override
+    def compute_constraint_params(self, path, gridpoints, *args, **kwargs):
+        a, b, c, x_max = self._rows
+        bounds = np.stack([np.zeros_like(x_max), x_max], axis=1)
+        each = np.eye(a.shape[1])
+        return canlinear_colloc_to_interpolate(a, b, c, each, np.zeros(len(each)), None, bounds, gridpoints, True)
+
+
+class _Interval(AbstractGeometricPath):
+    """From 0 to an end: the rows know the geometry, toppra asks for no more."""
+
+    def __init__(self, end: float):
+        self._end = end
+
+    @property
+    @override
+    def dof(self) -> int:
+        return 1
+
+    @property
+    @override
+    def path_interval(self) -> np.ndarray:
+        return np.array([0.0, self._end])
+
+    @property
+    def duration(self) -> float:
+        return self._end
+
+
+def fastest(s: np.ndarray, rows: Rows) -> Law:
+    """The largest x at every s, (N,) rising from 0, from rest to rest."""
+    # Measured in this unit of length, u and x are numbers that toppra's absolute tolerances suit.
+    steepest = float(np.abs(rows.a).max(initial=0.0))
+    unit = steepest / STEEPNESS if steepest > ROUNDING else 1.0
+    never, scaled = _normalised(Rows(rows.a / unit, rows.b / unit**2, rows.c, rows.x_max * unit**2))
+    if never.any():
+        return Law(None, int(np.argmax(never)))
+    grid = s * unit
+    with _silence():
+        algorithm = TOPPRA([_Limits(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
+        found: Any = algorithm.compute_parameterization(0.0, 0.0, return_data=True)  # of three or four, its hints say
+    _, speeds, _, reach = found
+    if speeds is None:
+        lost = np.flatnonzero(np.isnan(reach).any(axis=1))
+        return Law(None, int(lost[-1]) if lost.size else 0)
+    if np.isnan(speeds).any():
+        return Law(None, int(np.flatnonzero(np.isnan(speeds))[0]))
+    x = speeds**2
+    return Law(x / unit**2, None, bool(x.max() > UNLIMITED))
+
+
+def _normalised(rows: Rows) -> tuple[Any, Rows]:
+    """Where a limit cannot hold, (N,), and rows of length one: toppra takes two short ones for parallel."""
+    size = np.hypot(rows.a, rows.b)
+    idle = size * FARTHEST <= np.abs(rows.c)
+    per_size = 1.0 / np.where(idle, 1.0, size)
+    a, b = np.where(idle, 0.0, rows.a * per_size), np.where(idle, 0.0, rows.b * per_size)
+    c = np.where(idle, -1.0, rows.c * per_size)
+    return np.any(idle & (rows.c > 0), axis=1), Rows(a, b, c, np.minimum(rows.x_max, 2 * UNLIMITED))
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep toppra from warning of what is an answer here."""
+    logger = logging.getLogger("toppra")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)

@@ -1,0 +1,358 @@
+"""What a plan shows a person: its report as text and HTML, its convergence, its film."""
+
+import shutil
+import time
+from dataclasses import replace
+from html.parser import HTMLParser
+from io import StringIO
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from PIL import Image
+from rich.console import Console
+
+from towline.cli.watching import watching
+from towline.errors import InputError, TowlineError
+from towline.figures import animation, film
+from towline.figures.convergence import convergence, runs
+from towline.models import Dynamics, load
+from towline.ocp import PlanStatus, plan
+from towline.ocp.report import direction_in_words, sections, verdict
+from towline.ocp.scene import outline, scene
+from towline.ocp.task_limits import Block, Capsule, Sphere
+from towline.solvers import TensionProblem, certify
+
+CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.2 * np.pi}
+FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
+SIDEWAYS = {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}
+
+
+@pytest.fixture(scope="module")
+def free():
+    rows = []
+    found = plan(load("wang-flying"), {"name": "circle", "path": CIRCLE, "base": FREE}, lambda *row: rows.append(row))
+    assert found.feasible
+    return replace(found, iterates=tuple(rows))
+
+
+@pytest.fixture(scope="module")
+def impossible():
+    found = plan(load("wang-flying"), {"name": "sideways", "path": SIDEWAYS, "duration": 1, "margin": 0.1})
+    assert found.status is PlanStatus.INFEASIBLE
+    return found
+
+
+def facts(found):
+    """Facts by section and name; a fact without a name goes on with the one before."""
+    told = {}
+    for title, rows in sections(found):
+        name = ""
+        for own_name, fact in rows:
+            name = own_name or name
+            told.setdefault((title, name), []).append(fact)
+    return {key: "; ".join(values) for key, values in told.items()}
+
+
+def number(text):
+    return float(text.split()[0])
+
+
+def test_report_of_a_feasible_plan_tells_what_the_audit_saw(free):
+    told, seen, robot = facts(free), free.audit, free.scenario.robot
+    assert verdict(free).startswith("wang-flying, circle: FEASIBLE, ")
+    assert free.report().splitlines()[0] == verdict(free)
+    for name, pick in (("smallest", np.argmin), ("largest", np.argmax)):
+        row, cable = np.unravel_index(pick(seen.tensions), seen.tensions.shape)
+        fact = told["Tensions", name]
+        assert number(fact) == pytest.approx(seen.tensions[row, cable], rel=1e-3)
+        assert f"in cable {cable + 1} at t = {seen.times[row]:.3f} s" in fact
+    assert number(told["Tensions", "margin"]) == pytest.approx(free.margin, rel=1e-3)
+    assert told["Tensions", "margin"].endswith("from t_min")
+    assert told["Tensions", "limits"] == "0.5 N to 60 N"
+    speed = np.linalg.norm(seen.carriers.velocity[:, 0, :3], axis=1).max()
+    acceleration = np.linalg.norm(seen.carriers.acceleration[:, 0, :3], axis=1).max()
+    assert f"{speed:.4g} m/s" in told["Carriers", "quad"]
+    assert "(no limit)" in told["Carriers", "quad"]
+    assert f"{acceleration:.4g} m/s^2" in told["Carriers", "quad"]
+    assert "(limit 3 m/s^2)" in told["Carriers", "quad"]
+    assert "1000 Hz, 10001 instants" in told["Audit", "rate"]
+    assert number(told["Audit", "worst violation"]) == pytest.approx(seen.violation.max(), rel=1e-2)
+    assert f"{free.solve_s:.3f} s" == told["Computation", "solve"]
+    assert str(free.iterations) in told["Computation", "solver"]
+    assert "Why there is none" not in free.report()
+    for line in (robot.name, *(fact for _, rows in sections(free) for _, fact in rows)):
+        assert line in free.report()
+
+
+def test_report_of_an_infeasible_plan_tells_the_certificate(impossible):
+    told, certificate = facts(impossible), impossible.certificate
+    why = {name: fact for (title, name), fact in told.items() if title == "Why there is none"}
+    assert f"INFEASIBLE, short by {certificate['shortfall']:.4g} N at t = {certificate['time']:.3f} s" in verdict(
+        impossible
+    )
+    assert why["time"] == f"t = {certificate['time']:.3f} s of 1 s"
+    assert number(why["needed"]) == pytest.approx(certificate["demand"], rel=1e-3)
+    assert number(why["available"]) == pytest.approx(certificate["support"], rel=1e-3)
+    assert number(why["short by"]) == pytest.approx(certificate["shortfall"], rel=1e-3)
+    for cable in certificate["binding"]:
+        assert str(cable + 1) in why["constraint"]
+    assert "(0.6 N), with the margin of 0.1 N" in why["constraint"]
+    without = ~np.isfinite(impossible.audit.tensions).all(axis=1)
+    missing = impossible.audit.times[without]
+    assert f"between t = {missing[0]:.3f} s and t = {missing[-1]:.3f} s" in told["Tensions", "none inside limits"]
+    assert number(told["Tensions", "none inside limits"]) == pytest.approx(100 * without.mean(), rel=1e-2)
+    # Where there are tensions they are told.
+    assert number(told["Tensions", "smallest"]) == pytest.approx(np.nanmin(impossible.audit.tensions), rel=1e-3)
+    assert told["Carriers", "quad"] == "at rest"
+    assert "the task fixes the motion" in told["Computation", "solver"]
+
+
+def test_report_of_a_plan_that_was_not_found_does_not_claim_a_proof(impossible):
+    lost = replace(impossible, status=PlanStatus.NOT_FOUND)
+    lost = replace(lost, audit=replace(lost.audit, excess=["quad: speed 3 m/s exceeds 1 m/s"]))
+    assert "NOT-FOUND" in verdict(lost)
+    assert "1 other limit broken" in verdict(lost)
+    assert "Why there is none" not in lost.report()
+    assert facts(lost)["What the closest motion misses", "limit broken"] == "quad: speed 3 m/s exceeds 1 m/s"
+    only = replace(lost, audit=replace(lost.audit, certificate=None, certificate_time=None))
+    assert verdict(only).endswith("NOT-FOUND, 1 other limit broken")
+
+
+def test_soft_limits_that_are_passed_are_told_of_a_feasible_plan(free):
+    passed = replace(free, audit=replace(free.audit, soft_excess=["cable_speed: cable 1: 2 m/s"]))
+    assert facts(passed)["Soft limits passed", "limit"] == "cable_speed: cable 1: 2 m/s"
+    assert "Soft limits passed" not in free.report()
+
+
+def test_directions_in_words():
+    robot = load("wang-flying")
+    m, length = 6, robot.length
+
+    def told(A, w):
+        certificate = certify(TensionProblem(A, w, np.zeros(m), np.ones(m), length=length))
+        return direction_in_words(certificate, robot)
+
+    push = np.vstack([np.eye(6)])
+    assert told(push, [0, 0, -5, 0, 0, 0]) == "100 % force along -z (down)"
+    assert told(push, [0, 0, 5, 0, 0, 0]) == "100 % force along +z (up)"
+    assert told(push, [-3, 0, 4 + 1, 0, 0, 0]) == "64 % force along +z (up), 36 % force along -x"
+    assert told(push, [0, 0, 0, 0, -1, 0]) == "100 % moment about -y"
+
+
+class Page(HTMLParser):
+    """Checks that tags are closed in order, and keeps cells, tags, attributes and text."""
+
+    OPEN = ("meta", "img", "br", "!doctype")
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.stack, self.tags, self.attributes, self.rows, self.text = [], [], [], [], ""
+        self.feed(text)
+        self.close()
+        assert self.stack == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, *pair) for pair in attrs]
+        if tag not in self.OPEN:
+            self.stack.append(tag)
+        if tag == "tr":
+            self.rows.append(["", ""])
+
+    def handle_endtag(self, tag):
+        assert self.stack.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+        if self.stack[-1:] in (["th"], ["td"]):
+            self.rows[-1][self.stack[-1] == "td"] += data
+
+
+def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path):
+    for found, pictures in ((free, 4), (impossible, 3)):
+        file = found.save_report(tmp_path / "new" / "report.html")
+        text = file.read_text()
+        page = Page(text)
+        assert [tuple(row) for row in page.rows] == [fact for section in sections(found) for fact in section.facts]
+        assert "viewport" in text
+        assert found.status.value in page.text
+        assert not {"script", "link", "iframe", "object", "a"} & set(page.tags)
+        places = [value for tag, name, value in page.attributes if name in ("src", "href", "srcset", "data")]
+        assert len(places) == pictures
+        assert all(place.startswith("data:image/svg+xml;base64,") for place in places)
+        assert "url(" not in text
+        assert "@import" not in text
+        alternatives = [value for tag, name, value in page.attributes if name == "alt"]
+        assert ("How the solver came to it" in alternatives) == (found is free)
+        assert [path.name for path in file.parent.iterdir()] == ["report.html"]
+    with pytest.raises(InputError, match="cannot be written"):
+        free.save_report("/proc/nowhere/report.html")
+
+
+def test_what_comes_from_files_is_escaped(impossible, tmp_path):
+    evil = '<script>alert("1")</script>&amp;'
+    robot = load("wang-flying").model_copy(update={"name": evil, "source": evil})
+    task = impossible.scenario.task.model_copy(update={"name": evil})
+    audit = replace(impossible.audit, excess=[evil])
+    found = replace(impossible, scenario=replace(impossible.scenario, robot=robot, task=task), audit=audit)
+    found = replace(found, message=evil, deviation=found.deviation)
+    text = found.save_report(tmp_path / "evil.html").read_text()
+    assert "<script" not in text.lower()
+    page = Page(text)
+    assert "script" not in page.tags
+    assert page.text.count(evil) >= 5  # title, heading, limit broken, both files
+
+
+def test_convergence_shows_every_run():
+    first = [(0, 5.0, 1.0), (1, 3.0, 1e-3), (2, 2.5, 0.0)]
+    second = [(0, 2.6, 1e-2), (1, 2.4, 1e-9)]
+    assert [len(run) for run in runs([*first, *second])] == [3, 2]
+    above, below = convergence([*first, *second]).axes
+    curves = [line for line in above.get_lines() if str(line.get_label()).startswith("run")]
+    assert [list(line.get_xdata()) for line in curves] == [[0, 1, 2], [3, 4]]
+    assert len({to_hex(line.get_color()) for line in curves}) == 2
+    assert (above.get_yscale(), below.get_yscale()) == ("log", "log")
+    assert min(curves[0].get_ydata()) > 0  # or the point would not be drawn
+    np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), [5.0, 3.0, 2.5])
+    assert convergence([(0, -1.0, 1.0), (1, 2.0, 0.1)]).axes[1].get_yscale() == "symlog"
+    for rows in ([], [(0, 0.0, 0.0)], [(0, float("nan"), float("inf")), (1, 1.0, 1.0)]):
+        convergence(rows).canvas.draw()
+
+
+def test_plots_of_a_plan(free, impossible, tmp_path):
+    drawn = [path.name for path in free.plot(tmp_path)]
+    assert drawn == ["path.png", "tensions.png", "base.png", "convergence.png"]
+    assert [path.name for path in impossible.plot(tmp_path)] == ["path.png", "tensions.png", "base.png"]
+
+
+@pytest.mark.parametrize("name", ["wang-flying", "ipanema-1", "wang-ctmrts"])
+def test_scene_has_the_cables_where_the_dynamics_has_them(name):
+    robot = load(name)
+    there = robot.home[:3]
+    path = {"kind": "line", "start": list(there), "end": list(there + 0.1)}
+    found = plan(robot, {"path": path, "duration": 1})
+    times = np.array([0.0, 0.25, 1.0])
+    shown = scene(found, times)
+    rows = [0, 250, 1000]
+    lengths = Dynamics(robot).cable_lengths(found.audit.motion.pose[rows], found.audit.carriers.pose[rows])
+    np.testing.assert_allclose(np.linalg.norm(shown.anchors - shown.attachments, axis=2), lengths, rtol=1e-12)
+    np.testing.assert_array_equal(shown.tensions, found.audit.tensions[rows])
+    assert shown.names == [carrier.name for carrier in robot.carriers if carrier.kind != "ground"]
+
+
+def test_places_to_keep_out_of_are_outlined_on_their_surface():
+    ball = Sphere(kind="sphere", centre=(1, 2, 3), radius=0.5)
+    for line in outline(ball):
+        np.testing.assert_allclose(np.linalg.norm(line - [1, 2, 3], axis=1), 0.5)
+    block = Block(kind="box", min=(0, 0, 0), max=(1, 2, 3))
+    assert len(outline(block)) == 12
+    np.testing.assert_array_equal(np.vstack(outline(block)).max(axis=0), [1, 2, 3])
+    for end in ((1, 1, 2), (0, 0, 0)):  # a capsule may be a ball
+        pipe = Capsule(kind="capsule", start=(0, 0, 0), end=end, radius=0.2)
+        points = np.vstack(outline(pipe))
+        share = np.clip(points @ end / max(np.dot(end, end), 1), 0, 1)
+        away = np.linalg.norm(points - share[:, None] * np.array(end), axis=1)
+        assert away.max() == pytest.approx(0.2)
+
+
+def test_carriers_that_tilt_tell_so_and_obstacles_are_in_the_film(tmp_path):
+    post = {"name": "<b>$post", "kind": "box", "min": [0.7, 0.7, -9], "max": [1.2, 1.2, 9]}
+    base = {**FREE, "tilt_max": 0.3, "turn_acceleration_max": 5}
+    path = {**CIRCLE, "rate": 3}
+    found = plan(load("wang-flying"), {"path": path, "base": base, "steps": 20, "limits": {"keep_out": [post]}})
+    tilt = facts(found)["Carriers", "quad"].split("; ")[2]
+    pose = found.audit.carriers.pose[:, 0]
+    largest = np.degrees(np.arccos((np.cos(pose[:, 3]) * np.cos(pose[:, 4])).min()))
+    assert number(tilt.removeprefix("up to ")) == pytest.approx(largest, rel=1e-3)
+    assert tilt.endswith("(limit 17.19 degrees)")
+    assert [len(lines) for lines in scene(found, np.zeros(1)).obstacles] == [12]
+    with Image.open(found.animate(tmp_path / "post.gif", fps=5)) as picture:
+        assert picture.n_frames == 11
+
+
+def test_gif_has_the_frames_that_were_asked_for(free, tmp_path):
+    start = time.perf_counter()
+    file = free.animate(tmp_path / "circle.gif")
+    assert time.perf_counter() - start < 30
+    with Image.open(file) as picture:
+        assert picture.n_frames == 201  # 10 s at 20 frames a second, both ends
+        assert picture.info["duration"] == 50
+        assert picture.size == (700, 520)
+        frames = []
+        for k in (0, 50, 100):
+            picture.seek(k)
+            frames.append(np.asarray(picture.convert("RGB")))
+    assert (frames[0] != frames[1]).any()
+    assert (frames[1] != frames[2]).any()
+    assert (frames[0][0, 0] == 255).all()
+    assert [path.name for path in tmp_path.iterdir()] == ["circle.gif"]
+
+
+def test_gif_keeps_the_speed_though_it_counts_in_hundredths(impossible, tmp_path):
+    """At 30 frames a second a delay would be 3.33 hundredths: frames come 3 apart, and the motion is looked at then."""
+    when = animation.timing(tmp_path / "x.gif", 1.0, speed=0.5, fps=30)
+    assert when.rate == pytest.approx(100 / 3)
+    np.testing.assert_allclose(np.diff(when.times), 0.015)
+    with Image.open(impossible.animate(tmp_path / "x.gif", speed=0.5, fps=30)) as picture:
+        assert picture.n_frames == 67
+        assert picture.info["duration"] == 30
+
+
+def test_mp4_by_ffmpeg_or_a_line_that_names_gif(impossible, tmp_path, monkeypatch):
+    file = tmp_path / "film.mp4"
+    if shutil.which("ffmpeg"):
+        impossible.animate(file, fps=25)
+        assert file.read_bytes()[4:8] == b"ftyp"
+    monkeypatch.setitem(mpl.rcParams, "animation.ffmpeg_path", "/nowhere/ffmpeg")
+    with pytest.raises(InputError, match=r"ffmpeg, which is not installed; accepted without it: \.gif"):
+        impossible.animate(tmp_path / "other.mp4")
+    assert not (tmp_path / "other.mp4").exists()
+
+
+def test_a_broken_ffmpeg_is_one_line_and_leaves_no_file(tmp_path, monkeypatch):
+    broken = tmp_path / "ffmpeg"
+    broken.write_text("#!/bin/sh\necho first >&2\necho 'no such codec' >&2\nexit 3\n")
+    broken.chmod(0o755)
+    monkeypatch.setitem(mpl.rcParams, "animation.ffmpeg_path", str(broken))
+    with pytest.raises(TowlineError, match=r"ffmpeg: stopped with exit code 3 \(no such codec\)"):
+        film.write(tmp_path / "film.mp4", lambda k: np.zeros((520, 700, 3), np.uint8), 50, 25)
+    assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "message"),
+    [
+        ("film.avi", {}, "suffix '.avi'; accepted: .gif, .mp4"),
+        ("film", {}, "suffix ''; accepted: .gif, .mp4"),
+        ("film.gif", {"fps": 80}, "fps: 80; accepted: 0.1 to 50 frames a second in .gif"),
+        ("film.gif", {"fps": float("nan")}, "fps: nan; accepted"),
+        ("film.gif", {"speed": 0}, "speed: 0; accepted: a number > 0"),
+        ("film.gif", {"speed": 1e-4}, "frames; accepted: at most 3000"),
+    ],
+)
+def test_films_that_cannot_be_are_refused_in_one_line(impossible, file, options, message, tmp_path):
+    with pytest.raises(InputError) as refused:
+        impossible.animate(tmp_path / file, **options)
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_watching_shows_and_keeps_what_the_solver_tells():
+    """On 80 columns nothing is cut."""
+    screen = Console(file=StringIO(), force_terminal=True, width=80)
+    with watching("planning circle", console=screen) as watch:
+        for row in ((0, 5.0, 1.0), (1, 3.25, 1e-3), (0, 3.5, 2e-2)):
+            watch(*row)
+    assert watch.rows == [(0, 5.0, 1.0), (1, 3.25, 1e-3), (0, 3.5, 2e-2)]
+    assert watch.attempt == 2
+    shown = screen.file.getvalue()
+    for part in ("planning circle", "attempt 2", "iteration 0", "objective 3.5", "infeasibility 2.0e-02"):
+        assert part in shown
+    for options in ({"quiet": True, "console": Console(file=(silent := StringIO()), force_terminal=True)}, {}):
+        with watching("planning", **({"console": Console(file=silent)} | options)) as watch:
+            watch(0, 1.0, 1.0)
+        assert silent.getvalue() == ""
+        assert len(watch.rows) == 1

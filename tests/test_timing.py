@@ -1,0 +1,369 @@
+"""Timing along a path, held against closed forms, an optimal control program of its own, and the planner's audit."""
+
+import sys
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from towline.errors import InputError, SolverError
+from towline.models import Dynamics, Robot, load
+from towline.models.parsing import parse_yaml, to_yaml
+from towline.ocp import Task, TimingStatus, plan, time_along
+from towline.ocp.available_wrench import facets
+from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, TimedPath, WaypointPath
+from towline.solvers import TensionProblem, capacity_margin, solve
+
+GRAVITY = 9.81
+HOVER = RestPath(kind="rest", pose=(50, 50, 100, 0, 0, 0))
+PAPER_F = CirclePath(kind="circle", centre=(50, 50, 99), radius=1, rate=0.2 * np.pi)
+SMALL_CIRCLE = CirclePath(kind="circle", frame="quad", centre=(0, 0, -1), radius=0.1, rate=0.2 * np.pi)
+ROUND_TRIP = WaypointPath(
+    kind="waypoints", points=((0, 0, 2), (1, 1, 2.5), (2, 0, 2, 0, 0, 0.1), (-1, -1, 1.5))
+)  # of cogiro
+
+pytest.importorskip("toppra")
+
+
+def point_mass(anchors, dof, kind="ground", mass=2.0, t_min=1.0, t_max=40.0, **carrier):
+    """A point mass at the origin that hangs from a carrier at each anchor."""
+    return Robot.model_validate(
+        {
+            "name": "mass",
+            "source": "test",
+            "platform": {"mass": mass, "home": [0, 0, 0, 0, 0, 0], "dof": dof},
+            "carriers": [
+                {"name": f"c{i}", "kind": kind, "home": [*anchor, 0, 0, 0], **carrier}
+                for i, anchor in enumerate(anchors)
+            ],
+            "cables": [
+                {"carrier": f"c{i}", "anchor": [0, 0, 0], "attachment": [0, 0, 0], "t_min": t_min, "t_max": t_max}
+                for i in range(len(anchors))
+            ],
+        }
+    )
+
+
+def straight(robot, by):
+    return LinePath(kind="line", start=tuple(robot.home), end=tuple(robot.home + np.array(by)))
+
+
+def optimal_duration(robot, path, intervals, margin=0.0):
+    """Minimum time by IPOPT: ds/dt at the grid points and tensions at the midpoints are free, A t = w holds there."""
+    dynamics, h = Dynamics(robot), 1.0 / intervals
+    pose, first, second = path.by_fraction((np.arange(intervals) + 0.5) * h)
+    rows = np.flatnonzero(robot.dof_mask)
+    A = dynamics.wrench_matrix(pose)[:, rows]
+    rest = dynamics.required_wrench(pose, 0 * pose, 0 * pose)[:, rows]
+    inertia = dynamics.required_wrench(pose, 0 * pose, first)[:, rows] - rest
+    motion = dynamics.required_wrench(pose, first, second)[:, rows] - rest
+    speed = ca.MX.sym("speed", intervals + 1)
+    tensions = ca.MX.sym("tensions", robot.m, intervals)
+    square = speed**2
+    u, x = (square[1:] - square[:-1]) / (2 * h), (square[1:] + square[:-1]) / 2
+    given = ca.horzcat(*[A[k] @ tensions[:, k] for k in range(intervals)])
+    needed = ca.DM(inertia.T) * ca.repmat(u.T, len(rows), 1) + ca.DM(motion.T) * ca.repmat(x.T, len(rows), 1)
+    gap = (given - needed - ca.DM(rest.T)) / robot.force_scale
+    program = {
+        "x": ca.veccat(speed, tensions),
+        "f": ca.sum1(2 * h / (speed[1:] + speed[:-1])),
+        "g": ca.vec(gap),
+    }
+    solver = ca.nlpsol("time", "ipopt", program, {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes"})
+    low = np.concatenate([[0.0], np.full(intervals - 1, 1e-4), [0.0], np.tile(robot.t_min + margin, intervals)])
+    high = np.concatenate([[0.0], np.full(intervals - 1, np.inf), [0.0], np.tile(robot.t_max - margin, intervals)])
+    start = np.concatenate([np.full(intervals + 1, 0.5), np.tile((robot.t_min + robot.t_max) / 2, intervals)])
+    found = solver(x0=start, lbx=low, ubx=high, lbg=0, ubg=0)
+    assert solver.stats()["success"]
+    return float(found["f"])
+
+
+@pytest.mark.parametrize("name", ["ipanema-1", "nist-robocrane", "planar-4", "example-spatial"])
+def test_facets_are_as_far_from_a_wrench_as_the_capacity_margin_says(name):
+    robot, rng = load(name), np.random.default_rng(3)
+    rows = np.flatnonzero(robot.dof_mask)
+    poses = robot.home + 0.05 * rng.uniform(-1, 1, (30, 6)) * robot.dof_mask
+    A = Dynamics(robot).wrench_matrix(poses)[:, rows] / np.array([1, 1, 1, *[robot.length] * 3])[rows][:, None]
+    found = facets(A, robot.t_min, robot.t_max)
+    assert not found.outside.any()
+    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=2), 1, atol=1e-12)
+    for k in range(len(A)):
+        w = A[k] @ rng.uniform(robot.t_min, robot.t_max)
+        along = found.normals[k] @ w
+        nearest = min((found.high[k] - along).min(), (along - found.low[k]).min())
+        margin = capacity_margin(TensionProblem(A[k], w, robot.t_min, robot.t_max)).value
+        assert nearest == pytest.approx(margin, abs=1e-9 * robot.t_max.max())
+
+
+def test_flat_and_shifted_sets_are_described_inside_their_span():
+    rng = np.random.default_rng(5)
+    A = rng.normal(size=(3, 4, 5))
+    A[1] = rng.normal(size=(4, 2)) @ rng.normal(size=(2, 5))  # rank 2
+    t_min, t_max = np.array([1.0, 1, 1, 2, 1]), np.array([3.0, 3, 3, 2, 3])  # cable 4 has no choice
+    found = facets(A, t_min, t_max)
+    assert np.trace(found.outside[1]) == pytest.approx(2)
+    assert not found.outside[[0, 2]].any()
+    for k in range(3):
+        for t in rng.uniform(t_min - 0.5, t_max + 0.5, (200, 5)):
+            t[3] = 2.0
+            w = A[k] @ t
+            along = found.normals[k] @ w
+            inside = min((found.high[k] - along).min(), (along - found.low[k]).min())
+            assert np.abs(found.outside[k] @ (w - found.offset[k])).max() < 1e-10
+            assert (inside >= 0) == solve(TensionProblem(A[k], w, t_min, t_max)).feasible
+
+
+def test_one_vertical_cable_has_a_closed_form():
+    """Full tension up, least tension to slow down: T^2 = 2 h (1 / up + 1 / down)."""
+    mass, height = 2.0, 1.5
+    robot = point_mass([[0, 0, 4]], ["z"], mass=mass, t_min=1.0, t_max=40.0)
+    for margin in (0.0, 3.0):
+        timing = time_along(robot, straight(robot, [0, 0, height, 0, 0, 0]), margin=margin)
+        up, down = (40 - margin) / mass - GRAVITY, GRAVITY - (1 + margin) / mass
+        assert timing.feasible
+        assert timing.duration == pytest.approx(np.sqrt(2 * height * (1 / up + 1 / down)), rel=2e-4)
+
+
+def test_minimum_time_on_a_line_agrees_with_an_optimal_control_program():
+    robot = load("ipanema-1")
+    path = straight(robot, [0.6, 0.4, 0.3, 0, 0, 0])
+    for margin in (0.0, 30.0):
+        timing = time_along(robot, path, margin=margin)
+        best = optimal_duration(robot, path.model_copy(update={"timing": "uniform"}), 200, margin)
+        assert timing.feasible
+        assert timing.duration == pytest.approx(best, rel=0.01)
+
+
+def test_minimum_time_on_a_curve_agrees_with_an_optimal_control_program():
+    robot = load("cogiro")
+    timing = time_along(robot, ROUND_TRIP)
+    assert timing.feasible
+    best = optimal_duration(robot, ROUND_TRIP.model_copy(update={"timing": "uniform"}), 200)
+    assert timing.duration == pytest.approx(best, rel=0.01)
+
+
+def test_finer_grids_converge_and_margins_cost_time():
+    robot = load("cogiro")
+    durations = [time_along(robot, ROUND_TRIP, grid=grid).duration for grid in (200, 400, 800, 1600)]
+    steps = np.abs(np.diff(durations))
+    assert steps[-1] < 1e-3 * durations[-1]
+    assert steps[-1] < steps[0]
+    slower = [time_along(robot, ROUND_TRIP, margin=margin).duration for margin in (0.0, 20.0, 60.0)]
+    assert slower[0] < slower[1] < slower[2]
+
+
+def test_plans_of_timings_pass_the_audit():
+    cogiro, flying = load("cogiro"), load("wang-flying")
+    pitching = WaypointPath(kind="waypoints", points=((0, 0, 10), (1, 1, 10, 0, 0.1, 0), (3, 0, 11)))
+    for robot, timing in [
+        (cogiro, time_along(cogiro, ROUND_TRIP, margin=5.0)),
+        (flying, time_along(flying, SMALL_CIRCLE)),
+        (flying, time_along(flying, SMALL_CIRCLE, wind=(0, 0, 0))),
+        (flying, time_along(flying, SMALL_CIRCLE, carriers={"quad": pitching}, margin=0.1)),
+    ]:
+        assert timing.feasible
+        assert timing.violation <= 1e-6
+        found = plan(robot, timing.task())
+        assert found.feasible, found.report()
+        assert found.margin >= timing.margin - 1e-6
+        assert found.margin < timing.margin + 0.02 * robot.weight  # the fastest motion comes near to a limit
+        assert found.audit.times[-1] == pytest.approx(timing.duration)
+        # It is the same motion in {G}, by code that knows no s.
+        times = found.audit.times
+        for mine, its in zip(timing.motion(times)[0], found.audit.motion, strict=True):
+            np.testing.assert_allclose(mine, its, atol=1e-9)
+
+
+def test_carriers_moving_along_with_the_load_have_a_closed_form():
+    """The whole robot is shifted: the carriers' limits of speed and acceleration make a trapezoid."""
+    anchors, way = [[2, 0, 2], [-1, 1.7, 2], [-1, -1.7, 2]], np.array([1.2, 0.5, 0.0])
+    reach = {"min": [-9, -9, 0], "max": [9, 9, 9]}
+    robot = point_mass(anchors, ["x", "y", "z"], "mobile", reach=reach, speed_max=0.8, acceleration_max=1.5)
+    carriers = {
+        f"c{i}": LinePath(kind="line", start=tuple(anchor), end=tuple(anchor + way)) for i, anchor in enumerate(anchors)
+    }
+    timing = time_along(robot, straight(robot, [*way, 0, 0, 0]), carriers=carriers)
+    assert timing.feasible
+    assert timing.duration == pytest.approx(np.linalg.norm(way) / 0.8 + 0.8 / 1.5, rel=2e-3)
+    assert plan(robot, timing.task()).feasible
+    slower = time_along(robot, straight(robot, [*way, 0, 0, 0]), carriers=carriers, carrier_speed_max=0.5)
+    assert slower.duration == pytest.approx(np.linalg.norm(way) / 0.5 + 0.5 / 1.5, rel=2e-3)
+    # Carriers alone may move too: then the platform's relative motion is theirs.
+    alone = time_along(
+        load("wang-flying"),
+        RestPath(kind="rest", frame="quad", pose=(0, 0, -1)),
+        carriers={"quad": LinePath(kind="line", start=(0, 0, 10), end=(3, 0, 10))},
+    )
+    assert alone.feasible
+
+
+def test_speeds_stay_inside_their_limits():
+    robot = load("cogiro")
+    free = time_along(robot, ROUND_TRIP)
+    limited = time_along(robot, ROUND_TRIP, speed_max=1.2, cable_speed_max=np.ones(robot.m))
+    assert limited.feasible
+    assert limited.duration > free.duration
+    times = np.linspace(0, limited.duration, 4001)
+    platform, _ = limited.motion(times)
+    lengths = Dynamics(robot).cable_lengths(platform.pose)
+    cable_speed = np.abs(np.diff(lengths, axis=0)).max() / times[1]
+    speed = np.linalg.norm(platform.velocity[:, :3], axis=1).max()
+    assert speed <= 1.2 * (1 + 1e-6)
+    assert cable_speed <= 1.0 * (1 + 1e-5)
+    assert max(speed / 1.2, cable_speed) > 0.995  # one of them holds it back
+
+
+def test_hovering_quadrotor_cannot_start_the_papers_circle():
+    robot = load("wang-flying")
+    timing = time_along(robot, PAPER_F, carriers={"quad": HOVER})
+    assert timing.status is TimingStatus.INFEASIBLE
+    assert timing.duration is None
+    # On the circle the load could go round as a conical pendulum does; to rest there is what is impossible.
+    np.testing.assert_array_equal(timing.blocked, [0, 1])
+    assert timing.certificate.verify(timing.problem)
+    assert timing.certificate.shortfall > 1
+    assert "short by" in timing.report()
+    away = time_along(robot, LinePath(kind="line", frame="quad", start=(0, 0, -1), end=(1, 0, -1)))
+    assert away.status is TimingStatus.INFEASIBLE
+    assert away.at == 1
+    with pytest.raises(InputError, match="infeasible and has no motion"):
+        away.task()
+
+
+def test_a_blocked_arc_is_found_and_proven_for_every_speed():
+    robot, angles = load("wang-flying"), np.linspace(0, np.pi / 2, 7)
+    arc = [(0.4 * np.cos(angle), 0.4 * np.sin(angle), -1) for angle in angles]
+    path = WaypointPath(
+        kind="waypoints", frame="quad", points=((0, 0, -1), (0.2, 0, -1), *arc, (0, 0.2, -1), (0, 0, -1))
+    )
+    timing = time_along(robot, path, speed_max=0.3)
+    assert timing.status is TimingStatus.INFEASIBLE
+    platform, _ = timing.course.at(timing.blocked)
+    radius = np.linalg.norm(platform.pose[:, :2], axis=1)
+    assert radius.min() > 0.2
+    certificate, problem = timing.certificate, timing.problem
+    assert certificate.verify(problem)
+    place, _ = timing.course.at(np.array([timing.at]))
+    top = 0.3 / np.linalg.norm(place.velocity[0, :3])
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        motion = place.timed(np.array([rng.uniform(0, top)]), np.array([rng.normal() * 30]))
+        w = timing.course.dynamics.required_wrench(*(part[0] for part in motion))
+        assert certificate.direction @ w - certificate.support >= certificate.shortfall - 1e-6
+
+
+def test_samples_and_timed_paths_are_taken_as_curves():
+    robot = load("cogiro")
+    times = np.linspace(0, 3, 13)
+    samples = SamplePath(kind="samples", times=tuple(times), poses=tuple((np.sin(t) ** 3, 0.2 * t, 2) for t in times))
+    first = time_along(robot, samples)
+    assert first.feasible
+    again = time_along(robot, first.path)
+    assert again.duration == pytest.approx(first.duration)
+
+
+def test_two_cables_move_a_mass_in_their_plane_alone():
+    robot = point_mass([[-1, 0, 2], [1, 0, 2]], ["x", "y", "z"])
+    inside = time_along(robot, straight(robot, [0.2, 0, 0.3, 0, 0, 0]))
+    assert inside.feasible
+    assert plan(robot, inside.task()).feasible
+    with pytest.raises(InputError, match="rank 2 of 3"):
+        time_along(robot, straight(robot, [0.2, 0.1, 0.3, 0, 0, 0]))
+    tilted = point_mass([[-1, 0.5, 2], [1, 0.5, 2]], ["x", "y", "z"])
+    beside = time_along(tilted, straight(tilted, [0.2, 0, 0, 0, 0, 0]))
+    assert beside.status is TimingStatus.INFEASIBLE
+    assert beside.certificate.singular
+
+
+def test_a_timed_path_is_a_path_as_others_are():
+    circle = CirclePath(kind="circle", centre=(0, 0, 1), radius=1, rate=1)
+    path = TimedPath(kind="timed", along=circle, s=(0, 0.3, 0.7, 1), speeds=(0, 0.5, 0.4, 0))
+    ends = path.times
+    assert path.natural_duration == pytest.approx(0.6 / 0.5 + 0.8 / 0.9 + 0.6 / 0.4)
+    step = 1e-4
+    times = np.linspace(0.01, ends[-1] - 0.01, 50)
+    times = times[np.abs(times[:, None] - ends).min(axis=1) > 2 * step]
+    before, at, after = (path.at(times + shift, 1.0) for shift in (-step, 0, step))
+    np.testing.assert_allclose(at.velocity, (after.pose - before.pose) / (2 * step), atol=1e-5)
+    np.testing.assert_allclose(at.acceleration, (after.velocity - before.velocity) / (2 * step), atol=1e-5)
+    late = path.at(np.array([ends[-1] + 1]), 1.0)
+    np.testing.assert_allclose(late.pose, circle.by_fraction(np.array([1.0])).pose)
+    assert not late.velocity.any()
+    task = Task(path=path)
+    assert parse_yaml(to_yaml(task), Task, "task") == task
+
+
+def test_uniform_waypoints_rest_nowhere():
+    path = WaypointPath(kind="waypoints", points=((0, 0, 1), (1, 0, 2, 0, 0, 0.5), (1, 1, 1)), timing="uniform")
+    s, step = np.linspace(0.01, 0.99, 40), 1e-5
+    before, at, after = (path.by_fraction(s + shift) for shift in (-step, 0, step))
+    np.testing.assert_allclose(at.velocity, (after.pose - before.pose) / (2 * step), atol=1e-7)
+    np.testing.assert_allclose(at.acceleration, (after.velocity - before.velocity) / (2 * step), atol=1e-3)
+    assert np.linalg.norm(path.by_fraction(np.array([0.0, 1.0])).velocity, axis=1).min() > 1
+    np.testing.assert_allclose(path.by_fraction(np.array([0.0, 1.0])).pose[:, :3], [[0, 0, 1], [1, 1, 1]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        ({"s": (0, 1), "speeds": (0, 0)}, "both 0"),
+        ({"s": (0, 0.5), "speeds": (0, 1)}, "from 0 to 1"),
+        ({"s": (0, 0.6, 0.5, 1), "speeds": (0, 1, 1, 0)}, "must rise"),
+        ({"s": (0, 0.5, 1), "speeds": (0, 1)}, "one for each s"),
+        ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "frame": "quad"}, "not that of along"),
+    ],
+)
+def test_laws_that_are_none_are_refused(law, message):
+    with pytest.raises(InputError, match=message):
+        TimedPath.model_validate({"kind": "timed", "along": PAPER_F.model_dump(), **law})
+
+
+CENTRE = {"kind": "line", "start": [0, 0, -1], "end": [0, 0, -1.2]}
+QUAD = {"kind": "line", "start": [0, 0, 0], "end": [1, 0, 0]}
+
+
+@pytest.mark.parametrize(
+    ("robot", "path", "options", "message"),
+    [
+        ("wang-flying", {"kind": "spiral"}, {}, "path.kind: 'spiral' is unknown"),
+        ("wang-flying", {**CENTRE, "end": [0, 0, -1]}, {}, "nothing moves there"),
+        ("wang-flying", {**CENTRE, "frame": "moon"}, {}, "path.frame: 'moon'"),
+        ("wang-flying", CENTRE, {"carriers": {"moon": QUAD}}, "'moon' is unknown; accepted: quad"),
+        ("wang-flying", CENTRE, {"carriers": {"quad": {**QUAD, "frame": "quad"}}}, "accepted: world"),
+        ("cogiro", ROUND_TRIP, {"carriers": {"frame": QUAD}}, "never moves"),
+        ("wang-flying", CENTRE, {"margin": 40}, "leaves nothing of the limits of cable 1"),
+        ("wang-flying", CENTRE, {"margin": -1}, "margin"),
+        ("wang-flying", CENTRE, {"grid": 2}, "grid"),
+        ("wang-flying", CENTRE, {"speed_max": 0}, "speed_max"),
+        ("wang-flying", CENTRE, {"cable_speed_max": [1.0, 2.0]}, "has 2 items; accepted: one number, or 6"),
+        ("wang-flying", CENTRE, {"wind": (1, 0, 0)}, "zeros for still air"),
+        ("cogiro", ROUND_TRIP, {"wind": (0, 0, 0)}, "no platform.aero"),
+        ("flycrane", CENTRE, {}, "of kind quadrotor"),
+        ("planar-4", {**CENTRE, "end": [0, 0.3, -1]}, {}, "cannot move so"),
+        ("wang-ctmrts", {"kind": "line", "start": [1.2, 0.9, 0.3], "end": [1.3, 1, 0.5]}, {}, "rank 3 of 6"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_line(robot, path, options, message):
+    with pytest.raises(InputError, match=message) as error:
+        time_along(load(robot), path, **options)
+    assert "\n" not in str(error.value)
+
+
+def test_speed_without_a_limit_is_refused():
+    """A load that keeps its place in {G} while its carrier drifts by a hair: tensions hardly tell the speed."""
+    robot = point_mass([[0, 0, 4]], ["z"], "prescribed")
+    path, drift = RestPath(kind="rest", pose=(0, 0, 0)), LinePath(kind="line", start=(0, 0, 4), end=(0, 0, 5))
+    with pytest.raises(InputError, match="nothing limits the speed"):
+        time_along(robot, path, carriers={"c0": drift})
+    assert time_along(robot, path, carriers={"c0": drift}, carrier_speed_max=1.0).status is TimingStatus.FEASIBLE
+
+
+def test_without_the_extra_it_says_how_to_install_it(monkeypatch):
+    for name in [name for name in sys.modules if name.partition(".")[0] == "toppra"]:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, "toppra", None)
+    monkeypatch.delitem(sys.modules, "towline.ocp.toppra_law", raising=False)
+    monkeypatch.delattr(sys.modules["towline.ocp"], "toppra_law", raising=False)
+    robot = point_mass([[0, 0, 4]], ["z"])
+    with pytest.raises(SolverError, match=r"pip install 'towline\[timing\]'"):
+        time_along(robot, straight(robot, [0, 0, 1, 0, 0, 0]))
