@@ -148,7 +148,10 @@ def _without_branches(details: list[Any]) -> list[Any]:
         if isinstance(first["input"], dict) and taking:
             told += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in taking]
         else:
-            plain = [one["msg"][:1].lower() + one["msg"][1:] for one in branches if not one["type"].startswith("model")]
+            plain = [
+                one["msg"].removeprefix("Value error, ") for one in branches if not one["type"].startswith("model")
+            ]
+            plain = [text[:1].lower() + text[1:] for text in plain]
             told.append(first | {"loc": place[:at], "msg": ", or ".join(dict.fromkeys(plain))})
     return told
 

@@ -120,7 +120,7 @@ WRONG = {
         {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
         "duration: is to be chosen, but path of kind circle has times of its own",
     ),
-    "tube": ({"tube": {"position": "loose"}}, "tube.position: accepted: a number, not text, or .*'free', got 'loose'$"),
+    "tube": ({"tube": {"position": "loose"}}, "tube.position: accepted: a number, not text, or .*'free', got 'loose'"),
     "range of what": (
         {"duration": {"min": 2, "mx": 3}},
         "duration.(max: is missing|mx: is not a known key, did you mean 'max')",
