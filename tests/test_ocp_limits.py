@@ -1,0 +1,148 @@
+"""Limits of a task: distances by brute force, rates by differences, quadrotors by forward dynamics."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from towline.errors import InputError
+from towline.models import load
+from towline.ocp import plan
+from towline.ocp.clearance import between_cables, cable_outside, point_outside
+from towline.ocp.limits import limits
+from towline.ocp.scenario import lay_out
+from towline.ocp.task import Task
+from towline.ocp.task_limits import Block, Capsule, Sphere
+
+SHARES = np.linspace(0, 1, 201)
+points = arrays(np.float64, (4, 3), elements=st.floats(-2, 2).map(lambda x: round(x, 3)))
+
+
+def along(start, end):
+    return start + SHARES[:, None] * (end - start)
+
+
+@given(ends=points)
+def test_cables_are_as_far_apart_as_their_points(ends):
+    p, p_end, q, q_end = ends
+    lengths = np.linalg.norm(p_end - p), np.linalg.norm(q_end - q)
+    if min(lengths) < 0.1:
+        return
+    apart = np.linalg.norm(along(p, p_end)[:, None] - along(q, q_end)[None], axis=2).min()
+    told = float(between_cables(*(ca.DM(point) for point in ends)))
+    # The samples are up to half a step off, and parallel lines are told apart by a billionth.
+    assert told <= apart + 1e-4
+    assert told >= apart - max(lengths) / 200 - 1e-4
+
+
+@given(ends=points)
+def test_obstacles_are_as_far_as_their_points_say(ends):
+    p, p_end, centre, corner = ends
+    sphere = Sphere(kind="sphere", centre=tuple(centre), radius=0.3)
+    step = np.linalg.norm(p_end - p) / 200 + 1e-5
+    truth = np.linalg.norm(along(p, p_end) - centre, axis=1) - 0.3
+    assert float(point_outside(sphere, ca.DM(p))) == pytest.approx(truth[0], abs=1e-5)
+    assert truth.min() - step <= float(cable_outside(sphere, ca.DM(p), ca.DM(p_end))) <= truth.min() + 1e-5
+    if np.linalg.norm(corner - centre) > 0.1:
+        capsule = Capsule(kind="capsule", start=tuple(centre), end=tuple(corner), radius=0.2)
+        truth = np.linalg.norm(p - along(centre, corner), axis=1).min() - 0.2
+        assert truth - 0.02 <= float(point_outside(capsule, ca.DM(p))) <= truth + 1e-5
+    low, high = np.minimum(centre, corner), np.maximum(centre, corner) + 0.1
+    box = Block(kind="box", min=tuple(low), max=tuple(high))
+    outside = np.linalg.norm(np.maximum(np.maximum(low - p, p - high), 0))
+    told = float(point_outside(box, ca.DM(p)))
+    assert told <= outside + 1e-12
+    assert (told > 0) == (outside > 0)
+
+
+def test_winch_speeds_are_differences_of_lengths():
+    robot = load("ipanema-1")
+    path = {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.3]}
+    found = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 9.0, "platform_speed": 9.0}})
+    seen = found.audit
+    all_limits = limits(found.scenario)
+    assert [limit.name for limit in all_limits.all] == ["cable_speed", "platform_speed"]
+    lengths = found.scenario.dynamics.cable_lengths(seen.motion.pose, seen.carriers.pose)
+    by_difference = np.gradient(lengths, seen.times, axis=0)[1:-1]
+    bodies = [np.hstack(seen.motion), np.hstack([part[:, 0] for part in seen.carriers])]
+    values = all_limits.function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T[1:-1]
+    np.testing.assert_allclose(values[:, :8], by_difference, atol=1e-4)
+    np.testing.assert_allclose(values[:, 8], np.linalg.norm(seen.motion.velocity[1:-1, :3], axis=1), atol=1e-8)
+    slow = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 0.5}})
+    assert not slow.feasible
+    assert any(sentence.startswith("cable_speed: cable ") for sentence in slow.audit.excess)
+    soft = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 0.5, "soft": {"cable_speed": 0.1}}})
+    assert soft.feasible
+    assert soft.audit.soft_excess
+
+
+def test_a_place_is_kept_out_of():
+    robot = load("ipanema-1")
+    task = {
+        "path": {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.3]},
+        "duration": 1.5,
+        "steps": 40,
+        "tube": {"position": "free", "ends": "exact"},
+        "objective": {"deviation": 1.0},
+    }
+    through = plan(robot, task)
+    middle = through.audit.motion.pose[len(through.audit.times) // 2, :3]
+    post = {"kind": "sphere", "name": "post", "centre": middle.tolist(), "radius": 0.1, "cables": None}
+    around = plan(robot, task | {"limits": {"keep_out": [post]}})
+    assert around.feasible
+
+    def nearest(found):
+        return np.linalg.norm(found.audit.motion.pose[:, :3] - middle, axis=1).min()
+
+    assert nearest(through) < 0.1 <= nearest(around) + 1e-6
+
+
+def test_quadrotors_move_as_forward_dynamics_moves_them():
+    """The thrust and torque that the plan stands for give the accelerations that it has."""
+    robot = load("wang-flying-quadrotor")
+    start = robot.home.tolist()
+    task = {"path": {"kind": "line", "start": start, "end": [1.5, 0.5, *start[2:]]}, "duration": 3.0, "steps": 60}
+    found = plan(robot, task | {"base": {"kind": "free", "ends": "rest"}})
+    assert found.feasible, found.report()
+    seen, scenario = found.audit, found.scenario
+    names = [limit.name for limit in limits(scenario).all]
+    assert names == ["thrust", "force across the thrust", "torque", "torque", "torque"]
+    bodies = [np.hstack(seen.motion), np.hstack([part[:, 0] for part in seen.carriers])]
+    asked = limits(scenario).function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T
+    carrier = robot.carriers[0]
+    assert asked[:, 0].max() <= carrier.thrust_max
+    assert np.abs(asked[:, 3:]).max() <= max(carrier.torque_max)
+    nodes = np.linspace(0, len(seen.times) - 1, 61).astype(
+        int
+    )  # between them a little force across the thrust is missing
+    for row in nodes[::10]:
+        platform, base = scenario.dynamics.coupled_acceleration(
+            seen.motion.pose[row],
+            seen.motion.velocity[row],
+            seen.carriers.pose[row],
+            seen.carriers.velocity[row],
+            seen.tensions[row],
+            asked[row, :1],
+            asked[row, 3:6][None],
+        )
+        np.testing.assert_allclose(platform, seen.motion.acceleration[row], atol=1e-6)
+        np.testing.assert_allclose(base, seen.carriers.acceleration[row], atol=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [
+        ({"cable_speed": -1}, "limits.cable_speed"),
+        ({"soft": {"cable_speed": 1}}, "soft: 'cable_speed' is none of this task's limits"),
+        ({"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [0, 1, 1]}]}, "is not below max"),
+        ({"keep_out": [{"kind": "cone"}]}, "limits.keep_out"),
+        ({"cable_length": {"min": 2, "max": 1}}, "is more than max"),
+    ],
+)
+def test_wrong_limits_are_one_line(limit, message):
+    with pytest.raises(InputError) as caught:
+        lay_out(load("ipanema-1"), Task.model_validate({"path": {"kind": "rest", "pose": [0, 0, 1]}, "limits": limit}))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
