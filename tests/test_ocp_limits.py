@@ -55,6 +55,19 @@ def test_obstacles_are_as_far_as_their_points_say(ends):
     told = float(point_outside(box, ca.DM(p)))
     assert told <= outside + 1e-12
     assert (told > 0) == (outside > 0)
+    middle, half = (low + high) / 2, (high - low) / 2
+    truth = (np.abs(along(p, p_end) - middle) - half).max(axis=1).min()  # along the axes
+    assert truth - step <= float(cable_outside(box, ca.DM(p), ca.DM(p_end))) <= truth + 1e-9
+
+
+def test_a_cable_through_the_edge_of_a_thin_box_is_seen():
+    """It is inside for a hundredth of its length, between any samples that one would take."""
+    box = Block(kind="box", min=(0.503, -1, -1), max=(0.513, 1, 1))
+    start, end = np.array([0.0, 0, 0]), np.array([1.0, 0, 0])
+    assert float(cable_outside(box, ca.DM(start), ca.DM(end))) == pytest.approx(-0.005, abs=1e-9)
+    x = ca.SX.sym("x", 3)
+    slope = ca.Function("slope", [x], [ca.gradient(cable_outside(box, x, x + ca.DM(end)), x)])
+    assert np.isfinite(slope(start).full()).all()
 
 
 def test_winch_speeds_are_differences_of_lengths():
