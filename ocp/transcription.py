@@ -356,7 +356,8 @@ def _limit_rows(
     if not limits.all:
         return 0.0
     evaluated = limits.function(*(ca.vertcat(*motion) for motion in motions), tensions)
-    cost, at, soft = 0.0, 0, 0
+    cost, at = 0.0, 0
+    paid: set[str] = set()  # limits of one name share a slack
     for limit in limits.all:
         size = limit.values.numel()
         value = evaluated[at : at + size] / limit.scale
@@ -368,12 +369,13 @@ def _limit_rows(
             rows += [(f"{limit.name} of {label}", low, high) for label in limit.labels]
             continue
         slack = x[layout.slacks][_place_of(scenario, limit.name)]
-        cost += (slack * limit.scale / limit.soft) ** 2
+        if limit.name not in paid:
+            cost += (slack * limit.scale / limit.soft) ** 2
+            paid.add(limit.name)
         for sign, bound in ((1.0, low), (-1.0, -high)):
             if np.isfinite(bound):
                 values.append(sign * value + slack)
                 rows += [(f"{limit.name} of {label}", bound, np.inf) for label in limit.labels]
-        soft += 1
     return cost
 
 
