@@ -323,11 +323,14 @@ def _limit_excess(
         return hard, soft
     bodies = [np.hstack(motion), *(np.hstack([part[:, i] for part in carriers]) for i in range(carriers.pose.shape[1]))]
     values = found.function.map(len(times))(*(body.T for body in bodies), tensions.T).full().T
+    there = np.isfinite(tensions).all(axis=1, keepdims=True)
     at = 0
     for limit in found.all:
         mine = values[:, at : at + len(limit.labels)]
         at += len(limit.labels)
-        beyond = np.nan_to_num(np.maximum(limit.low - mine, mine - limit.high))
+        beyond = np.maximum(limit.low - mine, mine - limit.high)
+        # Without tensions nothing is said of what depends on them; any other nan keeps no limit.
+        beyond = np.where(np.isnan(beyond), np.where(there, np.inf, -np.inf), beyond)
         tolerance = UNDERACTUATED_TOLERANCE if limit.equation else LIMIT_TOLERANCE
         if beyond.max() <= tolerance * limit.scale:
             continue
