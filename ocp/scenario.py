@@ -23,7 +23,7 @@ MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 
 @dataclass(frozen=True)
-class Limits:
+class CarrierLimits:
     """What one carrier may do; None or infinite: no limit."""
 
     acceleration: float | None  # [m/s^2]
@@ -34,7 +34,7 @@ class Limits:
     turn_acceleration: float | None  # [rad/s^2]
     attitude: np.ndarray | None  # (3,) that it keeps [rad]
 
-    def shrunk(self, share: float) -> Limits:
+    def shrunk(self, share: float) -> CarrierLimits:
         """Acceleration and speed limits less a share of themselves, for what happens between the nodes."""
         keep = 1.0 - share
         acceleration = self.acceleration and self.acceleration * keep
@@ -79,7 +79,7 @@ class Scenario:
     relative: bool
     platform_free: list[int]
     carrier_free: list[tuple[int, int]]
-    limits: dict[int, Limits]
+    limits: dict[int, CarrierLimits]
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it open: where the planner starts, then what it chose
 
@@ -152,8 +152,8 @@ class Scenario:
                 spread[:, owner[1]] = value[:, column]
         return spread
 
-    def free_limits(self, shrink: float = 0.0) -> dict[int, Limits]:
-        """Limits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
+    def free_limits(self, shrink: float = 0.0) -> dict[int, CarrierLimits]:
+        """CarrierLimits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
         free = {index for index, _ in self.carrier_free}
         return {index: limit.shrunk(shrink) for index, limit in self.limits.items() if index in free}
 
@@ -273,15 +273,15 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
     return free
 
 
-def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, Limits]:
-    """Limits of carriers by index: the robot's own whatever the base does, and the task's for a free base."""
+def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, CarrierLimits]:
+    """CarrierLimits of carriers by index: the robot's own whatever the base does, and the task's for a free base."""
     limits = {}
     free = base if isinstance(base, FreeBase) else None
     for index, carrier in enumerate(robot.carriers):
         acceleration = free.acceleration_max if free else None
         speed = free.speed_max if free else None
         if isinstance(carrier, MobileCarrier):
-            limits[index] = Limits(
+            limits[index] = CarrierLimits(
                 acceleration=_tighter(acceleration, carrier.acceleration_max),
                 speed=_tighter(speed, carrier.speed_max),
                 low=np.array(carrier.reach.min),
@@ -291,7 +291,7 @@ def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, Li
                 attitude=np.array(carrier.home[3:]),
             )
         elif isinstance(carrier, QuadrotorCarrier):
-            limits[index] = Limits(
+            limits[index] = CarrierLimits(
                 acceleration=_tighter(acceleration, carrier.acceleration_max),
                 speed=_tighter(speed, carrier.speed_max),
                 low=np.full(3, -np.inf),
@@ -301,7 +301,7 @@ def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, Li
                 attitude=None,
             )
         elif free and carrier.kind == "prescribed":
-            limits[index] = Limits(
+            limits[index] = CarrierLimits(
                 acceleration=acceleration,
                 speed=speed,
                 low=np.full(3, -np.inf),

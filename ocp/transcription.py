@@ -29,7 +29,7 @@ from .guess import initial_guess
 from .layout import DURATION, MARGIN, Layout
 from .limits import limits as limits_of
 from .path import WaypointPath
-from .scenario import ATTITUDE, POSITION, Deviation, Limits, Scenario
+from .scenario import ATTITUDE, POSITION, CarrierLimits, Deviation, Scenario
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
@@ -484,7 +484,7 @@ def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, steps: int) -> 
 
 def _carrier_rows(
     name: str,
-    limit: Limits,
+    limit: CarrierLimits,
     h: ca.SX | float,
     start: list[ca.SX],
     end: list[ca.SX],
