@@ -153,7 +153,7 @@ class Scenario:
         return spread
 
     def free_limits(self, shrink: float = 0.0) -> dict[int, CarrierLimits]:
-        """CarrierLimits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
+        """Limits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
         free = {index for index, _ in self.carrier_free}
         return {index: limit.shrunk(shrink) for index, limit in self.limits.items() if index in free}
 
@@ -274,7 +274,7 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
 
 
 def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, CarrierLimits]:
-    """CarrierLimits of carriers by index: the robot's own whatever the base does, and the task's for a free base."""
+    """Limits of carriers by index: the robot's own whatever the base does, and the task's for a free base."""
     limits = {}
     free = base if isinstance(base, FreeBase) else None
     for index, carrier in enumerate(robot.carriers):
