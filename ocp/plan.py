@@ -8,12 +8,13 @@ from typing import Any
 
 from ..errors import InputError
 from ..models import Robot
-from . import transcription
 from .audit import Audit, at_rest, audit
+from .program import build
 from .result import Plan, PlanStatus
+from .rows import Mesh
 from .scenario import Deviation, Scenario, lay_out
+from .solver import Outcome, Progress, Solver
 from .task import Task, read_task
-from .transcription import Mesh, Outcome, Progress, Solver
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
@@ -33,7 +34,7 @@ def plan(
 
     The platform follows the task's path, exactly or inside a tube; the carriers hold, move as given, or are free inside
     their limits. What the planner may choose it chooses by inverse-dynamics transcription and IPOPT
-    (`transcription`). A plan is called feasible only by its audit on a dense grid (`audit`).
+    (`program`). A plan is called feasible only by its audit on a dense grid (`audit`).
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ class _Search:
         """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
         start = time.perf_counter()
         if mesh not in self._solvers:
-            self._solvers[mesh] = Solver(transcription.build(self.scenario, mesh))
+            self._solvers[mesh] = Solver(build(self.scenario, mesh))
         solver = self._solvers[mesh]
         solver.prepare(guess)
         built = time.perf_counter()

@@ -17,8 +17,8 @@ from ..figures import style
 from ..models import load
 from ..ocp import Plan, Task, plan
 from ..ocp.path import AnyPath, CirclePath, RestPath
+from ..ocp.solver import Progress
 from ..ocp.task import FreeBase, HoldBase
-from ..ocp.transcription import Progress
 
 HOVER = (50.0, 50.0, 100.0, 0.0, 0.0, 0.0)  # paper F, section VI.B [m, rad]
 CIRCLE = CirclePath(kind="circle", centre=(50.0, 50.0, 99.0), radius=1.0, rate=0.2 * np.pi)

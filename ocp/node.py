@@ -1,0 +1,129 @@
+"""What a program asks of one node: the balance A t = w, the limits that hold at an instant, and what it costs."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from .layout import MARGIN, Layout
+from .limits import limits as limits_of
+from .rows import OTHER_COSTS, Mesh, Row, motions
+from .scenario import POSITION, Scenario
+
+__all__ = ["node_function"]
+
+SLACK_COST = 1e2  # of a missing wrench as large as the weight
+
+
+def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Function, list[Row]]:
+    """Cost and constraints of one node: the balance A t = w and the limits that hold at an instant."""
+    robot, dynamics = scenario.robot, scenario.dynamics
+    x = ca.SX.sym("x", layout.width)
+    parameters = ca.SX.sym("p", 18 * (1 + len(robot.carriers)))
+    platform, *carriers = motions(scenario, layout, x, parameters)
+    tensions = robot.force_scale * x[layout.tensions]
+    wind = scenario.task.wind
+    pose_rows = [ca.vertcat(*(carrier[k].T for carrier in carriers)) for k in range(3)]
+    if scenario.relative:
+        A = dynamics.relative.wrench_matrix(platform[0])
+        w = dynamics.relative.required_wrench(*platform, *carriers[0], wind=wind)
+    else:
+        A = dynamics.wrench_matrix(platform[0], pose_rows[0])
+        w = dynamics.required_wrench(*platform, *pose_rows, wind=wind)
+    scale = robot.force_scale * np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
+    balance = ((A @ tensions - w) / ca.DM(scale))[moving]
+    cost = _node_cost(scenario, layout, x)
+    if mesh.elastic:
+        missing = x[layout.missing]
+        balance -= missing[moving]
+        cost = OTHER_COSTS * cost + SLACK_COST * ca.sumsqr(missing)
+
+    values: list[ca.SX] = [balance]
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    rows: list[Row] = [(f"balance {axes[row]}", 0.0, 0.0) for row in moving]
+    if robot.fixed_lengths is not None and not scenario.relative:
+        lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
+        values.append((lengths / robot.fixed_lengths) ** 2)  # squared: no square root in the derivatives
+        rows += [(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
+    for index, limit in scenario.free_limits(mesh.shrink).items():
+        name, acceleration = robot.carriers[index].name, carriers[index][2]
+        if limit.acceleration is not None:
+            values.append(ca.sumsqr(acceleration[0:3]) / limit.acceleration**2)
+            rows.append((f"{name} acceleration", -np.inf, 1.0))
+        if limit.tilt and limit.turn_acceleration is not None:
+            values.append(acceleration[3:5] / limit.turn_acceleration)
+            rows += [(f"{name} turn acceleration", -1.0, 1.0)] * 2
+    if (place := layout.at(MARGIN)) is not None:
+        low, high = (bound / robot.force_scale for bound in scenario.bounds())
+        values += [x[layout.tensions] - x[place] - low, high - x[place] - x[layout.tensions]]
+        rows += [("margin", 0.0, np.inf)] * (2 * robot.m)
+    if scenario.relative:
+        platform = list(dynamics.relative.motion_in_world(*platform, *carriers[0]))
+    cost += _limit_rows(scenario, mesh, layout, x, [platform, *carriers], tensions, values, rows)
+    return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)]), rows
+
+
+def _limit_rows(
+    scenario: Scenario,
+    mesh: Mesh,
+    layout: Layout,
+    x: ca.SX,
+    motions: list[list[ca.SX]],
+    tensions: ca.SX,
+    values: list[ca.SX],
+    rows: list[Row],
+) -> ca.SX | float:
+    """Add the limits of `limits`, in units of their scale; return what passing the soft ones costs."""
+    limits = limits_of(scenario)
+    if not limits.all:
+        return 0.0
+    evaluated = limits.function(*(ca.vertcat(*motion) for motion in motions), tensions)
+    cost, at = 0.0, 0
+    paid: set[str] = set()  # limits of one name share a slack
+    for limit in limits.all:
+        size = limit.values.numel()
+        value = evaluated[at : at + size] / limit.scale
+        at += size
+        reserve = 0.0 if limit.equation else mesh.shrink * limit.scale
+        low, high = (limit.low + reserve) / limit.scale, (limit.high - reserve) / limit.scale
+        if limit.soft is None or mesh.elastic:
+            values.append(value)
+            rows += [(f"{limit.name} of {label}", low, high) for label in limit.labels]
+            continue
+        slack = x[layout.slacks][_place_of(scenario, limit.name)]
+        if limit.name not in paid:
+            cost += (slack * limit.scale / limit.soft) ** 2
+            paid.add(limit.name)
+        for sign, bound in ((1.0, low), (-1.0, -high)):
+            if np.isfinite(bound):
+                values.append(sign * value + slack)
+                rows += [(f"{limit.name} of {label}", bound, np.inf) for label in limit.labels]
+    return cost
+
+
+def _place_of(scenario: Scenario, name: str) -> int:
+    """Which slack belongs to a soft limit."""
+    return list(scenario.task.limits.soft).index(name)
+
+
+def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:
+    robot, objective = scenario.robot, scenario.task.objective
+    tension_scale = objective.tension or robot.force_scale
+    deviation_scale = objective.deviation or _tenth_of_tube(scenario)
+    cost = ca.sumsqr(robot.force_scale * x[layout.tensions] / tension_scale)
+    q, a = x[layout.q], x[layout.a]
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        if owner is None:
+            arm = 1.0 if coordinate in POSITION else robot.length
+            if np.isfinite(deviation_scale):
+                cost += (arm * q[column] / deviation_scale) ** 2
+        else:
+            cost += (q[column] / objective.carrier_offset) ** 2 + (a[column] / objective.carrier_acceleration) ** 2
+    return cost
+
+
+def _tenth_of_tube(scenario: Scenario) -> float:
+    tube = scenario.task.tube
+    turn = 0.0 if tube.attitude == "free" else tube.turn
+    return 0.1 * max(tube.radius, scenario.robot.length * turn)
