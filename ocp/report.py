@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..models import Robot
 from ..models.robot import COORDINATES
 from ..solvers import Certificate
-
-if TYPE_CHECKING:
-    from .result import Plan
+from .finding import Finding
 
 LEAST_SHARE = 0.05  # of a direction: what turns it less is not put into words
 Fact = tuple[str, str]  # its name, and the fact with its unit
@@ -24,12 +22,12 @@ class Section(NamedTuple):
     facts: list[Fact]
 
 
-def verdict(plan: Plan) -> str:
+def verdict(plan: Finding) -> str:
     """The answer in one line: robot, task, status, and what decided it."""
     return f"{plan.scenario.robot.name}, {plan.scenario.task.name}: {plan.status.value.upper()}, {_decisive(plan)}"
 
 
-def sections(plan: Plan) -> list[Section]:
+def sections(plan: Finding) -> list[Section]:
     """All that the report tells below its first line; sections without facts are left out."""
     titles = {"infeasible": "Why there is none", "not-found": "What the closest motion misses"}
     found = [
@@ -44,7 +42,7 @@ def sections(plan: Plan) -> list[Section]:
     return [section for section in found if section.facts]
 
 
-def as_text(plan: Plan) -> str:
+def as_text(plan: Finding) -> str:
     """The whole report for a terminal."""
     parts = sections(plan)
     width = max(len(name) for section in parts for name, _ in section.facts)
@@ -55,7 +53,7 @@ def as_text(plan: Plan) -> str:
     return "\n".join(lines)
 
 
-def _decisive(plan: Plan) -> str:
+def _decisive(plan: Finding) -> str:
     if plan.feasible:
         return f"every tension inside its limits, by {_short(plan.margin)} N at least"
     certificate, excess = plan.audit.certificate, plan.audit.excess
@@ -66,7 +64,7 @@ def _decisive(plan: Plan) -> str:
     return f"{short}, {broken}" if broken else short
 
 
-def _why(plan: Plan) -> list[Fact]:
+def _why(plan: Finding) -> list[Fact]:
     if plan.feasible:
         return []
     facts: list[Fact] = []
@@ -85,7 +83,7 @@ def _why(plan: Plan) -> list[Fact]:
     return facts + [("limit broken", sentence) for sentence in plan.audit.excess]
 
 
-def _constraint(plan: Plan, certificate: Certificate) -> str:
+def _constraint(plan: Finding, certificate: Certificate) -> str:
     if certificate.singular:
         return "wrench balance: no cable pulls along the direction, however large its tension"
     low, high = plan.scenario.bounds()
@@ -134,7 +132,7 @@ def _vector(certificate: Certificate) -> str:
     return f"force ({_listed(direction[:3], '.3f')}), moment ({_listed(direction[3:], '.3f')})/m"
 
 
-def _tensions(plan: Plan) -> list[Fact]:
+def _tensions(plan: Finding) -> list[Fact]:
     robot, seen = plan.scenario.robot, plan.audit
     there = np.isfinite(seen.tensions).all(axis=1)
     facts: list[Fact] = []
@@ -164,7 +162,7 @@ def _tensions(plan: Plan) -> list[Fact]:
     return facts
 
 
-def _motion(plan: Plan) -> list[Fact]:
+def _motion(plan: Finding) -> list[Fact]:
     task, seen = plan.scenario.task, plan.audit
     worst = int(seen.tracking_error.argmax())
     error = f"{_short(plan.tracking_error_max * 1e3)} mm at most"
@@ -182,7 +180,7 @@ def _motion(plan: Plan) -> list[Fact]:
     ]
 
 
-def _carriers(plan: Plan) -> list[Fact]:
+def _carriers(plan: Finding) -> list[Fact]:
     """The largest speed, acceleration and tilt of each carrier that could move, against its limits."""
     facts = []
     seen = plan.audit.carriers
@@ -211,7 +209,7 @@ def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarr
     return f"up to {_short(values[row])} {unit} at t = {times[row]:.3f} s ({bound})"
 
 
-def _audit(plan: Plan) -> list[Fact]:
+def _audit(plan: Finding) -> list[Fact]:
     seen = plan.audit
     facts = [
         ("rate", f"{seen.rate:.6g} Hz, {len(seen.times)} instants, by code that is not the planner's"),
@@ -226,7 +224,7 @@ def _audit(plan: Plan) -> list[Fact]:
     return facts
 
 
-def _computation(plan: Plan) -> list[Fact]:
+def _computation(plan: Finding) -> list[Fact]:
     facts = [("build", f"{plan.build_s:.3f} s"), ("solve", f"{plan.solve_s:.3f} s")]
     if plan.deviation is None:
         return [*facts, ("solver", "none: the task fixes the motion, the audit alone decides")]

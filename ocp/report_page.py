@@ -15,12 +15,12 @@ from ..figures import plan as figures
 from ..figures import style
 from ..figures.convergence import convergence
 from ..models.parsing import to_yaml
+from .finding import Finding
 from .report import Section, sections, verdict
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
-
-    from .result import Plan
 
 PAGE = Template("""\
 <!DOCTYPE html>
@@ -60,7 +60,7 @@ $files
 COLOURS = {"feasible": style.colour(0), "infeasible": style.colour(1), "not-found": style.colour(5)}
 
 
-def page(plan: Plan) -> str:
+def page(plan: Finding, trajectory: xr.Dataset) -> str:
     """The whole page."""
     from .. import __version__
 
@@ -72,7 +72,7 @@ def page(plan: Plan) -> str:
         colour=COLOURS[plan.status.value],
         verdict=escape(decisive),
         tables="\n".join(_table(section) for section in sections(plan)),
-        figures="\n".join(_figure(caption, drawn) for caption, drawn in _drawings(plan).items()),
+        figures="\n".join(_figure(caption, drawn) for caption, drawn in _drawings(plan, trajectory).items()),
         files=_file("The robot's file", to_yaml(robot)) + "\n" + _file("The task", to_yaml(task)),
         version=escape(__version__),
     )
@@ -87,8 +87,7 @@ def _table(section: Section) -> str:
     return f"<h2>{escape(section.title)}</h2>\n<table>\n" + "\n".join(rows) + "\n</table>"
 
 
-def _drawings(plan: Plan) -> dict[str, Figure]:
-    trajectory = plan.trajectory
+def _drawings(plan: Finding, trajectory: xr.Dataset) -> dict[str, Figure]:
     drawn = {
         "Tensions against their limits": figures.tensions(trajectory),
         "Path of the platform and places of the carriers": figures.path(trajectory),
