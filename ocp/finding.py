@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 
 from .audit import Audit
+from .missing import Missing, missing
+from .rung import Rung
 from .scenario import Deviation, Scenario
+
+__all__ = ["Finding", "PlanStatus", "Relaxed"]
 
 
 class PlanStatus(StrEnum):
@@ -21,7 +25,9 @@ class PlanStatus(StrEnum):
 
     INFEASIBLE = "infeasible"
     """The task fixes the motion, and it cannot be: at some time no tensions give the wrench that it needs, proven by
-    the certificate, or it leaves a carrier's or drive's limits, told by the audit's `excess`."""
+    the certificate, or it leaves a carrier's or drive's limits, told by the audit's `excess`. Or the task leaves the
+    duration open, and no duration and time law that it leaves will do: then the certificate is that of the slowest
+    motion, and `rungs` tell what excludes the others."""
 
     NOT_FOUND = "not-found"
     """The planner found no motion without violation. The certificate and the `excess` are those of the closest motion
@@ -49,6 +55,10 @@ class Finding:
     iterates
         Rows of (iteration, objective, infeasibility) of all runs of the solver, in order: where the iteration falls
         back to 0 another run begins.
+    rungs
+        The steps of the planner's ladder, in order: what each said, and how long it took.
+    relaxed
+        If not feasible: what would have been, if the planner knows.
     """
 
     scenario: Scenario
@@ -60,6 +70,8 @@ class Finding:
     iterations: int = 0
     message: str = ""
     iterates: tuple[tuple[int, float, float], ...] = ()
+    rungs: tuple[Rung, ...] = ()
+    relaxed: Relaxed | None = None
 
     @property
     def feasible(self) -> bool:
@@ -98,6 +110,11 @@ class Finding:
             return None
         return {"time": self.audit.certificate_time, **self.audit.certificate.as_dict()}
 
+    @cached_property
+    def missing(self) -> tuple[Missing, ...]:
+        """The spans in which no tensions inside their limits give the wrench that is needed; see `missing`."""
+        return missing(self.scenario, self.audit)
+
     def summary(self) -> dict[str, Any]:
         """What `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""
         return {
@@ -113,4 +130,32 @@ class Finding:
             "solver_message": self.message,
             "audit": self.audit.summary(),
             "certificate": self.certificate,
+            "missing": [each.as_dict() for each in self.missing],
+            "relaxed": None if self.relaxed is None else self.relaxed.as_dict(),
+            "rungs": [rung._asdict() for rung in self.rungs],
         }
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """A task near the one that was asked, and its plan.
+
+    Attributes
+    ----------
+    name, unit
+        The field of the task that differs, and its unit.
+    asked, possible
+        Its value in the task, and the nearest one that was found to do.
+    plan
+        The plan of that.
+    """
+
+    name: str
+    unit: str
+    asked: float
+    possible: float
+    plan: Finding
+
+    def as_dict(self) -> dict[str, Any]:
+        """{"name", "unit", "asked", "possible"} for JSON."""
+        return {"name": self.name, "unit": self.unit, "asked": self.asked, "possible": self.possible}

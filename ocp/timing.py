@@ -114,7 +114,7 @@ class Timing:
         InputError
             If there is no law.
         """
-        return self._timed(self.course.path)
+        return self.timed(self.course.path)
 
     def task(self, name: str = "timed") -> Task:
         """A task that fixes this motion of platform and carriers: `plan` audits it.
@@ -128,7 +128,7 @@ class Timing:
         base: HoldBase | GivenBase = HoldBase(kind="hold")
         if course.carriers:
             paths: dict[str, AnyPath] = {
-                carriers[index].name: self._timed(path) if index in course.moving else path
+                carriers[index].name: self.timed(path) if index in course.moving else path
                 for index, path in course.carriers.items()
             }
             base = GivenBase(kind="given", paths=paths)
@@ -157,7 +157,14 @@ class Timing:
             told += [f"  {line}" for line in self.certificate.in_words().splitlines()]
         return "\n".join(told)
 
-    def _timed(self, path: Curve) -> TimedPath:
+    def timed(self, path: Curve) -> TimedPath:
+        """A path of the course, the platform's or a carrier's, with the time law.
+
+        Raises
+        ------
+        InputError
+            If there is no law.
+        """
         if np.isnan(self.sd).any():
             raise InputError(f"timing: is {self.status.value} and has no motion; accepted: a feasible one")
         law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
