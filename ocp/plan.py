@@ -156,7 +156,7 @@ def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relax
     if near < left.shortest or near > LONGEST * asked:
         return None
     longer = scenario.lasting(near)
-    seen = search.audit_motion(longer, None)
+    seen = search.audit_motion(longer, None, f"audit of {near:.4g} s")
     if not seen.passed:
         return None
     return Relaxed("duration", "s", asked, near, Plan(longer, PlanStatus.FEASIBLE, None, seen, 0.0, 0.0))
@@ -180,7 +180,7 @@ def _rest_along_the_path(search: Search) -> Plan | None:
     if search.scenario.count or span is None or margin.margin[[0, -1]].min() >= 0:
         return None
     slowest = search.scenario.lasting(span.max)
-    proven = at_rest(slowest, search.audit_motion(slowest, None))
+    proven = at_rest(slowest, search.audit_motion(slowest, None, f"audit of {span.max:.4g} s"))
     return None if proven is None else Plan(slowest, PlanStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
@@ -202,14 +202,14 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
         return None, own
     if timing.duration is not None and span.min <= timing.duration <= span.max:
         chosen = scenario.along(timing.path, timing.duration)
-        seen = search.audit_motion(chosen, None)
+        seen = search.audit_motion(chosen, None, "audit of that")
         return (Plan(chosen, PlanStatus.FEASIBLE, None, seen, 0.0, 0.0) if seen.passed else None), own
     too_slow = timing.duration is not None and BOUND * timing.duration > span.max
     if own or not (too_slow or timing.certificate is not None):
         return None, own
     # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
     slowest = scenario.lasting(span.max)
-    seen = search.audit_motion(slowest, None)
+    seen = search.audit_motion(slowest, None, f"audit of {span.max:.4g} s")
     if seen.passed:
         return None, True
     relaxed = _longer(search, slowest, left)

@@ -22,6 +22,14 @@ class Section(NamedTuple):
     facts: list[Fact]
 
 
+class Table(NamedTuple):
+    """Rows of equal kind under named columns."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
 def verdict(plan: Finding) -> str:
     """The answer in one line: robot, task, status, and what decided it."""
     return f"{plan.scenario.robot.name}, {plan.scenario.task.name}: {plan.status.value.upper()}, {_decisive(plan)}"
@@ -32,14 +40,32 @@ def sections(plan: Finding) -> list[Section]:
     titles = {"infeasible": "Why there is none", "not-found": "What the closest motion misses"}
     found = [
         Section(titles.get(plan.status.value, "Limits"), _why(plan)),
-        Section("Soft limits passed", [("limit", sentence) for sentence in plan.audit.soft_excess]),
+        Section("Soft limits passed", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
+        Section("How it was found", [(rung.name, f"{rung.verdict} ({rung.seconds:.3f} s)") for rung in plan.rungs]),
         Section("Computation", _computation(plan)),
     ]
     return [section for section in found if section.facts]
+
+
+def missing(plan: Finding) -> Table | None:
+    """When the motion lacks wrench, which cables bind then, and what is needed and available along the certificate.
+
+    None of a motion that lacks nothing.
+    """
+    rows = []
+    for span in plan.missing:
+        certificate = span.certificate
+        most = direction_in_words(certificate, plan.scenario.robot).partition(", ")[0]
+        numbers = (certificate.demand, certificate.support, certificate.shortfall)
+        times = (f"{time:.3f}" for time in (span.start, span.end, span.at))
+        rows.append((*times, most, _binding(certificate), *(_short(number) for number in numbers)))
+    columns = ("from [s]", "to [s]", "worst [s]", "along", "cables that bind")
+    columns += ("needed [N]", "available [N]", "short by [N]")
+    return Table("When wrench is missing", columns, rows) if rows else None
 
 
 def as_text(plan: Finding) -> str:
@@ -47,10 +73,27 @@ def as_text(plan: Finding) -> str:
     parts = sections(plan)
     width = max(len(name) for section in parts for name, _ in section.facts)
     lines = [verdict(plan)]
-    for title, facts in parts:
+    for index, (title, facts) in enumerate(parts):
         lines.append(f"  {title}")
         lines += [f"    {name:<{width}}  {fact}" for name, fact in facts]
+        table = missing(plan) if index == 0 else None
+        if table is not None:
+            lines += _in_columns(table)
     return "\n".join(lines)
+
+
+def _in_columns(table: Table) -> list[str]:
+    """A table's lines, columns as wide as they need."""
+    rows = [table.columns, *table.rows]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
+    told = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return [f"  {table.title}", *(f"    {line}" for line in told)]
+
+
+def _binding(certificate: Certificate) -> str:
+    """The cables at their limits along the certificate, counted from 1."""
+    at = (("t_min", certificate.at_min), ("t_max", certificate.at_max))
+    return "; ".join(f"{name}: {_listed(cables + 1)}" for name, cables in at if cables.size) or "none pulls so"
 
 
 def _decisive(plan: Finding) -> str:
@@ -80,7 +123,11 @@ def _why(plan: Finding) -> list[Fact]:
             ("available", f"{_short(certificate.support)} N at most" + pulled * (certificate.support < 0)),
             ("short by", f"{_short(certificate.shortfall)} N"),
         ]
-    return facts + [("limit broken", sentence) for sentence in plan.audit.excess]
+    facts += [("limit broken", str(excess)) for excess in plan.audit.excess]
+    if (relaxed := plan.relaxed) is not None:
+        asked, possible = (f"{value:.4g} {relaxed.unit}" for value in (relaxed.asked, relaxed.possible))
+        facts.append(("would do", f"a {relaxed.name} of {possible} instead of {asked}, planned and audited"))
+    return facts
 
 
 def _constraint(plan: Finding, certificate: Certificate) -> str:
@@ -171,9 +218,10 @@ def _motion(plan: Finding) -> list[Fact]:
     speed, acceleration = (
         np.linalg.norm(part[:, :3], axis=1).max() for part in (seen.motion.velocity, seen.motion.acceleration)
     )
+    law = "" if plan.scenario.path is task.path else ", by the fastest time law"
     return [
         ("duration", f"{plan.scenario.duration:.6g} s"),
-        ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}"),
+        ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
         ("tracking error", error),
         ("platform", f"up to {_short(speed)} m/s and {_short(acceleration)} m/s^2"),
         *([("wind", f"({_listed(np.array(task.wind), 'g')}) m/s")] if task.wind is not None else []),
@@ -227,7 +275,9 @@ def _audit(plan: Finding) -> list[Fact]:
 def _computation(plan: Finding) -> list[Fact]:
     facts = [("build", f"{plan.build_s:.3f} s"), ("solve", f"{plan.solve_s:.3f} s")]
     if plan.deviation is None:
-        return [*facts, ("solver", "none: the task fixes the motion, the audit alone decides")]
+        fixed = plan.scenario.is_fixed
+        why = "the task fixes the motion, the audit alone decides" if fixed else "a rung before it knew the answer"
+        return [*facts, ("solver", f"none: {why}")]
     starts = sum(row[0] == 0 for row in plan.iterates)
     runs = f", run {starts} of {starts}" if starts > 1 else ""
     return [*facts, ("solver", f"{plan.iterations} iterations{runs}: {plan.message}")]

@@ -75,9 +75,9 @@ class Search:
         """What the audit says of a program's motion."""
         return self.audit_motion(self.scenario.lasting(outcome.duration), outcome.deviation)
 
-    def audit_motion(self, scenario: Scenario, deviation: Deviation | None) -> Audit:
+    def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
         """What the audit says of any motion."""
-        with self.rung("audit") as verdict:
+        with self.rung(name) as verdict:
             seen = audit(scenario, deviation)
             verdict.told = "passed" if seen.passed else in_words(seen)
         return seen
