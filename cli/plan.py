@@ -26,7 +26,7 @@ def plan(
         Path | None, typer.Option("--out", help="NetCDF file to write; none: ROBOT-TASK.nc in this folder.")
     ] = None,
     figures: Annotated[
-        Path | None, typer.Option("--figures", help="Folder to draw path, tensions and base in.")
+        Path | None, typer.Option("--figures", help="Folder to draw path, views, tensions, base and limits in.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, to open anywhere.")

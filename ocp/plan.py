@@ -222,7 +222,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     steps = scenario.task.steps
     outcome = search.solve("program", Mesh(steps), start)
     if not outcome.success:
-        closest = search.solve("elastic program", Mesh(steps, elastic=True), None)
+        closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             return _closest(search, closest)
         outcome = search.solve("program", Mesh(steps), closest.deviation)

@@ -11,10 +11,9 @@ from html import escape
 from string import Template
 from typing import TYPE_CHECKING
 
-from ..figures import plan as figures
 from ..figures import style
-from ..figures.convergence import convergence
 from ..models.parsing import to_yaml
+from .drawings import drawings
 from .finding import Finding
 from .report import Section, Table, missing, sections, verdict
 
@@ -74,7 +73,7 @@ def page(plan: Finding, trajectory: xr.Dataset) -> str:
         colour=COLOURS[plan.status.value],
         verdict=escape(decisive),
         tables="\n".join(_tables(plan)),
-        figures="\n".join(_figure(caption, drawn) for caption, drawn in _drawings(plan, trajectory).items()),
+        figures="\n".join(_figure(*drawing) for drawing in drawings(plan, trajectory).values()),
         files=_file("The robot's file", to_yaml(robot)) + "\n" + _file("The task", to_yaml(task)),
         version=escape(__version__),
     )
@@ -101,17 +100,6 @@ def _table(section: Section) -> str:
         for name, fact in section.facts
     ]
     return f"<h2>{escape(section.title)}</h2>\n<table>\n" + "\n".join(rows) + "\n</table>"
-
-
-def _drawings(plan: Finding, trajectory: xr.Dataset) -> dict[str, Figure]:
-    drawn = {
-        "Tensions against their limits": figures.tensions(trajectory),
-        "Path of the platform and places of the carriers": figures.path(trajectory),
-        "Carriers beside and above the platform": figures.base_offset(trajectory),
-    }
-    if plan.iterates:
-        drawn["How the solver came to it"] = convergence(plan.iterates)
-    return drawn
 
 
 def _figure(caption: str, drawn: Figure) -> str:

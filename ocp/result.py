@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..figures import animation, style
-from ..figures.convergence import convergence
-from ..figures.plan import draw
 from ..writing import whole_file
+from .drawings import drawings
 from .finding import Finding, PlanStatus
 from .report import as_text
 from .report_page import page
@@ -48,14 +47,12 @@ class Plan(Finding):
         return path
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Draw path, tensions, base offset and convergence as PNG files in `folder`; their paths.
+        """Draw path, views, tensions, base offset, other limits and convergence as PNG files in `folder`; their paths.
 
-        There is no convergence where no solver ran: the task fixed the motion.
+        What there is nothing of has no figure: no convergence where no solver ran, no base where all is ground.
         """
-        drawn = draw(self.trajectory, Path(folder))
-        if self.iterates:
-            drawn.append(style.save(convergence(self.iterates), Path(folder) / "convergence.png"))
-        return drawn
+        drawn = drawings(self, self.trajectory)
+        return [style.save(drawing.figure, Path(folder) / f"{name}.png") for name, drawing in drawn.items()]
 
     def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
         """Draw the robot in motion as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.

@@ -14,7 +14,7 @@ from .finding import Finding
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["trajectory"]
+__all__ = ["output_rows", "trajectory"]
 
 
 def trajectory(found: Finding) -> xr.Dataset:
@@ -22,7 +22,7 @@ def trajectory(found: Finding) -> xr.Dataset:
     import xarray as xr
 
     robot, task = found.scenario.robot, found.scenario.task
-    rows = _output_rows(found)
+    rows = output_rows(found)
     seen = found.audit
 
     def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Any:
@@ -52,11 +52,12 @@ def trajectory(found: Finding) -> xr.Dataset:
         "time": ("time", seen.times[rows], {"units": "s"}),
         "coordinate": list(COORDINATES),
         "carrier": [carrier.name for carrier in robot.carriers],
+        "carrier_kind": ("carrier", [carrier.kind for carrier in robot.carriers]),
         "cable": np.arange(1, robot.m + 1),
     }
     return xr.Dataset(variables, coordinates, attributes)
 
 
-def _output_rows(found: Finding) -> np.ndarray:
+def output_rows(found: Finding) -> np.ndarray:
     """Rows of the audit that are saved: at equal times, and each of them audited."""
     return np.arange(0, len(found.audit.times), (len(found.audit.times) - 1) // found.scenario.output_samples)
