@@ -1,7 +1,7 @@
 """Distances between points, cables and obstacles, as expressions that a nonlinear program can differentiate.
 
-Points are (3, 1), CasADi SX or DM. Distances are the true ones, but for a hair (1e-6 m) where things touch; those from
-boxes are measured along the axes, which is never more than the true distance.
+Points are (3, 1), CasADi SX or DM. Distances are the true ones, but for a hair (1e-6 m) where things touch: round
+about the corners of a box, so that a program can pass them. Inside a box what counts is how far the nearest face is.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ __all__ = ["between_cables", "between_points", "cable_outside", "point_outside"]
 Point: TypeAlias = Any  # (3, 1), SX or DM
 
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
+_BISECTIONS = 20
 _STILL = 1e-9  # [m], of a cable along an axis: what changes less counts as this much
 
 
@@ -46,9 +47,8 @@ def point_outside(place: KeepOut, p: Point) -> Any:
     if isinstance(place, Capsule):
         return _from_segment(p, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
-        low, high = np.array(place.min), np.array(place.max)
-        beyond = ca.fabs(p - ca.DM((low + high) / 2)) - ca.DM((high - low) / 2)
-        return ca.mmax(beyond) if isinstance(beyond, ca.DM) else _largest([beyond[i] for i in range(3)])
+        beyond = _beyond(place, p)
+        return ca.if_else(_inside(beyond), _largest(beyond), ca.sqrt(_squared(beyond) + _TINY))
     raise TypeError(f"{type(place).__name__} is no obstacle")
 
 
@@ -59,9 +59,51 @@ def cable_outside(place: KeepOut, p: Point, p_end: Point) -> Any:
     if isinstance(place, Capsule):
         return between_cables(p, p_end, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
+        nearest = _beyond(place, p + _nearest_share(place, p, p_end) * (p_end - p))
         shares = [0.0, 1.0, *_corners(place, p, p_end)]
-        return -_largest([-point_outside(place, p + share * (p_end - p)) for share in shares])
+        through = -_largest([-_largest(_beyond(place, p + share * (p_end - p))) for share in shares])
+        return ca.if_else(_squared(nearest) > _TINY, ca.sqrt(_squared(nearest) + _TINY), through)
     raise TypeError(f"{type(place).__name__} is no obstacle")
+
+
+def _beyond(place: Block, p: Point) -> list[Any]:
+    """How far p is beyond the faces of a box along each axis [m]; all negative inside."""
+    low, high = np.array(place.min), np.array(place.max)
+    beyond = ca.fabs(p - ca.DM((low + high) / 2)) - ca.DM((high - low) / 2)
+    return [beyond[i] for i in range(3)]
+
+
+def _squared(beyond: list[Any]) -> Any:
+    """Squared distance from a box [m^2], zero inside."""
+    return sum(ca.fmax(value, 0.0) ** 2 for value in beyond)
+
+
+def _inside(beyond: list[Any]) -> Any:
+    return _largest(beyond) <= 0
+
+
+def _nearest_share(place: Block, p: Point, p_end: Point) -> Any:
+    """Where a segment is nearest to a box.
+
+    The squared distance is convex along it and its slope piecewise linear: bisection finds the piece, with nothing to
+    differentiate, and a step of Newton's the place in it, with its true derivatives.
+    """
+    low, high, along = ca.DM(place.min), ca.DM(place.max), p_end - p
+    rate = ca.sumsqr(along) * _TINY
+
+    def slopes(share: Any) -> tuple[Any, Any]:
+        at = p + share * along
+        over, under = at - high, low - at
+        slope = ca.dot(along, ca.fmax(over, 0.0) - ca.fmax(under, 0.0))
+        return slope, ca.dot(along**2, (over > 0) + (under > 0))
+
+    share, step = ca.DM(0.5), 0.25
+    for _ in range(_BISECTIONS):
+        slope, _ = slopes(share)
+        share = share + step * ca.if_else(slope > 0, -1.0, ca.if_else(slope < 0, 1.0, 0.0))
+        step /= 2
+    slope, bend = slopes(share)
+    return _within(share - slope / (bend + rate))
 
 
 def _corners(place: Block, p: Point, p_end: Point) -> list[Any]:

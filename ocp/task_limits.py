@@ -41,7 +41,7 @@ class Capsule(KeepOut):
 
 
 class Block(KeepOut):
-    """A box along the axes of {G}. Distances to it are measured along these axes, so they are never too large."""
+    """A box along the axes of {G}."""
 
     kind: Literal["box"]
     min: Vector3 = Field(description="corner in {G} [m]")

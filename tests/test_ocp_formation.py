@@ -1,0 +1,115 @@
+"""Past obstacles without a guess from the user: a team of quadrotors takes its load through a slot and back."""
+
+import numpy as np
+import pytest
+
+from towline.models import load
+from towline.ocp import plan
+from towline.ocp.formation import clear_formation
+from towline.ocp.guess import initial_guess
+from towline.ocp.scenario import lay_out
+from towline.ocp.task import Task
+
+HALF_SLOT, HALF_WALL = 0.5, 0.2  # [m]
+APART = 0.6  # [m]
+KEPT = {"platform": 0.05, "carriers": 0.1, "cables": 0.05}  # [m] from the walls
+
+
+def walls():
+    box = {"kind": "box", **KEPT}
+    return [
+        {**box, "name": "left wall", "min": [-HALF_WALL, HALF_SLOT, -3], "max": [HALF_WALL, 6, 6]},
+        {**box, "name": "right wall", "min": [-HALF_WALL, -6, -3], "max": [HALF_WALL, -HALF_SLOT, 6]},
+    ]
+
+
+def there_and_back(**changes):
+    task = {
+        "path": {"kind": "waypoints", "points": [[-3, 0, 0], [3, 0, 0], [-3, 0, 0]]},
+        "duration": 16,
+        "steps": 64,
+        "tube": {"position": "free", "attitude": "free", "ends": "exact", "waypoints": "exact"},
+        "base": {"kind": "free", "ends": "rest"},
+        "objective": {"deviation": 1.0},
+        "limits": {"keep_out": walls(), "carrier_separation": APART},
+    }
+    return task | changes
+
+
+def from_walls(points):
+    """Euclidean distance of points (..., 3) from the nearer wall, zero inside."""
+    found = []
+    for wall in walls():
+        low, high = np.array(wall["min"]), np.array(wall["max"])
+        found.append(np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=-1))
+    return np.minimum(*found)
+
+
+def bodies(robot, pose, carriers):
+    """CoM and attachments (n, 1 + m, 3), and points along each cable (n, m, 21, 3): by scipy's rotations."""
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_euler("ZYX", pose[:, 5:2:-1]).as_matrix()
+    attachments = pose[:, None, :3] + np.einsum("nij,mj->nmi", turn, robot.attachments)
+    anchors = carriers[:, robot.carrier_of_cable, :3]  # cables run to the quadrotors' CoM
+    share = np.linspace(0, 1, 21)[:, None]
+    cables = attachments[:, :, None] + share * (anchors - attachments)[:, :, None]
+    return np.concatenate([pose[:, None, :3], attachments], axis=1), cables
+
+
+def test_the_formation_draws_together_and_keeps_clear():
+    robot = load("multi-quadrotor-4")
+    scenario = lay_out(robot, Task.model_validate(there_and_back()))
+    formation = clear_formation(scenario)
+    assert formation is not None
+    times = np.linspace(0, 16, 801)
+    pose, carriers = formation.motion(times)
+    platform, cables = bodies(robot, pose, carriers)
+    assert from_walls(platform).min() >= KEPT["platform"]
+    assert from_walls(cables).min() >= KEPT["cables"]
+    assert from_walls(carriers[..., :3]).min() >= KEPT["carriers"]
+    apart = np.linalg.norm(carriers[:, :, None, :3] - carriers[:, None, :, :3], axis=-1) + 9 * np.eye(4)
+    assert apart.min() >= APART
+    inside = np.abs(pose[:, 0]) < HALF_WALL
+    assert inside.sum() > 20  # it does go through
+
+
+def test_nothing_in_the_way_leaves_the_formation_as_it_is():
+    robot = load("multi-quadrotor-4")
+    far = [{"kind": "sphere", "centre": [0, 0, 30], "radius": 1.0}]
+    for limits in ({}, {"keep_out": far}):
+        assert clear_formation(lay_out(robot, Task.model_validate(there_and_back(limits=limits)))) is None
+    held = there_and_back(tube={}, base={"kind": "hold"})
+    assert clear_formation(lay_out(robot, Task.model_validate(held))) is None
+
+
+def test_quadrotors_are_guessed_to_tilt_as_their_cables_pull():
+    """At rest at home: the attitudes of the library file, in which thrust carries weight and cables."""
+    robot = load("multi-quadrotor-4")
+    task = {"path": {"kind": "rest", "pose": [0, 0, 0]}, "duration": 1, "base": {"kind": "free"}}
+    level = robot.model_dump(mode="json")
+    for carrier in level["carriers"]:
+        carrier["home"][3:] = [0.0, 0.0, 0.0]
+    scenario = lay_out(type(robot).model_validate(level), Task.model_validate(task))
+    guess = initial_guess(scenario, np.linspace(0, 1, 5))
+    _, carriers = scenario.motion(guess.nodes, guess)
+    np.testing.assert_allclose(carriers.pose[:, :, 3:], robot.carrier_home[None, :, 3:].repeat(5, axis=0), atol=1e-6)
+
+
+def test_four_quadrotors_go_through_a_slot_and_back():
+    robot = load("multi-quadrotor-4")
+    found = plan(robot, there_and_back())
+    assert found.feasible, found.report()
+    seen = found.audit
+    platform, cables = bodies(robot, seen.motion.pose, seen.carriers.pose)
+    assert from_walls(platform).min() >= KEPT["platform"] - 1e-5
+    assert from_walls(cables).min() >= KEPT["cables"] - 1e-5
+    assert from_walls(seen.carriers.pose[..., :3]).min() >= KEPT["carriers"] - 1e-5
+    lengths = np.linalg.norm(cables[:, :, -1] - cables[:, :, 0], axis=-1)
+    np.testing.assert_allclose(lengths, np.broadcast_to(robot.fixed_lengths, lengths.shape), atol=1e-4)
+    x = seen.motion.pose[:, 0]
+    assert x[0] == pytest.approx(-3, abs=1e-9)
+    assert x[len(x) // 2] == pytest.approx(3, abs=1e-6)
+    assert x[-1] == pytest.approx(-3, abs=1e-9)
+    assert robot.t_min.min() - 1e-6 <= seen.tensions.min()
+    assert seen.tensions.max() <= robot.t_max.max() + 1e-6
