@@ -65,6 +65,8 @@ class Scenario:
 
     Attributes
     ----------
+    path
+        That of the platform: the task's, or the same places by a time law that the planner chose.
     relative
         Whether the platform's path is given in the frame of the robot's only carrier.
     platform_free
@@ -75,6 +77,7 @@ class Scenario:
 
     robot: Robot
     task: Task
+    path: AnyPath
     dynamics: Dynamics
     relative: bool
     platform_free: list[int]
@@ -91,6 +94,10 @@ class Scenario:
     def lasting(self, seconds: float) -> Scenario:
         """The same with another duration [s]."""
         return replace(self, duration=seconds)
+
+    def along(self, path: AnyPath, seconds: float) -> Scenario:
+        """The same with another path of the platform, in the same frame, and its duration [s]."""
+        return replace(self, path=path, duration=seconds)
 
     @property
     def count(self) -> int:
@@ -113,7 +120,7 @@ class Scenario:
 
     def references(self, times: np.ndarray) -> tuple[Motion, list[Motion]]:
         """The platform's path, in its own frame, and the carriers' reference motions in {G}."""
-        platform = self.task.path.at(times, self.duration)
+        platform = self.path.at(times, self.duration)
         carriers = []
         for index, home in enumerate(self.robot.carrier_home):
             path = self.carrier_paths.get(index)
@@ -138,7 +145,7 @@ class Scenario:
 
     def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
         """How far the platform at `motion` in {G} is from its path, (n, 6) [m, rad], along the path's own axes."""
-        wanted = self.task.path.at(times, self.duration).pose
+        wanted = self.path.at(times, self.duration).pose
         pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
         off = pose - wanted
         off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
@@ -185,6 +192,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     scenario = Scenario(
         robot=robot,
         task=task,
+        path=task.path,
         dynamics=Dynamics(robot),
         relative=relative,
         platform_free=platform_free,
