@@ -99,8 +99,7 @@ def _start(scenario: Scenario, start: Plan | None) -> Deviation | None:
         )
     if scenario.duration_range is not None:
         return theirs
-    stretch = scenario.duration / theirs.nodes[-1]
-    return Deviation(theirs.nodes * stretch, theirs.q, theirs.v / stretch, theirs.a / stretch**2, theirs.tensions)
+    return theirs.stretched(scenario.duration / theirs.nodes[-1])
 
 
 def _fixed_motion(scenario: Scenario) -> Plan:

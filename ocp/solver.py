@@ -1,4 +1,4 @@
-"""IPOPT for a program: from a guess, from a motion or from its own last solution, and what came of it."""
+"""IPOPT or fatrop for a program: from a guess, a motion or its own last solution, and what came of it."""
 
 from __future__ import annotations
 
@@ -56,8 +56,11 @@ _FROM_A_SOLUTION = {
 _STARTS: dict[str, dict[str, Any]] = {"guess": _FROM_A_GUESS, "motion": _FROM_A_MOTION, "solution": _FROM_A_SOLUTION}
 
 
+FATROP_STATUS = {0: "Solve_Succeeded", 1: "Maximum_Iterations_Exceeded"}  # fatrop's numbers in IPOPT's words
+
+
 class Solver:
-    """IPOPT for one program, to be run from several guesses, or from its own last solution."""
+    """IPOPT or fatrop for one program, to be run from several guesses, or from its own last solution."""
 
     def __init__(self, program: Program, max_iterations: int = 400):
         self.program = program
@@ -67,20 +70,42 @@ class Solver:
         self._last: dict[str, ca.DM] | None = None
 
     def prepare(self, guess: Deviation | None) -> ca.Function:
-        """IPOPT for a run from `guess`, made when it is first asked for."""
+        """The solver for a run from `guess`, made when it is first asked for."""
         start = "motion" if guess is not None else "guess" if self._last is None else "solution"
         if start not in self._solvers:
             self._solvers[start] = self._make(_STARTS[start])
         return self._solvers[start]
 
     def _make(self, start: dict[str, Any]) -> ca.Function:
-        quiet = {"print_level": 0, "sb": "yes"}
-        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
-        options = {"print_time": False, "error_on_fail": False, "iteration_callback": self._watch}
+        name, common = self.program.scenario.task.solver, {"print_time": False, "error_on_fail": False}
+        options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
         try:
-            return ca.nlpsol("planner", "ipopt", self.program.problem, {"ipopt": quiet | accuracy | start, **options})
+            return ca.nlpsol("planner", name, self.program.problem, common | options)
         except RuntimeError as error:
             raise _broken(error) from None
+
+    def _ipopt(self, start: dict[str, Any]) -> dict[str, Any]:
+        quiet = {"print_level": 0, "sb": "yes"}
+        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
+        return {"ipopt": quiet | accuracy | start, "iteration_callback": self._watch}
+
+    def _fatrop(self, start: dict[str, Any]) -> dict[str, Any]:
+        program = self.program
+        if program.stages is None:
+            raise SolverError("planner: fatrop needs a program in stages")
+        stages = program.stages
+        # Of what `start` says it knows this much, by names of its own.
+        words = {"mu_init": "mu_init", "warm_start_bound_push": "bound_push", "warm_start_bound_frac": "bound_frac"}
+        asked = {words[key]: value for key, value in start.items() if key in words}
+        return {
+            "structure_detection": "manual",
+            "N": len(stages.rows) - 1,
+            "nx": stages.states,
+            "nu": stages.controls,
+            "ng": stages.rows,
+            "equality": (program.lower_g == program.upper_g).tolist(),
+            "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | asked,
+        }
 
     def solve(self, guess: Deviation | None, progress: Progress | None = None) -> Outcome:
         """Solve from `guess`; None: from the last solution and its multipliers, or else from a guess of our own.
@@ -117,17 +142,21 @@ class Solver:
         if watch.interrupted or statistics["return_status"] == "User_Requested_Stop":
             raise KeyboardInterrupt
         self._last = result if statistics["success"] else None
-        x = result["x"].full().ravel()
+        x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
+        message = statistics["return_status"]
+        if isinstance(message, int):
+            message = FATROP_STATUS.get(message, f"fatrop's status {message}")
+            # It calls nobody while it solves.
+            watch.tell(iterations, float(result["f"]), result["g"].full().ravel())
         # A minimum time is often found long before IPOPT is sure that there is no shorter one.
         met = program.violation(x, result["g"].full().ravel()) <= MET
-        missing = program.layout.columns(x)[:, program.layout.missing]
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
             success=(bool(statistics["success"]) or met) and bool(np.isfinite(x).all()),
-            message=str(statistics["return_status"]),
-            iterations=int(statistics["iter_count"]),
-            slack=float(np.linalg.norm(missing, axis=1).max(initial=0.0) * program.scenario.robot.force_scale),
+            message=str(message),
+            iterations=iterations,
+            slack=program.missing(x),
         )
 
 
@@ -151,6 +180,13 @@ class _Watch(ca.Callback):
         self._iteration = 0
         self.interrupted = False
 
+    def tell(self, iteration: int, objective: float, g: np.ndarray) -> None:
+        """Tell whoever asked."""
+        if self._progress is not None:
+            low, high = self._bounds
+            infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
+            self._progress(iteration, objective, infeasibility)
+
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
 
@@ -170,11 +206,7 @@ class _Watch(ca.Callback):
 
     def eval(self, arg: Sequence[ca.DM]) -> list[int]:
         try:
-            if self._progress is not None:
-                g = arg[2].full().ravel()
-                low, high = self._bounds
-                infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
-                self._progress(self._iteration, float(arg[1]), infeasibility)
+            self.tell(self._iteration, float(arg[1]), arg[2].full().ravel())
             self._iteration += 1
         except KeyboardInterrupt:
             self.interrupted = True
