@@ -11,7 +11,7 @@ import numpy as np
 
 from . import spline
 from .layout import Layout
-from .rows import OTHER_COSTS, Mesh, Row, motions, spread, stretch
+from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, spread, stretch
 from .scenario import ATTITUDE, POSITION, CarrierLimits, Scenario
 from .spline import Values
 
@@ -90,7 +90,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
         offset = [spread(scenario, index) @ column[layout.a] for column in columns]
         total = _total(scenario, h, motion, offset, jerk)
         _carrier_rows(scenario, robot.carriers[index].name, limit, total, values, rows)
-    function = ca.Function("interval", [x, x_end, parameters, parameters_end], [cost, ca.vertcat(*values)])
+    inputs = [x, x_end, parameters, parameters_end]
+    function = ca.Function("interval", inputs, [cost, ca.vertcat(*values)], differentiated(4, 2))
     return Interval(function, flow, rows, gaps)
 
 

@@ -18,6 +18,7 @@ from .task import Task, read_task
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
+COARSE = 50  # steps: from four times as many on, the optimum of so few is found first
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
@@ -124,16 +125,20 @@ class _Search:
         if self._progress is not None:
             self._progress(iteration, objective, infeasibility)
 
-    def solve(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
+    def knows(self, mesh: Mesh) -> bool:
+        """Whether the program of `mesh` has been made: then it may have a solution to start from."""
+        return mesh in self._solvers
+
+    def solve(self, mesh: Mesh, guess: Deviation | None, coarser: bool = False) -> Outcome:
         """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
         start = time.perf_counter()
         if mesh not in self._solvers:
             self._solvers[mesh] = Solver(build(self.scenario, mesh))
         solver = self._solvers[mesh]
-        solver.prepare(guess)
+        solver.prepare(guess, coarser)
         built = time.perf_counter()
         at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-        outcome = solver.solve(at, self._seen)
+        outcome = solver.solve(at, self._seen, coarser)
         self.build_s += built - start
         self.solve_s += time.perf_counter() - built
         return outcome
@@ -162,11 +167,21 @@ def _closest(search: _Search, closest: Outcome) -> Plan:
     return search.plan(PlanStatus.NOT_FOUND, closest, seen)
 
 
+def _coarse(search: _Search) -> Deviation | None:
+    """The optimum on a coarse mesh, to start a fine one from; None where that would save no time."""
+    steps = search.scenario.task.steps
+    if steps < 4 * COARSE or search.knows(Mesh(steps)):
+        return None
+    outcome = search.solve(Mesh(COARSE), None)
+    return outcome.deviation if outcome.success else None
+
+
 def _free_motion(search: _Search, start: Deviation | None) -> Plan:
     """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
     scenario = search.scenario
     steps = scenario.task.steps
-    outcome = search.solve(Mesh(steps), start)
+    coarse = _coarse(search) if start is None else None
+    outcome = search.solve(Mesh(steps), start or coarse, coarser=coarse is not None)
     if not outcome.success:
         closest = search.solve(Mesh(steps, elastic=True), None)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import casadi as ca
 
@@ -11,7 +11,7 @@ from .layout import DURATION, Layout
 from .scenario import Scenario
 from .spline import Values
 
-__all__ = ["OTHER_COSTS", "Mesh", "Row", "motions", "spread", "stretch"]
+__all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "spread", "stretch"]
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
@@ -43,6 +43,14 @@ def stretch(layout: Layout, x: Values) -> Values:
     """The duration of column x, relative to that of the references."""
     place = layout.at(DURATION)
     return 1.0 if place is None else x[place]
+
+
+def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
+    """Options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
+
+    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as long.
+    """
+    return {"cse": True, "is_diff_in": [i < unknown for i in range(inputs)]}
 
 
 def spread(scenario: Scenario, owner: int | None) -> ca.DM:

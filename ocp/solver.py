@@ -41,7 +41,12 @@ _FROM_A_GUESS = {"mu_init": 1e-2}
 _FROM_A_MOTION = {"mu_init": 1e-3}
 
 
-# A solution with its multipliers is nearer still.
+# The same task's optimum on a coarser mesh is nearer still: paper F's circle then takes 5 to 8 iterations from N = 100
+# to 1600, and 6 to 40 from the barrier above.
+_FROM_COARSER = {"mu_init": 1e-5}
+
+
+# A solution with its multipliers is the nearest.
 _FROM_A_SOLUTION = {
     "mu_init": 1e-6,
     "warm_start_init_point": "yes",
@@ -53,7 +58,12 @@ _FROM_A_SOLUTION = {
 }
 
 
-_STARTS: dict[str, dict[str, Any]] = {"guess": _FROM_A_GUESS, "motion": _FROM_A_MOTION, "solution": _FROM_A_SOLUTION}
+_STARTS: dict[str, dict[str, Any]] = {
+    "guess": _FROM_A_GUESS,
+    "motion": _FROM_A_MOTION,
+    "coarser": _FROM_COARSER,
+    "solution": _FROM_A_SOLUTION,
+}
 
 
 FATROP_STATUS = {0: "Solve_Succeeded", 1: "Maximum_Iterations_Exceeded"}  # fatrop's numbers in IPOPT's words
@@ -69,9 +79,10 @@ class Solver:
         self._solvers: dict[str, ca.Function] = {}
         self._last: dict[str, ca.DM] | None = None
 
-    def prepare(self, guess: Deviation | None) -> ca.Function:
+    def prepare(self, guess: Deviation | None, coarser: bool = False) -> ca.Function:
         """The solver for a run from `guess`, made when it is first asked for."""
-        start = "motion" if guess is not None else "guess" if self._last is None else "solution"
+        own = "guess" if self._last is None else "solution"
+        start = own if guess is None else "coarser" if coarser else "motion"
         if start not in self._solvers:
             self._solvers[start] = self._make(_STARTS[start])
         return self._solvers[start]
@@ -107,10 +118,11 @@ class Solver:
             "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | asked,
         }
 
-    def solve(self, guess: Deviation | None, progress: Progress | None = None) -> Outcome:
+    def solve(self, guess: Deviation | None, progress: Progress | None = None, coarser: bool = False) -> Outcome:
         """Solve from `guess`; None: from the last solution and its multipliers, or else from a guess of our own.
 
-        That nothing is found is told, not raised.
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh. That nothing is found is told, not
+        raised.
 
         Raises
         ------
@@ -126,7 +138,7 @@ class Solver:
             "lbg": program.lower_g,
             "ubg": program.upper_g,
         }
-        nlp = self.prepare(guess)
+        nlp = self.prepare(guess, coarser)
         if guess is not None or self._last is None:
             if guess is None:
                 guess = initial_guess(program.scenario, program.shares * program.scenario.duration)

@@ -160,7 +160,7 @@ def test_least_square_acceleration_is_the_cubic(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_minimum_time_keeps_its_limits(name):
-    """Up with g, down with g: T = 2 sqrt(d / g). Schemes whose acceleration jumps get nearest."""
+    """Up with g, down with g: T = 2 sqrt(d / g)."""
     task = {
         "path": {"kind": "line", "start": [0, 0, 0.5], "end": [0, 0, 1.5]},
         "tube": {"position": "free", "ends": "exact"},
@@ -172,7 +172,7 @@ def test_minimum_time_keeps_its_limits(name):
     found = plan(hoist(), task)
     assert found.feasible, found.report()
     shortest = 2 * np.sqrt(1 / GRAVITY)
-    assert shortest * (1 - 1e-6) <= found.scenario.duration <= (1.05 if name == "spline" else 1.02) * shortest
+    assert shortest * (1 - 1e-6) <= found.scenario.duration <= 1.02 * shortest
 
 
 def test_more_balances_miss_less_between_them():
