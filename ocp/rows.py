@@ -48,7 +48,8 @@ def stretch(layout: Layout, x: Values) -> Values:
 def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
     """Options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
 
-    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as long.
+    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
+    long.
     """
     return {"cse": True, "is_diff_in": [i < unknown for i in range(inputs)]}
 
