@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from .scenario import Scenario
 
 __all__ = ["Layout"]
@@ -15,7 +13,10 @@ DURATION, MARGIN = "duration", "margin"
 
 @dataclass(frozen=True)
 class Layout:
-    """The column of a node: q, v, a (n each), tensions (m), missing wrench (6 or 0), one slack a soft limit, `carried`.
+    """A point's column: q, v, a (n each), tensions (m), missing wrench (6 or 0), one slack a soft limit, `carried`.
+
+    A smooth scheme's column has jerk and snap after a, times the first and second power of an interval's length at the
+    scenario's duration: so they are of the size of a.
 
     What all nodes share, the duration and the margin, each node carries a copy of, equal to the next one's: so the
     program stays banded.
@@ -23,6 +24,7 @@ class Layout:
 
     n: int
     m: int
+    derivatives: int
     elastic: bool
     soft: int
     carried: tuple[str, ...]
@@ -33,7 +35,7 @@ class Layout:
         carried = [DURATION] * (scenario.duration_range is not None)
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
         soft = 0 if elastic else len(scenario.task.limits.soft)
-        return Layout(scenario.count, scenario.robot.m, elastic, soft, tuple(carried))
+        return Layout(scenario.count, scenario.robot.m, scenario.scheme.derivatives, elastic, soft, tuple(carried))
 
     @property
     def q(self) -> slice:
@@ -51,14 +53,29 @@ class Layout:
         return slice(2 * self.n, 3 * self.n)
 
     @property
+    def jerk(self) -> slice:
+        """Of a smooth scheme; else empty."""
+        return slice(3 * self.n, max(self.derivatives - 1, 3) * self.n)
+
+    @property
+    def snap(self) -> slice:
+        """Of a smooth scheme; else empty."""
+        return slice(self.jerk.stop, self.motion.stop)
+
+    @property
+    def motion(self) -> slice:
+        """All of these."""
+        return slice(0, self.derivatives * self.n)
+
+    @property
     def tensions(self) -> slice:
         """In units of the robot's force."""
-        return slice(3 * self.n, 3 * self.n + self.m)
+        return slice(self.motion.stop, self.motion.stop + self.m)
 
     @property
     def missing(self) -> slice:
         """Missing wrench, of an elastic program."""
-        start = 3 * self.n + self.m
+        start = self.tensions.stop
         return slice(start, start + 6 * self.elastic)
 
     @property
@@ -81,7 +98,3 @@ class Layout:
     def width(self) -> int:
         """How many unknowns a node has."""
         return self.shared.stop
-
-    def columns(self, x: np.ndarray) -> np.ndarray:
-        """A program's unknowns, a row for each node."""
-        return x.reshape(-1, self.width)

@@ -7,7 +7,7 @@ import numpy as np
 
 from .layout import MARGIN, Layout
 from .limits import limits as limits_of
-from .rows import OTHER_COSTS, Mesh, Row, motions
+from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions
 from .scenario import POSITION, Scenario
 
 __all__ = ["node_function"]
@@ -61,7 +61,7 @@ def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Fu
     if scenario.relative:
         platform = list(dynamics.relative.motion_in_world(*platform, *carriers[0]))
     cost += _limit_rows(scenario, mesh, layout, x, [platform, *carriers], tensions, values, rows)
-    return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)]), rows
+    return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)], differentiated(2, 1)), rows
 
 
 def _limit_rows(

@@ -34,6 +34,7 @@ from .timing import Timing
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
+COARSE = 50  # steps: from four times as many on, the optimum of so few is found first
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
@@ -216,11 +217,21 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
     return Plan(slowest, PlanStatus.INFEASIBLE, None, seen, 0.0, 0.0, relaxed=relaxed), own
 
 
+def _coarse(search: Search) -> Deviation | None:
+    """The optimum on a coarse mesh, to start a fine one from; None where that would save no time."""
+    steps = search.scenario.task.steps
+    if steps < 4 * COARSE or search.knows(Mesh(steps)):
+        return None
+    outcome = search.solve("coarse program", Mesh(COARSE), None)
+    return outcome.deviation if outcome.success else None
+
+
 def _free_motion(search: Search, start: Deviation | None) -> Plan:
     """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
     scenario = search.scenario
     steps = scenario.task.steps
-    outcome = search.solve("program", Mesh(steps), start)
+    coarse = _coarse(search) if start is None else None
+    outcome = search.solve("program", Mesh(steps), start or coarse, coarser=coarse is not None)
     if not outcome.success:
         closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import casadi as ca
 
 from .layout import DURATION, Layout
 from .scenario import Scenario
+from .spline import Values
 
-__all__ = ["OTHER_COSTS", "Mesh", "Row", "motions", "stretch"]
+__all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "spread", "stretch"]
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
@@ -38,10 +39,28 @@ class Mesh:
     elastic: bool = False
 
 
-def stretch(layout: Layout, x: ca.SX) -> ca.SX | float:
+def stretch(layout: Layout, x: Values) -> Values:
     """The duration of column x, relative to that of the references."""
     place = layout.at(DURATION)
     return 1.0 if place is None else x[place]
+
+
+def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
+    """Options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
+
+    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
+    long.
+    """
+    return {"cse": True, "is_diff_in": [i < unknown for i in range(inputs)]}
+
+
+def spread(scenario: Scenario, owner: int | None) -> ca.DM:
+    """From free coordinates to the six of the platform (None) or of a carrier, (6, n)."""
+    chosen = ca.DM(6, scenario.count)
+    for column, (whose, coordinate) in enumerate(scenario.owners()):
+        if whose == owner:
+            chosen[coordinate, column] = 1
+    return chosen
 
 
 def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> list[list[ca.SX]]:
@@ -50,10 +69,7 @@ def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> 
     scale = stretch(layout, x)
     found = []
     for position, owner in enumerate(owners):
-        chosen = ca.DM(6, layout.n)
-        for column, (whose, coordinate) in enumerate(scenario.owners()):
-            if whose == owner:
-                chosen[coordinate, column] = 1
+        chosen = spread(scenario, owner)
         reference = ca.vertsplit(parameters[18 * position : 18 * (position + 1)], 6)
         deviation = (x[layout.q], x[layout.v], x[layout.a])
         found.append(

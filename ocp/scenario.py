@@ -1,7 +1,7 @@
 """A task laid out for one robot: reference motions at any time, and which coordinates are free to deviate from them.
 
 Every motion is a reference plus a deviation: the platform follows its path inside a tube, a free carrier moves about
-its home. The deviations are the unknowns of the planner, cubic splines of the time.
+its home. The deviations are the unknowns of the planner, piecewise polynomials of the time (`scheme`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import InputError
 from ..models import Dynamics, Robot
 from ..models.robot import MobileCarrier, QuadrotorCarrier
-from . import spline
 from .path import AnyPath, Motion, RestPath
+from .scheme import LINEAR, SCHEMES, Scheme
 from .task import DurationRange, FreeBase, GivenBase, HoldBase, Task
 
 POSITION, ATTITUDE = range(3), range(3, 6)
@@ -44,19 +44,33 @@ class CarrierLimits:
 
 @dataclass(frozen=True)
 class Deviation:
-    """Values of the free coordinates at the nodes of a transcription."""
+    """Values of the free coordinates at the points of a transcription, and by its scheme at all times between.
+
+    A scheme with inner points has those among the nodes.
+    """
 
     nodes: np.ndarray  # (k,) [s]
     q: np.ndarray  # (k, n)
     v: np.ndarray  # (k, n)
     a: np.ndarray  # (k, n)
     tensions: np.ndarray  # (k, m) [N]
+    scheme: Scheme = LINEAR
+    jerk: np.ndarray | None = None  # (k, n), where the scheme is smooth
+
+    def evaluate(self, times: np.ndarray) -> list[np.ndarray]:
+        """q, v, a and jerk at `times` (k,), (k, n) each."""
+        return self.scheme.evaluate(self.nodes, (self.q, self.v, self.a), self.jerk, times)
 
     def at(self, nodes: np.ndarray) -> Deviation:
-        """The same motion at other nodes."""
-        values = spline.evaluate(self.nodes, self.q, self.v, self.a, nodes)
+        """The values of the same motion at other nodes, to start from: between them the line is assumed."""
+        q, v, a, jerk = self.evaluate(nodes)
         tensions = [np.interp(nodes, self.nodes, column) for column in self.tensions.T]
-        return Deviation(nodes, *values, np.stack(tensions, axis=1))
+        return Deviation(nodes, q, v, a, np.stack(tensions, axis=1), jerk=jerk)
+
+    def stretched(self, factor: float) -> Deviation:
+        """The same way in `factor` times the time."""
+        jerk = None if self.jerk is None else self.jerk / factor**3
+        return replace(self, nodes=self.nodes * factor, v=self.v / factor, a=self.a / factor**2, jerk=jerk)
 
 
 @dataclass(frozen=True)
@@ -85,6 +99,11 @@ class Scenario:
     limits: dict[int, CarrierLimits]
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it open: where the planner starts, then what it chose
+
+    @property
+    def scheme(self) -> Scheme:
+        """How the acceleration runs between the nodes."""
+        return SCHEMES[self.task.scheme]
 
     @property
     def duration_range(self) -> DurationRange | None:
@@ -133,7 +152,7 @@ class Scenario:
         """Platform, (n, 6) each, and carriers, (n, c, 6) each, in {G} with their deviations."""
         platform, carriers = self.references(times)
         if deviation is not None:
-            values = spline.evaluate(deviation.nodes, deviation.q, deviation.v, deviation.a, times)
+            values = deviation.evaluate(times)[:3]
             platform = platform.plus(self._spread(value, None) for value in values)
             carriers = [c.plus(self._spread(value, i) for value in values) for i, c in enumerate(carriers)]
         if self.relative:
@@ -202,6 +221,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         duration=task.seconds,
     )
     _check_times(task, where)
+    _check_transcription(task, where)
     return scenario
 
 
@@ -212,6 +232,22 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
         accepted = "world" if only is None else f"world, {only}"
         raise InputError(f"{where}: path.frame: {frame!r} is unknown; accepted: {accepted}")
     return frame != "world"
+
+
+def _check_transcription(task: Task, where: str) -> None:
+    """Refuse what the scheme or the solver cannot do."""
+    if task.solver == "fatrop" and getattr(task.base, "ends", None) == "periodic":
+        raise InputError(
+            f"{where}: solver: 'fatrop' goes from stage to stage, but base.ends: 'periodic' binds the last to the "
+            "first; accepted: ipopt, or base.ends free, rest or exact"
+        )
+    for name, value in (("limits", task.limits), ("objective", task.objective)):
+        if value.tension_rate is not None and not SCHEMES[task.scheme].continuous:
+            accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if scheme.continuous)
+            raise InputError(
+                f"{where}: {name}.tension_rate: {value.tension_rate:g} N/s, but with the scheme {task.scheme!r} "
+                f"tensions jump at the nodes; accepted: none, or scheme: {accepted}"
+            )
 
 
 def _check_times(task: Task, where: str) -> None:

@@ -46,17 +46,24 @@ class Search:
         if self._progress is not None:
             self._progress(iteration, objective, infeasibility)
 
-    def solve(self, name: str, mesh: Mesh, guess: Deviation | None) -> Outcome:
-        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
+    def knows(self, mesh: Mesh) -> bool:
+        """Whether the program of `mesh` has been made: then it may have a solution to start from."""
+        return mesh in self._solvers
+
+    def solve(self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False) -> Outcome:
+        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own.
+
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh.
+        """
         with self.rung(f"{name} of {mesh.steps} steps") as verdict:
             start = time.perf_counter()
             if mesh not in self._solvers:
                 self._solvers[mesh] = Solver(build(self.scenario, mesh))
             solver = self._solvers[mesh]
-            solver.prepare(guess)
+            solver.prepare(guess, coarser)
             built = time.perf_counter()
             at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-            outcome = solver.solve(at, self._seen)
+            outcome = solver.solve(at, self._seen, coarser)
             self.build_s += built - start
             self.solve_s += time.perf_counter() - built
             verdict.told = f"{outcome.message}, {outcome.iterations} iterations"

@@ -1,53 +1,73 @@
-"""Motions of piecewise linear acceleration: the exact integrator that the transcription uses.
+"""Polynomials by their Bernstein points: exact integrals, and bounds that hold between the nodes.
 
-Over an interval of h seconds from (q, v, a) at its start to a' at its end,
+Over an interval of h seconds a polynomial of degree d is sum_i p_i B_i(s), B_i(s) = C(d, i) s^i (1 - s)^(d - i), with
+s from 0 to 1. It starts at p_0, ends at p_d and lies inside the convex hull of all its points: a convex limit that
+holds at those holds at every time. The points of its integral from f are
 
-    v' = v + h/2 (a + a'),    q' = q + h v + h^2/6 (2 a + a'),
+    f,  f + h/(d + 1) p_0,  f + h/(d + 1) (p_0 + p_1),  ...,
 
-so q is a cubic spline and its acceleration, and with it the tension, is continuous. A cubic lies inside the convex
-hull of its Bernstein points: a convex limit that holds at those holds at every time between the nodes.
+so of an acceleration that is a polynomial, speed and position are known exactly.
 
-All functions take NumPy arrays and CasADi expressions.
+Points are NumPy arrays or CasADi expressions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+from math import comb
 from typing import Any, TypeAlias
 
 import numpy as np
 
+__all__ = ["basis", "derivative", "integral", "joined", "mean_square", "value"]
+
 Values: TypeAlias = Any  # np.ndarray or a CasADi expression
 
 
-def defects(
-    h: Values, start: tuple[Values, Values, Values], end: tuple[Values, Values, Values]
-) -> tuple[Values, Values]:
-    """How far (q', v') at the end is from what integration gives; zero on a motion."""
-    q, v, a = start
-    q_end, v_end, a_end = end
-    return q_end - (q + h * v + h**2 / 6 * (2 * a + a_end)), v_end - (v + h / 2 * (a + a_end))
+def basis(degree: int, shares: np.ndarray | Sequence[float]) -> np.ndarray:
+    """B_i at each share of an interval, (k, degree + 1)."""
+    s = np.asarray(shares, dtype=float)[:, None]
+    i = np.arange(degree + 1)
+    return np.array([comb(degree, j) for j in i]) * s**i * (1 - s) ** (degree - i)
 
 
-def position_points(h: Values, q: Values, v: Values, q_end: Values, v_end: Values) -> list[Values]:
-    """The two inner Bernstein points of the cubic q; the outer two are q and q'."""
-    return [q + h / 3 * v, q_end - h / 3 * v_end]
+def integral(h: Values, start: Values, points: Sequence[Values]) -> list[Values]:
+    """Points of the integral that begins at `start`."""
+    found = [start]
+    for point in points:
+        found.append(found[-1] + h / len(points) * point)
+    return found
 
 
-def speed_point(h: Values, v: Values, a: Values) -> Values:
-    """The inner Bernstein point of the quadratic v; the outer two are v and v'."""
-    return v + h / 2 * a
+def derivative(h: Values, points: Sequence[Values]) -> list[Values]:
+    """Points of the time derivative."""
+    degree = len(points) - 1
+    return [degree / h * (after - before) for before, after in pairwise(points)]
 
 
-def evaluate(
-    nodes: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray, times: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position, velocity and acceleration at `times`, (n, c) each, of the spline with values (k, c) at `nodes` (k,)."""
-    index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, len(nodes) - 2)
-    h = (nodes[index + 1] - nodes[index])[:, None]
-    s = times[:, None] - nodes[index][:, None]
-    start, slope = a[index], (a[index + 1] - a[index]) / h
-    return (
-        q[index] + s * v[index] + s**2 / 2 * start + s**3 / 6 * slope,
-        v[index] + s * start + s**2 / 2 * slope,
-        start + s * slope,
-    )
+def value(points: Sequence[Values], share: float) -> Values:
+    """The polynomial at one share of the interval."""
+    return sum(float(b) * point for b, point in zip(basis(len(points) - 1, [share])[0], points, strict=True) if b != 0)
+
+
+def joined(h: Values, points: Sequence[Values], speed: Values, end: Values, end_speed: Values) -> list[Values]:
+    """Points of a position whose last two are told by where it ends, not by integration over the whole interval.
+
+    On a motion they are the same; in a program they depend on fewer unknowns, and the limits at both sides of a node
+    are the same ones.
+    """
+    degree = len(points) - 1
+    if degree < 3:
+        return [*points[:-1], end]
+    return [points[0], points[0] + h / degree * speed, *points[2:-2], end - h / degree * end_speed, end]
+
+
+def mean_square(points: Sequence[Values], square: Any) -> Values:
+    """Mean over the interval of a polynomial's square; `square(a, b)` is the product of two points."""
+    n = len(points) - 1
+    total: Values = 0.0
+    for i, a in enumerate(points):
+        for j, b in enumerate(points):
+            total = total + comb(n, i) * comb(n, j) / ((2 * n + 1) * comb(2 * n, i + j)) * square(a, b)
+    return total

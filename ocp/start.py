@@ -100,5 +100,4 @@ def _lasting(scenario: Scenario, theirs: Deviation) -> Deviation:
     seconds, span = scenario.duration, scenario.duration_range
     if span is not None:
         seconds = float(np.clip(theirs.nodes[-1], span.min, span.max))
-    stretch = seconds / theirs.nodes[-1]
-    return Deviation(theirs.nodes * stretch, theirs.q, theirs.v / stretch, theirs.a / stretch**2, theirs.tensions)
+    return theirs.stretched(seconds / theirs.nodes[-1])

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..models.parsing import read_yaml, validate
 from ..models.robot import Name, NonNegative, Part, Pose, Positive, Vector3
 from .path import AnyPath
+from .scheme import SchemeName
 from .task_limits import TaskLimits
 
 FREE_TURN = 1.2  # [rad], from the path's angles, short of where Euler angles lose their meaning
@@ -134,6 +135,14 @@ class Task(Part):
     wind: Vector3 | None = Field(default=None, description="constant, in {G} [m/s]; none: no air")
     limits: TaskLimits = TaskLimits()
     steps: int = Field(default=100, ge=4, le=20_000, description="intervals of the transcription")
+    scheme: SchemeName = Field(
+        default="linear",
+        description="how the acceleration runs in an interval: constant; linear; hermite and gauss: quadratic, with "
+        "more balances A t = w; spline: a cubic B-spline, smooth",
+    )
+    solver: Literal["ipopt", "fatrop"] = Field(
+        default="ipopt", description="of the nonlinear program; fatrop takes tasks without periodic ends"
+    )
     objective: Objective = Objective()
     output_rate: Positive = Field(
         default=100.0, description="samples of the saved trajectory, each of them audited [1/s]"

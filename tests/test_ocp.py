@@ -11,7 +11,7 @@ from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.models.statics import equilibria
-from towline.ocp import PlanStatus, Task, plan, read_task, spline
+from towline.ocp import PlanStatus, Task, plan, read_task
 from towline.ocp.audit import audit
 from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
 from towline.ocp.scenario import Deviation, lay_out
@@ -55,35 +55,6 @@ def test_paths_go_where_they_are_told():
     np.testing.assert_allclose(line.velocity, 0, atol=1e-12)
     radius = np.linalg.norm((PATHS["helix"].at(np.array([1.0]), 4.0).pose[0, :3] - [1.1, 2.2, 3.3])[:2])
     assert radius == pytest.approx(0.5)
-
-
-def test_spline_is_integrated_exactly_and_bounded_by_its_points():
-    rng = np.random.default_rng(7)
-    nodes, a = np.linspace(0, 2, 6), rng.normal(size=(6, 3))
-    q, v = np.zeros((6, 3)), np.zeros((6, 3))
-    q[0], v[0] = rng.normal(size=(2, 3))
-    h = nodes[1]
-    for k in range(5):
-        # Integrate the linear acceleration with Gauss-Legendre quadrature, which is exact for it.
-        s, weight = np.polynomial.legendre.leggauss(4)
-        s, weight = h * (s + 1) / 2, h * weight / 2
-        acceleration = a[k] + s[:, None] / h * (a[k + 1] - a[k])
-        v[k + 1] = v[k] + weight @ acceleration
-        q[k + 1] = q[k] + h * v[k] + (weight * (h - s)) @ acceleration
-        defects = spline.defects(h, (q[k], v[k], a[k]), (q[k + 1], v[k + 1], a[k + 1]))
-        np.testing.assert_allclose(np.array(defects), 0, atol=1e-14)
-    times = np.linspace(0, 2, 2001)
-    position, speed, acceleration = spline.evaluate(nodes, q, v, a, times)
-    np.testing.assert_allclose(position[::400], q, atol=1e-14)
-    np.testing.assert_allclose(np.gradient(position, times, axis=0)[1:-1], speed[1:-1], atol=1e-5)
-    np.testing.assert_allclose(np.gradient(speed, times, axis=0)[1:-1], acceleration[1:-1], atol=2e-2)
-    for k in range(5):
-        inside = (times >= nodes[k]) & (times <= nodes[k + 1])
-        points = np.array([q[k], *spline.position_points(h, q[k], v[k], q[k + 1], v[k + 1]), q[k + 1]])
-        assert (position[inside] <= points.max(axis=0) + 1e-12).all()
-        assert (position[inside] >= points.min(axis=0) - 1e-12).all()
-        speeds = np.array([v[k], spline.speed_point(h, v[k], a[k]), v[k + 1]])
-        assert (speed[inside] <= speeds.max(axis=0) + 1e-12).all()
 
 
 def judge(robot, trajectory, margin=0.0, residual=1e-6):

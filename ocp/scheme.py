@@ -1,0 +1,183 @@
+"""Transcription schemes: which polynomial of time the acceleration is between two nodes, and where A t = w is asked.
+
+Inverse dynamics makes the differential equation a chain of integrators, which every scheme integrates exactly: position
+and speed at the nodes are no approximation. Schemes differ in two choices only:
+
+    constant   acceleration constant, jumps at the nodes; balance in the middle of each interval
+    linear     acceleration linear and continuous; balance at the nodes
+    hermite    acceleration quadratic and continuous; balance at the nodes and in the middle (Hermite-Simpson)
+    gauss      acceleration quadratic, jumps at the nodes; balance at the three Gauss points of each interval
+    spline     acceleration a cubic B-spline, twice continuously differentiable; balance at the nodes
+
+A robot with enough cables has tensions between those points too, wherever its limits leave room; one with few has them
+only as exactly as the polynomial follows the motion that it can make. There the order counts: two balances an interval
+with a quadratic miss far less than one with a line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from . import spline
+from .spline import Values
+
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+__all__ = ["LINEAR", "SCHEMES", "Scheme", "SchemeName"]
+
+SchemeName = Literal["constant", "linear", "hermite", "gauss", "spline"]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """One scheme.
+
+    An interval has a point at its start, one at each share in `inner`, and one at its end, which is the next
+    interval's start. Every point has q, v and a.
+
+    Attributes
+    ----------
+    degree
+        Of the acceleration.
+    inner
+        Where in an interval it has further points, shares of it.
+    weights
+        Of the quadrature over an interval, at its points from start to end.
+    continuous
+        Whether the acceleration is: then A t = w is asked at the nodes too, else at the inner points alone.
+    smooth
+        Whether jerk and snap, the next two derivatives, are unknowns at the nodes as well.
+    """
+
+    name: SchemeName
+    degree: int
+    inner: tuple[float, ...]
+    weights: tuple[float, ...]
+    continuous: bool = True
+    smooth: bool = False
+
+    @property
+    def size(self) -> int:
+        """How many points each interval adds."""
+        return 1 + len(self.inner)
+
+    @property
+    def derivatives(self) -> int:
+        """How many of q, v, a, jerk, snap are unknowns."""
+        return 5 if self.smooth else 3
+
+    def shares(self, steps: int) -> np.ndarray:
+        """Where the points of all intervals are, (steps * size + 1,), shares of the duration."""
+        starts = np.arange(steps)[:, None] + np.array([0.0, *self.inner])
+        return np.append(starts.ravel(), steps) / steps
+
+    def asked(self, steps: int) -> np.ndarray:
+        """At which points A t = w and the limits are asked, indices."""
+        points = np.arange(steps * self.size + 1)
+        return points if self.continuous else points[points % self.size != 0]
+
+    def quadrature(self, steps: int) -> np.ndarray:
+        """Weights of the mean over the duration at all points, (steps * size + 1,)."""
+        weights = np.zeros(steps * self.size + 1)
+        for k in range(steps):
+            weights[k * self.size : (k + 1) * self.size + 1] += np.array(self.weights) / steps
+        return weights + _snap_share(steps) / steps if self.smooth else weights
+
+    @cached_property
+    def _to_points(self) -> np.ndarray:
+        """From values where the balance is asked to Bernstein points of the polynomial through them."""
+        places = (0.0, *self.inner, 1.0) if self.continuous else self.inner
+        found = np.linalg.inv(spline.basis(self.degree, places))
+        return np.where(np.abs(found) < 1e-12, 0.0, found)
+
+    @property
+    def inner_points(self) -> tuple[int, ...]:
+        """Bernstein points of the acceleration that are no value at a point: limits are asked there too."""
+        is_value = [(row != 0).sum() == 1 for row in self._to_points] if not self.smooth else [True, False, False, True]
+        return tuple(i for i, known in enumerate(is_value) if not known)
+
+    def acceleration(self, h: Values, a: Sequence[Values], jerk: tuple[Values, Values] | None = None) -> list[Values]:
+        """Bernstein points of the acceleration over an interval, `degree` + 1.
+
+        Parameters
+        ----------
+        h
+            Length of the interval [s].
+        a
+            Accelerations at its points, start and end included.
+        jerk
+            At start and end, for a smooth scheme; None: none is known, the line between the ends.
+        """
+        if self.smooth:
+            start, end = a
+            rise = (end - start) / 3 if jerk is None else None
+            first, last = (rise, rise) if jerk is None else (h / 3 * jerk[0], h / 3 * jerk[1])
+            return [start, start + first, end - last, end]
+        values = list(a) if self.continuous else list(a[1:-1])
+        return [
+            sum(float(w) * value for w, value in zip(row, values, strict=True) if w != 0) for row in self._to_points
+        ]
+
+    def evaluate(
+        self, nodes: np.ndarray, values: Motion, jerk: np.ndarray | None, times: np.ndarray
+    ) -> list[np.ndarray]:
+        """Position, velocity, acceleration and jerk at `times` (k,), (k, n) each.
+
+        `values` are (q, v, a) at the points `nodes` of all intervals, (points, n) each, and `jerk` likewise or None. At
+        a node where the acceleration jumps it is that of the interval to come.
+        """
+        size = self.size
+        starts = nodes[::size]
+        q, v = (part[:-1:size] for part in values[:2])
+        h = np.diff(starts)[:, None]
+        a = [values[2][i:-1:size] for i in range(size)] + [values[2][size::size]]
+        acceleration = self.acceleration(h, a, None if jerk is None else (jerk[:-1], jerk[1:]))
+        speed = spline.integral(h, v, acceleration)
+        position = spline.integral(h, q, speed)
+        change = spline.derivative(h, acceleration) if self.degree else [np.zeros_like(v)]
+        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 2)
+        shares = (times - starts[index]) / h[index, 0]
+        found = []
+        for points in (position, speed, acceleration, change):
+            weights = spline.basis(len(points) - 1, shares)
+            found.append(sum(weights[:, i : i + 1] * point[index] for i, point in enumerate(points)))
+        return found
+
+
+def _snap_share(steps: int) -> np.ndarray:
+    """What the mean of a cubic spline through values at the nodes has beyond the trapezoid rule, (steps + 1,) weights.
+
+    Over an interval the mean is (a + a')/2 - h^2/24 (s + s') with the snaps of s_{k-1} + 4 s_k + s_{k+1} =
+    6/h^2 (a_{k-1} - 2 a_k + a_{k+1}), equal in the first two nodes and in the last two. With other weights for the cost
+    than for the motion the ends would be used to move for less.
+    """
+    snaps = 4 * np.eye(steps + 1) + np.eye(steps + 1, k=1) + np.eye(steps + 1, k=-1)
+    snaps[0, :2] = snaps[-1, :-3:-1] = 1, -1
+    counted = np.full(steps + 1, -2 / 24)
+    counted[[0, -1]] /= 2
+    back = 6 * np.linalg.solve(snaps.T, counted)
+    back[[0, -1]] = 0.0  # the rows of the two ends have no second difference
+    found = -2 * back
+    found[:-1] += back[1:]
+    found[1:] += back[:-1]
+    return found
+
+
+_GAUSS = 0.5 * np.sqrt(0.6)
+
+SCHEMES: dict[str, Scheme] = {
+    scheme.name: scheme
+    for scheme in (
+        Scheme("constant", 0, (0.5,), (0.0, 1.0, 0.0), continuous=False),
+        Scheme("linear", 1, (), (0.5, 0.5)),
+        Scheme("hermite", 2, (0.5,), (1 / 6, 2 / 3, 1 / 6)),
+        Scheme("gauss", 2, (0.5 - _GAUSS, 0.5, 0.5 + _GAUSS), (0.0, 5 / 18, 8 / 18, 5 / 18, 0.0), continuous=False),
+        Scheme("spline", 3, (), (0.5, 0.5), smooth=True),
+    )
+}
+LINEAR = SCHEMES["linear"]
