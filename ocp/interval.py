@@ -34,8 +34,13 @@ def interval_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[c
     rows += [("shared", 0.0, 0.0)] * len(layout.carried)
     if (most := scenario.task.limits.tension_rate) is not None:
         keep = most * (1.0 - mesh.shrink)
-        values.append(tension_rate / keep)
-        rows += [("tension_rate", -1.0, 1.0)] * robot.m
+        if (place := layout.slack_of("tension_rate")) is None:
+            values.append(tension_rate / keep)
+            rows += [("tension_rate", -1.0, 1.0)] * robot.m
+        else:
+            for sign in (1.0, -1.0):
+                values.append(sign * tension_rate / keep - x[place])
+                rows += [("tension_rate", -np.inf, 1.0)] * robot.m
 
     _tube_rows(scenario, h, start, end, values, rows)
     before, after = (motions(scenario, layout, *pair)[1:] for pair in ((x, parameters), (x_end, parameters_end)))

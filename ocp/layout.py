@@ -15,7 +15,10 @@ DURATION, MARGIN = "duration", "margin"
 
 @dataclass(frozen=True)
 class Layout:
-    """The column of a node: q, v, a (n each), tensions (m), missing wrench (6 or 0), one slack a soft limit, `carried`.
+    """The column of a node.
+
+    That is q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), missing wrenches (6 each or
+    0), one slack a soft limit, `carried`.
 
     What all nodes share, the duration and the margin, each node carries a copy of, equal to the next one's: so the
     program stays banded.
@@ -23,8 +26,9 @@ class Layout:
 
     n: int
     m: int
+    winds: int
     elastic: bool
-    soft: int
+    soft: tuple[str, ...]
     carried: tuple[str, ...]
 
     @staticmethod
@@ -32,8 +36,8 @@ class Layout:
         """The layout that a scenario needs."""
         carried = [DURATION] * (scenario.duration_range is not None)
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
-        soft = 0 if elastic else len(scenario.task.limits.soft)
-        return Layout(scenario.count, scenario.robot.m, elastic, soft, tuple(carried))
+        soft = tuple(scenario.task.limits.soft)
+        return Layout(scenario.count, scenario.robot.m, scenario.decisive_winds, elastic, soft, tuple(carried))
 
     @property
     def q(self) -> slice:
@@ -56,16 +60,26 @@ class Layout:
         return slice(3 * self.n, 3 * self.n + self.m)
 
     @property
+    def wind_tensions(self) -> slice:
+        """Those in the decisive winds of a box, one wind after another, likewise."""
+        start = self.tensions.stop
+        return slice(start, start + self.winds * self.m)
+
+    @property
     def missing(self) -> slice:
-        """Missing wrench, of an elastic program."""
-        start = 3 * self.n + self.m
-        return slice(start, start + 6 * self.elastic)
+        """Missing wrenches, of an elastic program: of the planned tensions, then of those in each decisive wind."""
+        start = self.wind_tensions.stop
+        return slice(start, start + 6 * (1 + self.winds) * self.elastic)
 
     @property
     def slacks(self) -> slice:
         """How far soft limits are passed, in their scale."""
         start = self.missing.stop
-        return slice(start, start + self.soft)
+        return slice(start, start + len(self.soft))
+
+    def slack_of(self, limit: str) -> int | None:
+        """Place of a soft limit's slack; None if the limit is hard."""
+        return self.slacks.start + self.soft.index(limit) if limit in self.soft else None
 
     @property
     def shared(self) -> slice:

@@ -48,8 +48,8 @@ class Limit(NamedTuple):
         A typical size in this unit.
     soft
         Amount beyond the bounds that costs one; None: hard.
-    equation
-        Whether the bounds are one: then it holds at the nodes, and between them nearly.
+    cosine
+        Whether values and bounds are cosines of the angle that `unit` is of: they have derivatives where it is zero.
     """
 
     name: str
@@ -60,6 +60,7 @@ class Limit(NamedTuple):
     labels: list[str]
     scale: float
     soft: float | None = None
+    cosine: bool = False
 
     @property
     def equation(self) -> bool:
@@ -135,13 +136,20 @@ def limits(scenario: Scenario) -> Limits:
 
 
 def _all(scenario: Scenario, state: State) -> list[Limit]:
-    found = [*_of_cables(scenario, state), *_of_platform(scenario, state), *_of_carriers(scenario, state)]
+    found = [*_of_cables(scenario, state), *_of_platform(scenario, state)]
+    found += [*_of_carriers(scenario, state), *_soft_of_carriers(scenario, state)]
     found += [limit for place in scenario.task.limits.keep_out for limit in _of_place(state, place)]
     for index, carrier in enumerate(scenario.robot.carriers):
         if isinstance(carrier, QuadrotorCarrier):
             found += _of_quadrotor(state, index, carrier)
-    soft = scenario.task.limits.soft
-    return [limit._replace(soft=soft.get(limit.name)) for limit in found]
+    return [_softened(limit, scenario.task.limits.soft) for limit in found]
+
+
+def _softened(limit: Limit, soft: dict[str, float]) -> Limit:
+    amount = soft.get(limit.name)
+    if amount is not None and limit.cosine:
+        amount *= float(np.sqrt(1 - limit.low**2))  # what the cosine changes by as the angle does
+    return limit._replace(soft=amount)
 
 
 def _cables(m: int) -> list[str]:
@@ -191,14 +199,40 @@ def _of_platform(scenario: Scenario, state: State) -> list[Limit]:
         if bound is not None:
             found.append(Limit(name, unit, ca.norm_2(value + 1e-9), 0.0, bound, ["platform"], bound))
     if asked.platform_tilt is not None:
-        # As the cosine, whose derivative exists when level too.
-        upright = ca.cos(pose[3]) * ca.cos(pose[4])
-        found.append(
-            Limit("platform_tilt", "(cosine)", upright, float(np.cos(asked.platform_tilt)), np.inf, ["platform"], 1.0)
-        )
+        found.append(_tilt("platform_tilt", pose, asked.platform_tilt, "platform"))
     if asked.platform_box is not None:
         for axis, low, high in zip(range(3), asked.platform_box.min, asked.platform_box.max, strict=True):
             found.append(Limit("platform_box", "m", pose[axis], low, high, [f"platform {'xyz'[axis]}"], 1.0))
+    return found
+
+
+def _tilt(name: str, pose: ca.SX, most: float, about: str) -> Limit:
+    """As the cosine, whose derivative exists when level too."""
+    upright = ca.cos(pose[3]) * ca.cos(pose[4])
+    return Limit(name, "rad", upright, float(np.cos(most)), np.inf, [about], 1.0, cosine=True)
+
+
+def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:
+    """Carriers' own limits that the task makes soft; the hard ones hold between the nodes too (`interval`)."""
+    found, soft = [], scenario.task.limits.soft
+    for index, limit in scenario.limits.items():
+        name = scenario.robot.carriers[index].name
+        pose, velocity, acceleration = state.carriers[index]
+        for quantity, value, bound, unit in (
+            ("carrier_speed", velocity, limit.speed, "m/s"),
+            ("carrier_acceleration", acceleration, limit.acceleration, "m/s^2"),
+        ):
+            if quantity in soft and bound is not None:
+                found.append(Limit(quantity, unit, ca.norm_2(value[:3] + 1e-9), 0.0, bound, [name], bound))
+        if "carrier_turn_acceleration" in soft and (turn := limit.turn_acceleration) is not None:
+            labels = [f"{name} roll", f"{name} pitch"]
+            found.append(Limit("carrier_turn_acceleration", "rad/s^2", acceleration[3:5], -turn, turn, labels, turn))
+        if "carrier_tilt" in soft and limit.tilt is not None:
+            found.append(_tilt("carrier_tilt", pose, limit.tilt, name))
+        if "carrier_reach" in soft and np.isfinite(limit.low).all():
+            for axis in range(3):
+                bounds = float(limit.low[axis]), float(limit.high[axis])
+                found.append(Limit("carrier_reach", "m", pose[axis], *bounds, [f"{name} {'xyz'[axis]}"], 1.0))
     return found
 
 
@@ -216,23 +250,31 @@ def _of_carriers(scenario: Scenario, state: State) -> list[Limit]:
 def _of_place(state: State, place: KeepOut) -> list[Limit]:
     robot, found = state.robot, []
     com = kinematics.transform(state.platform[0], np.array([robot.platform.com]))
-    points = ca.horzcat(com, state.attachments)
-    bodies = {
-        "platform": (place.platform, [(point_outside(place, points[:, i]), "platform") for i in range(robot.m + 1)]),
-        "carriers": (
+    points, anchors = ca.horzcat(com, state.attachments), state.anchors
+    carriers, attachments = ca.horzcat(*(carrier[0][:3] for carrier in state.carriers)), state.attachments
+    if place.frame == "platform":
+        R, origin = rotation(state.platform[0][3:6]), state.platform[0][:3]
+        anchors, carriers = (R.T @ (values - ca.repmat(origin, 1, values.shape[1])) for values in (anchors, carriers))
+        attachments = ca.SX(ca.DM(robot.attachments.T))
+    bodies = [
+        (
             place.carriers,
-            [(point_outside(place, c[0][:3]), robot.carriers[i].name) for i, c in enumerate(state.carriers)],
-        ),
-        "cables": (
-            place.cables,
             [
-                (cable_outside(place, state.attachments[:, i], state.anchors[:, i]), f"cable {i + 1}")
-                for i in range(robot.m)
+                (point_outside(place, carriers[:, i]), carrier.name)
+                for i, carrier in enumerate(robot.carriers)
+                if carrier.kind != "ground"
             ],
         ),
-    }
-    for distance, outside in bodies.values():
-        if distance is not None:
+        (
+            place.cables,
+            [(cable_outside(place, attachments[:, i], anchors[:, i]), f"cable {i + 1}") for i in range(robot.m)],
+        ),
+    ]
+    if place.frame == "world":
+        outside = [(point_outside(place, points[:, i]), "platform") for i in range(robot.m + 1)]
+        bodies.insert(0, (place.platform, outside))
+    for distance, outside in bodies:
+        if distance is not None and outside:
             values, labels = zip(*outside, strict=True)
             about = [f"{label} outside {place.name}" for label in labels]
             found.append(Limit("keep_out", "m", ca.vertcat(*values), distance, np.inf, about, 1.0))

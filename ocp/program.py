@@ -7,6 +7,7 @@ duration T too where the task leaves it open:
     s.t.  A(q_k) t_k = w(q_k, v_k, a_k)                                            at every node
           (q, v)_{k+1} = integral of the linear acceleration from a_k to a_{k+1}   (`spline`)
           t_min + margin <= t_k <= t_max - margin
+          the same two for tensions of their own in each decisive wind of a box      (`wind_set`)
           the limits of `limits`                                                   at every node
           tube, reach, speed, tilt at the Bernstein points, acceleration at the nodes: so they hold between nodes too
 
@@ -77,6 +78,7 @@ class Program:
         for part, values in ((layout.q, deviation.q), (layout.v, deviation.v), (layout.a, deviation.a)):
             columns[:, part] = values
         columns[:, layout.tensions] = deviation.tensions / self.scenario.robot.force_scale
+        columns[:, layout.wind_tensions] = np.tile(columns[:, layout.tensions], layout.winds)
         if (place := layout.at(DURATION)) is not None:
             columns[:, place] = deviation.nodes[-1] / self.scenario.duration
         return columns.ravel()
@@ -163,8 +165,9 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
     lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
     low, high = scenario.bounds()
     reserve = np.minimum(mesh.reserve, (high - low) / 4)
-    lower[:, layout.tensions] = (low + reserve) / scenario.robot.force_scale
-    upper[:, layout.tensions] = (high - reserve) / scenario.robot.force_scale
+    for part, count in ((layout.tensions, 1), (layout.wind_tensions, layout.winds)):
+        lower[:, part] = np.tile((low + reserve) / scenario.robot.force_scale, count)
+        upper[:, part] = np.tile((high - reserve) / scenario.robot.force_scale, count)
     lower[:, layout.slacks] = 0.0
     if (place := layout.at(DURATION)) is not None and (span := scenario.duration_range) is not None:
         lower[:, place], upper[:, place] = span.min / scenario.duration, span.max / scenario.duration

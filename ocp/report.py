@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..models import Robot
-from ..models.robot import COORDINATES
+from ..models.robot import COORDINATES, Vector3
 from ..solvers import Certificate
+from .task import Task
+from .wind_set import WindBox
 
 if TYPE_CHECKING:
     from .result import Plan
@@ -34,7 +36,7 @@ def sections(plan: Plan) -> list[Section]:
     titles = {"infeasible": "Why there is none", "not-found": "What the closest motion misses"}
     found = [
         Section(titles.get(plan.status.value, "Limits"), _why(plan)),
-        Section("Soft limits passed", [("limit", sentence) for sentence in plan.audit.soft_excess]),
+        Section("Soft limits passed", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
@@ -63,6 +65,8 @@ def _decisive(plan: Plan) -> str:
     if certificate is None:
         return broken or "see the solver's message"
     short = f"short by {_short(certificate.shortfall)} N at t = {plan.audit.certificate_time:.3f} s"
+    if (wind := plan.audit.certificate_wind) is not None:
+        short += f" at wind {_wind(wind)}"
     return f"{short}, {broken}" if broken else short
 
 
@@ -75,6 +79,7 @@ def _why(plan: Plan) -> list[Fact]:
         pulled = ": the cables can but pull the other way"
         facts += [
             ("time", f"t = {plan.audit.certificate_time:.3f} s of {plan.scenario.duration:g} s"),
+            *([("wind", _wind(wind))] if (wind := plan.audit.certificate_wind) is not None else []),
             ("constraint", _constraint(plan, certificate)),
             ("wrench direction", direction_in_words(certificate, robot)),
             ("as a vector", _vector(certificate)),
@@ -82,7 +87,7 @@ def _why(plan: Plan) -> list[Fact]:
             ("available", f"{_short(certificate.support)} N at most" + pulled * (certificate.support < 0)),
             ("short by", f"{_short(certificate.shortfall)} N"),
         ]
-    return facts + [("limit broken", sentence) for sentence in plan.audit.excess]
+    return facts + [("limit broken", str(excess)) for excess in plan.audit.excess]
 
 
 def _constraint(plan: Plan, certificate: Certificate) -> str:
@@ -178,8 +183,20 @@ def _motion(plan: Plan) -> list[Fact]:
         ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}"),
         ("tracking error", error),
         ("platform", f"up to {_short(speed)} m/s and {_short(acceleration)} m/s^2"),
-        *([("wind", f"({_listed(np.array(task.wind), 'g')}) m/s")] if task.wind is not None else []),
+        *([("wind", _asked_wind(task))] if task.wind is not None else []),
     ]
+
+
+def _wind(wind: Vector3) -> str:
+    return f"({_listed(np.array(wind), 'g')}) m/s"
+
+
+def _asked_wind(task: Task) -> str:
+    """The task's wind, or its box and whose tensions are told."""
+    if isinstance(task.wind, WindBox):
+        box = task.wind
+        return f"any from {_wind(box.min)} to {_wind(box.max)}; the tensions are those in {_wind(box.middle)}"
+    return "" if task.wind is None else _wind(task.wind)
 
 
 def _carriers(plan: Plan) -> list[Fact]:

@@ -29,7 +29,7 @@ class Outcome:
     success: bool  # whether all constraints are met; the message tells whether it is an optimum too
     message: str
     iterations: int
-    slack: float  # largest missing wrench at a node [N], zero in the rigid program
+    slack: float  # largest missing wrench at a node, in any wind [N], zero in the rigid program
 
 
 # The guess is near: IPOPT's default 0.1 throws it away, and "adaptive" took 8 times as long.
@@ -120,7 +120,7 @@ class Solver:
         x = result["x"].full().ravel()
         # A minimum time is often found long before IPOPT is sure that there is no shorter one.
         met = program.violation(x, result["g"].full().ravel()) <= MET
-        missing = program.layout.columns(x)[:, program.layout.missing]
+        missing = program.layout.columns(x)[:, program.layout.missing].reshape(-1, 6)
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
