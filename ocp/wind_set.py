@@ -104,7 +104,7 @@ def inner_winds(box: WindBox, count: int, first: int = 0) -> np.ndarray:
     index = np.arange(first + 1, first + count + 1)
     share = (0.5 + index[:, None] * _STEPS) % 1.0
     faces = np.flatnonzero(index % 4 == 0)
-    axis = (faces // 4) % 3
+    axis = (index[faces] // 4) % 3
     share[faces, axis] = np.round(share[faces, axis])
     low, high = np.array(box.min), np.array(box.max)
     return low + share * (high - low)
