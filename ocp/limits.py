@@ -166,6 +166,12 @@ def _of_cables(scenario: Scenario, state: State) -> list[Limit]:
         low, high = asked.cable_length.min, asked.cable_length.max
         size = max(abs(low), abs(high), 1e-3)
         found.append(Limit("cable_length", "m", state.run.lengths, low, high, _cables(robot.m), size))
+    if "margin" in asked.soft:
+        # Hard it bounds the tensions themselves.
+        low, high = ca.DM(robot.t_min), ca.DM(robot.t_max)
+        for inside in (state.tensions - low, high - state.tensions):
+            least = scenario.task.margin
+            found.append(Limit("margin", "N", inside, least, np.inf, _cables(robot.m), robot.force_scale))
     if asked.cable_clearance is not None:
         values, labels = [], []
         for i, j in combinations(range(robot.m), 2):
@@ -197,13 +203,18 @@ def _of_platform(scenario: Scenario, state: State) -> list[Limit]:
         ("platform_turn", body_rate(pose[3:6], velocity[3:6]), asked.platform_turn, "rad/s"),
     ):
         if bound is not None:
-            found.append(Limit(name, unit, ca.norm_2(value + 1e-9), 0.0, bound, ["platform"], bound))
+            found.append(Limit(name, unit, _size(value, bound), 0.0, bound, ["platform"], bound))
     if asked.platform_tilt is not None:
         found.append(_tilt("platform_tilt", pose, asked.platform_tilt, "platform"))
     if asked.platform_box is not None:
         for axis, low, high in zip(range(3), asked.platform_box.min, asked.platform_box.max, strict=True):
             found.append(Limit("platform_box", "m", pose[axis], low, high, [f"platform {'xyz'[axis]}"], 1.0))
     return found
+
+
+def _size(value: ca.SX, bound: float) -> ca.SX:
+    """|value|, larger by 5e-7 of the bound there: round at zero, where a motion rests and a norm has a corner."""
+    return ca.sqrt(ca.sumsqr(value) + (1e-3 * bound) ** 2)
 
 
 def _tilt(name: str, pose: ca.SX, most: float, about: str) -> Limit:
@@ -223,7 +234,7 @@ def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:
             ("carrier_acceleration", acceleration, limit.acceleration, "m/s^2"),
         ):
             if quantity in soft and bound is not None:
-                found.append(Limit(quantity, unit, ca.norm_2(value[:3] + 1e-9), 0.0, bound, [name], bound))
+                found.append(Limit(quantity, unit, _size(value[:3], bound), 0.0, bound, [name], bound))
         if "carrier_turn_acceleration" in soft and (turn := limit.turn_acceleration) is not None:
             labels = [f"{name} roll", f"{name} pitch"]
             found.append(Limit("carrier_turn_acceleration", "rad/s^2", acceleration[3:5], -turn, turn, labels, turn))
@@ -248,16 +259,19 @@ def _of_carriers(scenario: Scenario, state: State) -> list[Limit]:
 
 
 def _of_place(state: State, place: KeepOut) -> list[Limit]:
-    robot, found = state.robot, []
-    com = kinematics.transform(state.platform[0], np.array([robot.platform.com]))
-    points, anchors = ca.horzcat(com, state.attachments), state.anchors
-    carriers, attachments = ca.horzcat(*(carrier[0][:3] for carrier in state.carriers)), state.attachments
-    if place.frame == "platform":
+    robot, riding = state.robot, place.frame == "platform"
+    anchors, attachments = state.anchors, state.attachments
+    carriers = ca.horzcat(*(carrier[0][:3] for carrier in state.carriers))
+    if riding:
         R, origin = rotation(state.platform[0][3:6]), state.platform[0][:3]
-        anchors, carriers = (R.T @ (values - ca.repmat(origin, 1, values.shape[1])) for values in (anchors, carriers))
+        anchors, carriers = (R.T @ (points - ca.repmat(origin, 1, points.shape[1])) for points in (anchors, carriers))
         attachments = ca.SX(ca.DM(robot.attachments.T))
+    com = kinematics.transform(state.platform[0], np.array([robot.platform.com]))
+    of_platform = ca.horzsplit(ca.horzcat(com, attachments))
     bodies = [
+        ("keep_out", place.platform, [] if riding else [(point_outside(place, p), "platform") for p in of_platform]),
         (
+            "carrier_platform_clearance" if riding else "keep_out",
             place.carriers,
             [
                 (point_outside(place, carriers[:, i]), carrier.name)
@@ -266,18 +280,17 @@ def _of_place(state: State, place: KeepOut) -> list[Limit]:
             ],
         ),
         (
+            "cable_platform_clearance" if riding else "keep_out",
             place.cables,
             [(cable_outside(place, attachments[:, i], anchors[:, i]), f"cable {i + 1}") for i in range(robot.m)],
         ),
     ]
-    if place.frame == "world":
-        outside = [(point_outside(place, points[:, i]), "platform") for i in range(robot.m + 1)]
-        bodies.insert(0, (place.platform, outside))
-    for distance, outside in bodies:
+    found = []
+    for name, distance, outside in bodies:
         if distance is not None and outside:
             values, labels = zip(*outside, strict=True)
             about = [f"{label} outside {place.name}" for label in labels]
-            found.append(Limit("keep_out", "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
+            found.append(Limit(name, "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
     return found
 
 

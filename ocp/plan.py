@@ -185,5 +185,4 @@ def _free_motion(search: _Search, start: Deviation | None) -> Plan:
         shrink = SHRINK * attempt if seen.excess else shrink
         outcome = search.solve(Mesh(steps, reserve * scenario.robot.force_scale, shrink), outcome.deviation)
         seen = search.audit(outcome)
-    feasible = seen.passed and outcome.success
-    return search.plan(PlanStatus.FEASIBLE if feasible else PlanStatus.NOT_FOUND, outcome, seen)
+    return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, outcome, seen)

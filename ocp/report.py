@@ -100,7 +100,7 @@ def _constraint(plan: Plan, certificate: Certificate) -> str:
         for name, cables, bound in at
         if cables.size
     ]
-    margin = plan.scenario.task.margin
+    margin = plan.scenario.hard_margin
     return f"tension limits, {'; '.join(told)}" + (f", with the margin of {margin:g} N" if margin else "")
 
 

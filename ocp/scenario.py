@@ -139,8 +139,13 @@ class Scenario:
         return max(round(self.duration * self.task.output_rate), 1)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Tension limits less the task's margin, (m,) each [N]."""
-        return self.robot.t_min + self.task.margin, self.robot.t_max - self.task.margin
+        """Tension limits less the task's margin where that is hard, (m,) each [N]."""
+        return self.robot.t_min + self.hard_margin, self.robot.t_max - self.hard_margin
+
+    @property
+    def hard_margin(self) -> float:
+        """How far every tension has to stay inside its limits [N]; a soft margin is among `limits`."""
+        return 0.0 if "margin" in self.task.limits.soft else self.task.margin
 
     def references(self, times: np.ndarray) -> tuple[Motion, list[Motion]]:
         """The platform's path, in its own frame, and the carriers' reference motions in {G}."""

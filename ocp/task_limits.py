@@ -23,12 +23,17 @@ OF_CARRIERS = (
 )
 
 
+# Limits that places in the frame of the platform make.
+OF_BODY = ("cable_platform_clearance", "carrier_platform_clearance")
+
+
 class KeepOut(Part):
     """What all places to keep out of share: by how much platform, carriers and cables stay outside.
 
     The platform counts as its CoM and its attachments, a carrier that can move as its origin, a cable as the line
     between its ends. A place in the frame of the platform rides along with it: so the platform's own body is kept clear
-    of cables and carriers. Cables end at their attachments, so such a body has to leave these outside.
+    of cables and carriers, limits known as cable_platform_clearance and carrier_platform_clearance. Cables end at their
+    attachments, so such a body has to leave these outside.
     """
 
     name: str = Field(default="obstacle", min_length=1, max_length=60)
@@ -95,7 +100,7 @@ class TaskLimits(Part):
     ----------
     soft :
         By name of a limit, how much beyond it costs as much as one of the objective's numbers, in the limit's unit.
-        Carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
+        The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
         carrier_turn_acceleration, carrier_reach, thrust, torque.
     """
 
@@ -116,9 +121,11 @@ class TaskLimits(Part):
 
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
-        given = [name for name in type(self).model_fields if name != "soft" and getattr(self, name)]
+        given = [name for name in type(self).model_fields if name not in ("soft", "keep_out") and getattr(self, name)]
+        frames = {place.frame for place in self.keep_out}
+        given += ["keep_out"] * ("world" in frames) + list(OF_BODY) * ("platform" in frames)
         for name in self.soft:
-            if name not in (*given, *OF_CARRIERS):
-                accepted = ", ".join((*given, *OF_CARRIERS))
+            if name not in (*given, "margin", *OF_CARRIERS):
+                accepted = ", ".join((*given, "margin", *OF_CARRIERS))
                 raise ValueError(f"soft: {name!r} is none of this task's limits; accepted: {accepted}")
         return self

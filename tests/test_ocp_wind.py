@@ -149,7 +149,7 @@ def test_a_rest_leaves_exactly_as_much_as_the_box_needs(share, feasible):
 
 
 def test_a_free_motion_is_planned_so_that_every_wind_is_held():
-    """At random instants, in winds of the box, a linear program finds tensions; of a plan without the box, not always."""
+    """At random instants, in winds of the box, a linear program finds tensions; without the box it does not."""
     robot = load("wang-flying")
     box = {"min": [-8, -8, 0], "max": [8, 8, 0]}
     task = {"path": {**CIRCLE, "radius": 0.5}, "base": FREE, "steps": 30}
