@@ -161,9 +161,9 @@ TOWED = {
     "base": {"kind": "free", "ends": "rest"},
 }
 FLOWN = {
-    "path": {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0.3, -0.3]},
-    "duration": 2.0,
-    "steps": 40,
+    "path": {"kind": "line", "start": [0, 0, -1], "end": [0.25, 0.1, -0.8]},
+    "duration": 1.0,
+    "steps": 20,
     "base": {"kind": "free", "ends": "rest"},
     "tube": {"position": "free", "attitude": 0.3, "ends": "exact"},
     "objective": {"deviation": 0.3},
