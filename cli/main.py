@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TowlineError
-from . import bench, demo, export, import_, plan, robots, tension
+from . import bench, demo, export, import_, plan, robots, tension, time
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -24,6 +24,7 @@ app.command("demo")(demo.demo)
 app.command("robots")(robots.robots)
 app.command("tension")(tension.tension)
 app.command("plan")(plan.plan)
+app.command("time")(time.time)
 app.add_typer(import_.app, name="import")
 app.command("export")(export.export)
 app.add_typer(bench.app, name="bench")

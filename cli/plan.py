@@ -11,6 +11,14 @@ from .options import JsonOption, RobotArgument, print_json
 from .watching import watching
 
 
+def _print_schema(asked: bool) -> None:
+    if asked:
+        from ..ocp import Task
+
+        print_json(Task.model_json_schema())
+        raise typer.Exit
+
+
 def plan(
     robot: RobotArgument,
     task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
@@ -18,7 +26,7 @@ def plan(
         Path | None, typer.Option("--out", help="NetCDF file to write; none: ROBOT-TASK.nc in this folder.")
     ] = None,
     figures: Annotated[
-        Path | None, typer.Option("--figures", help="Folder to draw path, tensions and base in.")
+        Path | None, typer.Option("--figures", help="Folder to draw path, views, tensions, base and limits in.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, to open anywhere.")
@@ -29,6 +37,10 @@ def plan(
     speed: Annotated[float, typer.Option(help="Of the film: 1 is real time.")] = 1.0,
     fps: Annotated[float, typer.Option(help="Frames a second of the film.")] = 20.0,
     as_json: JsonOption = False,
+    schema: Annotated[
+        bool,
+        typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files."),
+    ] = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or say why there is none."""
     from ..figures.animation import check_film

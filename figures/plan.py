@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,12 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.ticker import MaxNLocator
 
 
-def draw(trajectory: xr.Dataset, folder: Path) -> list[Path]:
-    """Draw all figures of a plan's dataset into `folder`, and return their paths."""
-    pictures = {"path": path(trajectory), "tensions": tensions(trajectory), "base": base_offset(trajectory)}
-    return [style.save(picture, folder / f"{name}.png") for name, picture in pictures.items()]
-
-
 def path(trajectory: xr.Dataset) -> Figure:
     """Platform and carriers in {G}, with the lines between them at a few instants."""
     from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
@@ -32,6 +25,8 @@ def path(trajectory: xr.Dataset) -> Figure:
     carriers = trajectory["carrier_pose"].values[:, :, :3]
     ax.plot(*position.T, color=style.colour(0), label="platform")
     for index, name in enumerate(trajectory["carrier"].values):
+        if trajectory["carrier_kind"].values[index] == "ground":
+            continue  # cables hang from all over it: `views` has them
         label, drawn = str(name), style.colour(index + 1)
         if np.ptp(carriers[:, index], axis=0).max() < 1e-9:
             ax.plot(*carriers[0, index], "s", color=drawn, label=f"{label} (at rest)")
@@ -43,7 +38,8 @@ def path(trajectory: xr.Dataset) -> Figure:
     for axis in "xyz":
         getattr(ax, f"set_{axis}label")(f"{axis} [m]")
         getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
-    equal_scales(ax, np.concatenate([position, carriers.reshape(-1, 3)]))
+    moving = trajectory["carrier_kind"].values != "ground"
+    equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
     ax.legend(fontsize="small", loc="upper left")
     return canvas
 
@@ -74,6 +70,7 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
     canvas = style.figure()
     ax = style.axes(canvas, "time [s]", "carrier from platform [m]")
     time = trajectory["time"].values
+    trajectory = trajectory.isel(carrier=trajectory["carrier_kind"].values != "ground")
     apart = trajectory["carrier_pose"].values[:, :, :3] - trajectory["pose"].values[:, None, :3]
     sideways = np.linalg.norm(apart[:, :, :2], axis=2)
     highest = float(max(sideways.max(), apart[:, :, 2].max()))

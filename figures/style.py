@@ -44,10 +44,16 @@ def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] =
     return ax
 
 
-def legend_below(canvas: Figure, ax: Axes) -> None:
-    """The legend of `ax` below everything, in as many rows as the figure's width asks for, equally long."""
-    handles, labels = ax.get_legend_handles_labels()
-    longest = max((len(label) for label in labels), default=0)
+def legend_below(canvas: Figure, *panels: Axes) -> None:
+    """One legend of all panels below everything, in as many rows as the figure's width asks for, equally long."""
+    shown = {}
+    for ax in panels:
+        handles, labels = ax.get_legend_handles_labels()
+        shown = {**shown, **{label: it for label, it in zip(labels, handles, strict=True) if label not in shown}}
+    labels, handles = list(shown), list(shown.values())
+    if not labels:
+        return
+    longest = max(len(label) for label in labels)
     most = max(int(canvas.get_figwidth() / (0.45 + 0.07 * longest)), 1)
     rows = max(-(-len(labels) // most), 1)
     columns = max(-(-len(labels) // rows), 1)

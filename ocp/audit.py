@@ -74,7 +74,7 @@ class Audit:
     soft_excess: list[Excess] = field(default_factory=list)
     certificate: Certificate | None = None
     certificate_time: float | None = None
-    certificate_wind: tuple[float, float, float] | None = None
+    certificate_wind: Vector3 | None = None
     drift: Drift | None = None
 
     @property
@@ -262,7 +262,7 @@ def _distance(scenario: Scenario, A: np.ndarray, w: np.ndarray) -> float:
 
 def _in_all_winds(
     distribute: _Distribution, box: WindBox, motion: Motion, middle: _Verdict
-) -> tuple[_Verdict, tuple[float, float, float] | None]:
+) -> tuple[_Verdict, Vector3 | None]:
     """The verdict of the worst wind of a box at each instant, and the wind of its certificate.
 
     `middle` is that of the planned tensions. Farther from the available wrenches than at the winds that decide the
@@ -307,20 +307,14 @@ def at_rest(scenario: Scenario, seen: Audit) -> Audit | None:
         if any(np.abs(motions[k]).max() > END_TOLERANCE for k in (1, 2, 4, 5)):
             continue
         A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
-        box = scenario.wind_box
-        for wind in [scenario.wind] if box is None else _winds_at(scenario, box, *motions[:2]):
+        for wind in scenario.winds_at(*motions[:2]):
             w = scenario.dynamics.required_wrench(*motions, wind=wind)
             certificate = certify(masked_problem(scenario.dynamics, A, w, low, high))
             if certificate is not None:
-                at = None if box is None else wind
+                at = None if scenario.wind_box is None else wind
                 time = float(seen.times[row])
                 return replace(seen, certificate=certificate, certificate_time=time, certificate_wind=at)
     return None
-
-
-def _winds_at(scenario: Scenario, box: WindBox, pose: np.ndarray, velocity: np.ndarray) -> list[Vector3]:
-    """The winds that decide at one motion (6,)."""
-    return [as_wind(winds[0]) for winds in decisive_winds_at(box, scenario.robot, pose[None], velocity[None])]
 
 
 def _inside_range(problem: TensionProblem) -> TensionProblem:

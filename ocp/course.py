@@ -42,6 +42,13 @@ class PathLimits:
     carrier_acceleration: dict[int, float]  # [m/s^2]
 
 
+class Paces(NamedTuple):
+    """How fast the parts of a motion go beside their limits of speed: names, and (n, k) in parts of each limit."""
+
+    names: list[str]
+    values: np.ndarray
+
+
 class Wrench(NamedTuple):
     """w = a d2s/dt2 + b (ds/dt)^2 + c, (n, 6) each, in {G}."""
 
@@ -136,13 +143,19 @@ class Course:
 
     def speed_limit(self, platform: Motion, carriers: Motion, limits: PathLimits) -> np.ndarray:
         """The largest ds/dt that the limits of speed leave, (n,) [1/s]."""
-        paces = [np.linalg.norm(platform.velocity[:, :3], axis=1) / limits.speed]
-        if np.isfinite(limits.cable_speed).any():
-            paces += list((np.abs(self.cable_pace(platform, carriers)) / limits.cable_speed).T)
-        for index, speed in limits.carrier_speed.items():
-            paces.append(np.linalg.norm(carriers.velocity[:, index, :3], axis=1) / speed)
         with np.errstate(divide="ignore"):
-            return 1.0 / np.max(paces, axis=0)
+            return 1.0 / self.paces(platform, carriers, limits).values.max(axis=1)
+
+    def paces(self, platform: Motion, carriers: Motion, limits: PathLimits) -> Paces:
+        """The speeds of a motion, by s or by time, beside their limits."""
+        found = {"platform speed": np.linalg.norm(platform.velocity[:, :3], axis=1) / limits.speed}
+        if np.isfinite(limits.cable_speed).any():
+            of_cables = np.abs(self.cable_pace(platform, carriers)) / limits.cable_speed
+            found |= {f"speed of cable {i + 1}": pace for i, pace in enumerate(of_cables.T)}
+        for index, speed in limits.carrier_speed.items():
+            pace = np.linalg.norm(carriers.velocity[:, index, :3], axis=1) / speed
+            found[f"speed of {self.robot.carriers[index].name}"] = pace
+        return Paces(list(found), np.stack(list(found.values()), axis=1))
 
     def carrier_rows(self, carriers: Motion, limits: PathLimits) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Limits of the carriers' accelerations as a u + b x + c <= 0, (n, SIDES) each, in parts of the limit.

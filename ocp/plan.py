@@ -1,20 +1,36 @@
-"""`plan`: from a robot and a task to a motion inside the tension limits, or to the reason why there is none."""
+"""`plan`: from a robot and a task to a motion inside the tension limits, or to the reason why there is none.
+
+The planner climbs a ladder, and the first rung that knows the answer gives it:
+
+1. rest along the path (`rest_margin`): where a motion that the task fixes rests, no duration helps;
+2. durations (`durations`) and timing (`pace`), if the duration alone is free: which ones and which time laws can be;
+3. the nonlinear program (`program`), audited, and refined where the audit objects;
+4. the elastic program: the motion that misses least, which is where the program starts again, or the closest motion.
+"""
 
 from __future__ import annotations
 
 import os
 import time
+from dataclasses import replace
 from typing import Any
 
-from ..errors import InputError
 from ..models import Robot
-from .audit import Audit, at_rest, audit
-from .program import build
+from .audit import Audit, at_rest
+from .cost import cost
+from .durations import Durations, durations
+from .finding import Relaxed
+from .pace import BOUND, fastest
+from .path import AnyPath
+from .rest_margin import rest_margin
 from .result import Plan, PlanStatus
 from .rows import Mesh
 from .scenario import Deviation, Scenario, lay_out
+from .search import Search
 from .solver import Outcome, Progress, Solver
+from .start import deviation_from
 from .task import Task, read_task
+from .timing import Timing
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
@@ -22,19 +38,24 @@ RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
 NO_SLACK = 1e-6  # of the weight: a motion that misses less at its nodes is a start for another try
+LONGER = 1.002  # than the shortest duration: between the places that were asked a little more can be needed
+LONGEST = 100.0  # times the duration that was asked: a longer one is no help
 
 
 def plan(
     robot: Robot,
     task: Task | dict[str, Any] | str | os.PathLike[str],
     progress: Progress | None = None,
-    start: Plan | None = None,
+    start: Plan | Timing | AnyPath | dict[str, Any] | None = None,
 ) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
     The platform follows the task's path, exactly or inside a tube; the carriers hold, move as given, or are free inside
     their limits. What the planner may choose it chooses by inverse-dynamics transcription and IPOPT
     (`program`). A plan is called feasible only by its audit on a dense grid (`audit`).
+
+    Where nothing but the duration is free, the time law along the path is too: the path's own law, stretched, competes
+    with the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
 
     Parameters
     ----------
@@ -45,19 +66,21 @@ def plan(
     progress
         Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
     start
-        A plan of the same robot for a similar task, to start from; None: the planner makes its own guess.
+        Where to start: a plan of the same robot for a similar task, a timing, or a path for the platform (or a mapping
+        with its keys) in the frame of the task's. None: the planner makes its own guess.
 
     Returns
     -------
     Plan
-        With status `feasible`; or `infeasible`, proven by the certificate, if the motion was fixed by the task; or
-        `not-found`, with the certificate at the worst time of the closest motion that was found, or with the limits
-        that it leaves.
+        With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves it
+        but its duration; or `not-found`, with the certificate at the worst time of the closest motion that was found,
+        or with the limits that it leaves. `Plan.rungs` tells how it came to that, `Plan.missing` what the motion
+        lacks, `Plan.relaxed` a duration that would do.
 
     Raises
     ------
     InputError
-        If the task is not valid or does not fit the robot; one line naming the field and the value.
+        If the task or the start is not valid or does not fit the robot; one line naming the field and the value.
     """
     return Planner(robot, task).plan(progress, start)
 
@@ -80,101 +103,136 @@ class Planner:
         self.scenario = lay_out(robot, read_task(task))
         self._solvers: dict[Mesh, Solver] = {}
 
-    def plan(self, progress: Progress | None = None, start: Plan | None = None) -> Plan:
+    def plan(
+        self, progress: Progress | None = None, start: Plan | Timing | AnyPath | dict[str, Any] | None = None
+    ) -> Plan:
         """Plan; from `start`, else from the last solution, else from a guess."""
-        if self.scenario.is_fixed:
-            return _fixed_motion(self.scenario)
-        return _free_motion(_Search(self.scenario, self._solvers, progress), _start(self.scenario, start))
+        search = Search(self.scenario, self._solvers, progress)
+        guess = None if start is None else deviation_from(self.scenario, start)
+        return replace(_climb(search, guess), rungs=tuple(search.rungs))
 
 
-def _start(scenario: Scenario, start: Plan | None) -> Deviation | None:
-    """What a plan to start from deviates by, stretched to this scenario's duration."""
-    if start is None or start.deviation is None:
-        return None
-    theirs = start.deviation
-    if start.scenario.owners() != scenario.owners() or theirs.tensions.shape[1] != scenario.robot.m:
-        raise InputError(
-            f"start: is a plan of {start.scenario.robot.name!r} for {start.scenario.task.name!r} with other "
-            "coordinates free; accepted: one whose robot, tube and base leave the same coordinates free"
-        )
-    if scenario.duration_range is not None:
-        return theirs
-    stretch = scenario.duration / theirs.nodes[-1]
-    return Deviation(theirs.nodes * stretch, theirs.q, theirs.v / stretch, theirs.a / stretch**2, theirs.tensions)
+def _climb(search: Search, start: Deviation | None) -> Plan:
+    """One rung after the other."""
+    scenario = search.scenario
+    if scenario.is_fixed:
+        return _fixed_motion(search)
+    proven = _rest_along_the_path(search)
+    if proven is not None:
+        return proven
+    paced, own = _pace(search) if scenario.count == 0 else (None, True)
+    if paced is not None and not (own and paced.feasible):
+        return paced
+    found = _free_motion(search, start)
+    if paced is None or (found.feasible and cost(found) <= cost(paced)):
+        return found
+    return replace(paced, build_s=search.build_s, solve_s=search.solve_s)
 
 
-def _fixed_motion(scenario: Scenario) -> Plan:
+def _fixed_motion(search: Search) -> Plan:
     """Nothing is free but the tensions: each instant is a tension-distribution problem of its own."""
     start = time.perf_counter()
-    seen = audit(scenario, None)
+    seen = search.audit_motion(search.scenario, None)
+    spent = time.perf_counter() - start
     status = PlanStatus.FEASIBLE if seen.passed else PlanStatus.INFEASIBLE
-    return Plan(scenario, status, None, seen, build_s=0.0, solve_s=time.perf_counter() - start)
+    relaxed = None if seen.passed else _longer(search, search.scenario, _durations(search, search.scenario))
+    return Plan(search.scenario, status, None, seen, build_s=0.0, solve_s=spent, relaxed=relaxed)
 
 
-class _Search:
-    """Solves one scenario's programs, one after the other, and keeps the time that it took."""
-
-    def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
-        self.scenario, self._solvers, self._progress = scenario, solvers, progress
-        self.build_s, self.solve_s = 0.0, 0.0
-        self._iterates: list[tuple[int, float, float]] = []
-
-    def _seen(self, iteration: int, objective: float, infeasibility: float) -> None:
-        """Keep what an iteration came to, and tell whoever asked."""
-        self._iterates.append((iteration, objective, infeasibility))
-        if self._progress is not None:
-            self._progress(iteration, objective, infeasibility)
-
-    def solve(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
-        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
-        start = time.perf_counter()
-        if mesh not in self._solvers:
-            self._solvers[mesh] = Solver(build(self.scenario, mesh))
-        solver = self._solvers[mesh]
-        solver.prepare(guess)
-        built = time.perf_counter()
-        at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-        outcome = solver.solve(at, self._seen)
-        self.build_s += built - start
-        self.solve_s += time.perf_counter() - built
-        return outcome
-
-    def plan(self, status: PlanStatus, outcome: Outcome, seen: Audit) -> Plan:
-        """What came of it."""
-        told = (outcome.iterations, outcome.message)
-        scenario = self.scenario.lasting(outcome.duration)
-        rows = tuple(self._iterates)
-        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told, iterates=rows)
-
-    def audit(self, outcome: Outcome) -> Audit:
-        """What the audit says of it."""
-        return audit(self.scenario.lasting(outcome.duration), outcome.deviation)
+def _durations(search: Search, scenario: Scenario) -> Durations | None:
+    """Which durations the path leaves; None: not known."""
+    with search.rung("durations") as verdict:
+        left = durations(scenario)
+        verdict.told = _told(left)
+    return left
 
 
-def _closest(search: _Search, closest: Outcome) -> Plan:
-    """What the elastic program says: all is well after all, or there can be no plan, or none was found."""
-    seen = search.audit(closest)
+def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relaxed | None:
+    """A duration near that of a scenario for which the motion is possible, if there is one."""
+    asked = scenario.duration
+    if left is None or not left.exist:
+        return None
+    near = min(max(asked, LONGER * left.shortest), left.longest / LONGER)
+    if near < left.shortest or near > LONGEST * asked:
+        return None
+    longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
+    seen = search.audit_motion(longer, None, f"audit of {near:.4g} s")
+    if not seen.passed:
+        return None
+    return Relaxed("duration", "s", asked, near, Plan(longer, PlanStatus.FEASIBLE, None, seen, 0.0, 0.0))
+
+
+def _told(left: Durations | None) -> str:
+    if left is None:
+        return "not asked: something else is free too, or goes by times of its own"
+    if not left.exist:
+        return f"none by the path's own time law, as {100 * left.at:.3g} % along it shows"
+    upper = "" if left.longest == float("inf") else f", {left.longest:.4g} s and less"
+    return f"{left.shortest:.4g} s and more{upper}, by the path's own time law"
+
+
+def _rest_along_the_path(search: Search) -> Plan | None:
+    """How far rest is from the tension limits; a proof if the motion rests at an end where nothing holds it."""
+    with search.rung("rest along the path") as verdict:
+        margin = rest_margin(search.scenario)
+        verdict.told = margin.in_words()
+    span = search.scenario.duration_range
+    if search.scenario.count or span is None or margin.margin[[0, -1]].min() >= 0:
+        return None
+    slowest = search.scenario.lasting(span.max)
+    proven = at_rest(slowest, search.audit_motion(slowest, None, f"audit of {span.max:.4g} s"))
+    return None if proven is None else Plan(slowest, PlanStatus.INFEASIBLE, None, proven, 0.0, 0.0)
+
+
+def _pace(search: Search) -> tuple[Plan | None, bool]:
+    """Of a motion whose pace alone is free: what the fastest law is worth, and whether the path's own law may do.
+
+    The plan is feasible, or the proof that no pace will do, or None: not known.
+    """
+    scenario, span = search.scenario, search.scenario.duration_range
+    if span is None:
+        return None, True
+    left = _durations(search, scenario)
+    own = left is None or left.leave(span.min, span.max)
+    if own and scenario.task.objective.time is None:
+        return None, own
+    with search.rung("timing") as verdict:
+        timing, verdict.told = fastest(scenario)
+    if timing is None:
+        return None, own
+    if timing.duration is not None and span.min <= timing.duration <= span.max:
+        chosen = scenario.along(timing.path, timing.duration)
+        seen = search.audit_motion(chosen, None, "audit of that")
+        return (Plan(chosen, PlanStatus.FEASIBLE, None, seen, 0.0, 0.0) if seen.passed else None), own
+    too_slow = timing.duration is not None and BOUND * timing.duration > span.max
+    if own or not (too_slow or timing.certificate is not None):
+        return None, own
+    # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
+    slowest = scenario.lasting(span.max)
+    seen = search.audit_motion(slowest, None, f"audit of {span.max:.4g} s")
     if seen.passed:
-        return search.plan(PlanStatus.FEASIBLE, closest, seen)
-    if search.scenario.count == 0:
-        proven = at_rest(search.scenario.lasting(closest.duration), seen)
-        if proven is not None:
-            return search.plan(PlanStatus.INFEASIBLE, closest, proven)
-    return search.plan(PlanStatus.NOT_FOUND, closest, seen)
+        return None, True
+    relaxed = _longer(search, slowest, left)
+    return Plan(slowest, PlanStatus.INFEASIBLE, None, seen, 0.0, 0.0, relaxed=relaxed), own
 
 
-def _free_motion(search: _Search, start: Deviation | None) -> Plan:
+def _free_motion(search: Search, start: Deviation | None) -> Plan:
     """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
     scenario = search.scenario
     steps = scenario.task.steps
-    outcome = search.solve(Mesh(steps), start)
+    outcome = search.solve("program", Mesh(steps), start)
     if not outcome.success:
-        closest = search.solve(Mesh(steps, elastic=True), None)
+        closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             return _closest(search, closest)
-        outcome = search.solve(Mesh(steps), closest.deviation)
+        outcome = search.solve("program", Mesh(steps), closest.deviation)
+    return _refined(search, outcome, search.audit(outcome))
+
+
+def _refined(search: Search, outcome: Outcome, seen: Audit) -> Plan:
+    """Solve again, with more nodes, as long as the audit objects."""
+    scenario, steps = search.scenario, search.scenario.task.steps
     reserve, shrink = 0.0, 0.0
-    seen = search.audit(outcome)
     for attempt in range(1, REFINEMENTS + 1):
         if seen.passed or not outcome.success:
             break
@@ -183,6 +241,13 @@ def _free_motion(search: _Search, start: Deviation | None) -> Plan:
         missed = float(seen.violation.max()) / scenario.robot.force_scale
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if seen.excess else shrink
-        outcome = search.solve(Mesh(steps, reserve * scenario.robot.force_scale, shrink), outcome.deviation)
+        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
+        outcome = search.solve("program", mesh, outcome.deviation)
         seen = search.audit(outcome)
     return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, outcome, seen)
+
+
+def _closest(search: Search, closest: Outcome) -> Plan:
+    """What the elastic program says: all is well after all, or none was found."""
+    seen = search.audit(closest)
+    return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, closest, seen)

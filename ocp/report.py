@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..models import Robot
 from ..models.robot import COORDINATES, Vector3
 from ..solvers import Certificate
+from .finding import Finding
 from .task import Task
 from .wind_set import WindBox
-
-if TYPE_CHECKING:
-    from .result import Plan
 
 LEAST_SHARE = 0.05  # of a direction: what turns it less is not put into words
 Fact = tuple[str, str]  # its name, and the fact with its unit
@@ -26,12 +24,20 @@ class Section(NamedTuple):
     facts: list[Fact]
 
 
-def verdict(plan: Plan) -> str:
+class Table(NamedTuple):
+    """Rows of equal kind under named columns."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def verdict(plan: Finding) -> str:
     """The answer in one line: robot, task, status, and what decided it."""
     return f"{plan.scenario.robot.name}, {plan.scenario.task.name}: {plan.status.value.upper()}, {_decisive(plan)}"
 
 
-def sections(plan: Plan) -> list[Section]:
+def sections(plan: Finding) -> list[Section]:
     """All that the report tells below its first line; sections without facts are left out."""
     titles = {"infeasible": "Why there is none", "not-found": "What the closest motion misses"}
     found = [
@@ -41,23 +47,58 @@ def sections(plan: Plan) -> list[Section]:
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
+        Section("How it was found", [(rung.name, f"{rung.verdict} ({rung.seconds:.3f} s)") for rung in plan.rungs]),
         Section("Computation", _computation(plan)),
     ]
     return [section for section in found if section.facts]
 
 
-def as_text(plan: Plan) -> str:
+def missing(plan: Finding) -> Table | None:
+    """When the motion lacks wrench, which cables bind then, and what is needed and available along the certificate.
+
+    None of a motion that lacks nothing.
+    """
+    rows = []
+    for span in plan.missing:
+        certificate = span.certificate
+        most = direction_in_words(certificate, plan.scenario.robot).partition(", ")[0]
+        numbers = (certificate.demand, certificate.support, certificate.shortfall)
+        times = (f"{time:.3f}" for time in (span.start, span.end, span.at))
+        rows.append((*times, most, _binding(certificate), *(_short(number) for number in numbers)))
+    columns = ("from [s]", "to [s]", "worst [s]", "along", "cables that bind")
+    columns += ("needed [N]", "available [N]", "short by [N]")
+    return Table("When wrench is missing", columns, rows) if rows else None
+
+
+def as_text(plan: Finding) -> str:
     """The whole report for a terminal."""
     parts = sections(plan)
     width = max(len(name) for section in parts for name, _ in section.facts)
     lines = [verdict(plan)]
-    for title, facts in parts:
+    for index, (title, facts) in enumerate(parts):
         lines.append(f"  {title}")
         lines += [f"    {name:<{width}}  {fact}" for name, fact in facts]
+        table = missing(plan) if index == 0 else None
+        if table is not None:
+            lines += _in_columns(table)
     return "\n".join(lines)
 
 
-def _decisive(plan: Plan) -> str:
+def _in_columns(table: Table) -> list[str]:
+    """A table's lines, columns as wide as they need."""
+    rows = [table.columns, *table.rows]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
+    told = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return [f"  {table.title}", *(f"    {line}" for line in told)]
+
+
+def _binding(certificate: Certificate) -> str:
+    """The cables at their limits along the certificate, counted from 1."""
+    at = (("t_min", certificate.at_min), ("t_max", certificate.at_max))
+    return "; ".join(f"{name}: {_listed(cables + 1)}" for name, cables in at if cables.size) or "none pulls so"
+
+
+def _decisive(plan: Finding) -> str:
     if plan.feasible:
         return f"every tension inside its limits, by {_short(plan.margin)} N at least"
     certificate, excess = plan.audit.certificate, plan.audit.excess
@@ -70,7 +111,7 @@ def _decisive(plan: Plan) -> str:
     return f"{short}, {broken}" if broken else short
 
 
-def _why(plan: Plan) -> list[Fact]:
+def _why(plan: Finding) -> list[Fact]:
     if plan.feasible:
         return []
     facts: list[Fact] = []
@@ -87,10 +128,14 @@ def _why(plan: Plan) -> list[Fact]:
             ("available", f"{_short(certificate.support)} N at most" + pulled * (certificate.support < 0)),
             ("short by", f"{_short(certificate.shortfall)} N"),
         ]
-    return facts + [("limit broken", str(excess)) for excess in plan.audit.excess]
+    facts += [("limit broken", str(excess)) for excess in plan.audit.excess]
+    if (relaxed := plan.relaxed) is not None:
+        asked, possible = (f"{value:.4g} {relaxed.unit}" for value in (relaxed.asked, relaxed.possible))
+        facts.append(("would do", f"a {relaxed.name} of {possible} instead of {asked}, planned and audited"))
+    return facts
 
 
-def _constraint(plan: Plan, certificate: Certificate) -> str:
+def _constraint(plan: Finding, certificate: Certificate) -> str:
     if certificate.singular:
         return "wrench balance: no cable pulls along the direction, however large its tension"
     low, high = plan.scenario.bounds()
@@ -139,7 +184,7 @@ def _vector(certificate: Certificate) -> str:
     return f"force ({_listed(direction[:3], '.3f')}), moment ({_listed(direction[3:], '.3f')})/m"
 
 
-def _tensions(plan: Plan) -> list[Fact]:
+def _tensions(plan: Finding) -> list[Fact]:
     robot, seen = plan.scenario.robot, plan.audit
     there = np.isfinite(seen.tensions).all(axis=1)
     facts: list[Fact] = []
@@ -169,7 +214,7 @@ def _tensions(plan: Plan) -> list[Fact]:
     return facts
 
 
-def _motion(plan: Plan) -> list[Fact]:
+def _motion(plan: Finding) -> list[Fact]:
     task, seen = plan.scenario.task, plan.audit
     worst = int(seen.tracking_error.argmax())
     error = f"{_short(plan.tracking_error_max * 1e3)} mm at most"
@@ -178,9 +223,10 @@ def _motion(plan: Plan) -> list[Fact]:
     speed, acceleration = (
         np.linalg.norm(part[:, :3], axis=1).max() for part in (seen.motion.velocity, seen.motion.acceleration)
     )
+    law = "" if plan.scenario.path is task.path else ", by the fastest time law"
     return [
         ("duration", f"{plan.scenario.duration:.6g} s"),
-        ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}"),
+        ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
         ("tracking error", error),
         ("platform", f"up to {_short(speed)} m/s and {_short(acceleration)} m/s^2"),
         *([("wind", _asked_wind(task))] if task.wind is not None else []),
@@ -199,7 +245,7 @@ def _asked_wind(task: Task) -> str:
     return "" if task.wind is None else _wind(task.wind)
 
 
-def _carriers(plan: Plan) -> list[Fact]:
+def _carriers(plan: Finding) -> list[Fact]:
     """The largest speed, acceleration and tilt of each carrier that could move, against its limits."""
     facts = []
     seen = plan.audit.carriers
@@ -228,7 +274,7 @@ def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarr
     return f"up to {_short(values[row])} {unit} at t = {times[row]:.3f} s ({bound})"
 
 
-def _audit(plan: Plan) -> list[Fact]:
+def _audit(plan: Finding) -> list[Fact]:
     seen = plan.audit
     facts = [
         ("rate", f"{seen.rate:.6g} Hz, {len(seen.times)} instants, by code that is not the planner's"),
@@ -243,10 +289,12 @@ def _audit(plan: Plan) -> list[Fact]:
     return facts
 
 
-def _computation(plan: Plan) -> list[Fact]:
+def _computation(plan: Finding) -> list[Fact]:
     facts = [("build", f"{plan.build_s:.3f} s"), ("solve", f"{plan.solve_s:.3f} s")]
     if plan.deviation is None:
-        return [*facts, ("solver", "none: the task fixes the motion, the audit alone decides")]
+        fixed = plan.scenario.is_fixed
+        why = "the task fixes the motion, the audit alone decides" if fixed else "a rung before it knew the answer"
+        return [*facts, ("solver", f"none: {why}")]
     starts = sum(row[0] == 0 for row in plan.iterates)
     runs = f", run {starts} of {starts}" if starts > 1 else ""
     return [*facts, ("solver", f"{plan.iterations} iterations{runs}: {plan.message}")]

@@ -11,16 +11,15 @@ from html import escape
 from string import Template
 from typing import TYPE_CHECKING
 
-from ..figures import plan as figures
 from ..figures import style
-from ..figures.convergence import convergence
 from ..models.parsing import to_yaml
-from .report import Section, sections, verdict
+from .drawings import drawings
+from .finding import Finding
+from .report import Section, Table, missing, sections, verdict
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
-
-    from .result import Plan
 
 PAGE = Template("""\
 <!DOCTYPE html>
@@ -39,6 +38,8 @@ h2 { font-size: 1.1rem; margin: 1.6rem 0 0.3rem; }
 table { border-collapse: collapse; width: 100%; }
 th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid #ddd; }
 th { font-weight: 600; width: 9.5rem; }
+.wide { overflow-x: auto; overflow-wrap: normal; }
+table.columns th { width: auto; }
 tr.more th, tr.more td { border-top: 0; padding-top: 0; }
 figure { margin: 1.2rem 0; }
 img { max-width: 100%; height: auto; display: block; margin: auto; }
@@ -60,7 +61,7 @@ $files
 COLOURS = {"feasible": style.colour(0), "infeasible": style.colour(1), "not-found": style.colour(5)}
 
 
-def page(plan: Plan) -> str:
+def page(plan: Finding, trajectory: xr.Dataset) -> str:
     """The whole page."""
     from .. import __version__
 
@@ -71,11 +72,25 @@ def page(plan: Plan) -> str:
         status=escape(plan.status.value),
         colour=COLOURS[plan.status.value],
         verdict=escape(decisive),
-        tables="\n".join(_table(section) for section in sections(plan)),
-        figures="\n".join(_figure(caption, drawn) for caption, drawn in _drawings(plan).items()),
+        tables="\n".join(_tables(plan)),
+        figures="\n".join(_figure(*drawing) for drawing in drawings(plan, trajectory).values()),
         files=_file("The robot's file", to_yaml(robot)) + "\n" + _file("The task", to_yaml(task)),
         version=escape(__version__),
     )
+
+
+def _tables(plan: Finding) -> list[str]:
+    """The sections; after the first, which tells why there is no plan, when wrench is missing."""
+    told, gaps = [_table(section) for section in sections(plan)], missing(plan)
+    return told if gaps is None else [told[0], _columns(gaps), *told[1:]]
+
+
+def _columns(table: Table) -> str:
+    """A table with a heading for each column; on a narrow screen it scrolls."""
+    heads = "".join(f'<th scope="col">{escape(column)}</th>' for column in table.columns)
+    rows = ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows]
+    inner = "\n".join([f"<tr>{heads}</tr>", *rows])
+    return f'<h2>{escape(table.title)}</h2>\n<div class="wide"><table class="columns">\n{inner}\n</table></div>'
 
 
 def _table(section: Section) -> str:
@@ -85,18 +100,6 @@ def _table(section: Section) -> str:
         for name, fact in section.facts
     ]
     return f"<h2>{escape(section.title)}</h2>\n<table>\n" + "\n".join(rows) + "\n</table>"
-
-
-def _drawings(plan: Plan) -> dict[str, Figure]:
-    trajectory = plan.trajectory
-    drawn = {
-        "Tensions against their limits": figures.tensions(trajectory),
-        "Path of the platform and places of the carriers": figures.path(trajectory),
-        "Carriers beside and above the platform": figures.base_offset(trajectory),
-    }
-    if plan.iterates:
-        drawn["How the solver came to it"] = convergence(plan.iterates)
-    return drawn
 
 
 def _figure(caption: str, drawn: Figure) -> str:

@@ -15,13 +15,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..models import Dynamics, Robot
-from ..models.robot import MobileCarrier, QuadrotorCarrier
+from ..models.robot import MobileCarrier, QuadrotorCarrier, Vector3
 from . import spline
 from .clearance import point_outside
 from .path import AnyPath, Motion, RestPath
 from .task import DurationRange, FreeBase, GivenBase, HoldBase, Task
 from .task_limits import OF_CARRIERS
-from .wind_set import WindBox, choices
+from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
@@ -80,6 +80,8 @@ class Scenario:
 
     Attributes
     ----------
+    path
+        That of the platform: the task's, or the same places by a time law that the planner chose.
     relative
         Whether the platform's path is given in the frame of the robot's only carrier.
     platform_free
@@ -90,6 +92,7 @@ class Scenario:
 
     robot: Robot
     task: Task
+    path: AnyPath
     dynamics: Dynamics
     relative: bool
     platform_free: list[int]
@@ -104,7 +107,7 @@ class Scenario:
         return self.task.duration if isinstance(self.task.duration, DurationRange) else None
 
     @property
-    def wind(self) -> tuple[float, float, float] | None:
+    def wind(self) -> Vector3 | None:
         """The wind of the planned tensions in {G} [m/s]: of a box its middle; None: no air."""
         return self.task.wind.middle if isinstance(self.task.wind, WindBox) else self.task.wind
 
@@ -112,6 +115,16 @@ class Scenario:
     def wind_box(self) -> WindBox | None:
         """All winds in which tensions have to exist; None if the task has one wind or none."""
         return self.task.wind if isinstance(self.task.wind, WindBox) else None
+
+    def winds_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[Vector3 | None]:
+        """In which winds tensions have to exist as the platform moves (6,), in {G}: of a box in those that decide.
+
+        [None]: no air.
+        """
+        if self.wind_box is None:
+            return [self.wind]
+        winds = decisive_winds_at(self.wind_box, self.robot, pose[None], velocity[None])
+        return [as_wind(values[0]) for values in winds]
 
     @property
     def decisive_winds(self) -> int:
@@ -122,6 +135,10 @@ class Scenario:
     def lasting(self, seconds: float) -> Scenario:
         """The same with another duration [s]."""
         return replace(self, duration=seconds)
+
+    def along(self, path: AnyPath, seconds: float) -> Scenario:
+        """The same with another path of the platform, in the same frame, and its duration [s]."""
+        return replace(self, path=path, duration=seconds)
 
     @property
     def count(self) -> int:
@@ -149,7 +166,7 @@ class Scenario:
 
     def references(self, times: np.ndarray) -> tuple[Motion, list[Motion]]:
         """The platform's path, in its own frame, and the carriers' reference motions in {G}."""
-        platform = self.task.path.at(times, self.duration)
+        platform = self.path.at(times, self.duration)
         carriers = []
         for index, home in enumerate(self.robot.carrier_home):
             path = self.carrier_paths.get(index)
@@ -174,7 +191,7 @@ class Scenario:
 
     def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
         """How far the platform at `motion` in {G} is from its path, (n, 6) [m, rad], along the path's own axes."""
-        wanted = self.task.path.at(times, self.duration).pose
+        wanted = self.path.at(times, self.duration).pose
         pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
         off = pose - wanted
         off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
@@ -225,6 +242,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     scenario = Scenario(
         robot=robot,
         task=task,
+        path=task.path,
         dynamics=Dynamics(robot),
         relative=relative,
         platform_free=platform_free,

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..figures.animation import Scene
 from ..figures.robot import box_edges
 from ..models import kinematics
 from ..models.robot import MobileCarrier
+from .finding import Finding
 from .task_limits import AnyKeepOut, Block, Sphere
-
-if TYPE_CHECKING:
-    from .result import Plan
 
 TRAIL = 10  # every so many audited instants have a point of the trail
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
 
 
-def scene(plan: Plan, times: np.ndarray) -> Scene:
+def scene(plan: Finding, times: np.ndarray) -> Scene:
     """The plan's robot at the audited instants nearest to `times` [s]; nothing is interpolated."""
     robot, audit = plan.scenario.robot, plan.audit
     step = audit.times[1] - audit.times[0]

@@ -17,6 +17,8 @@ from .scenario import Deviation
 __all__ = ["Outcome", "Progress", "Solver"]
 
 MET = 1e-8  # what constraints of a program may miss, in its units
+BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
+PATIENCE = 30  # iterations without a better one
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 
 
@@ -114,18 +116,20 @@ class Solver:
         except RuntimeError as error:
             raise _broken(error) from None
         statistics = nlp.stats()
-        if watch.interrupted or statistics["return_status"] == "User_Requested_Stop":
+        message = str(statistics["return_status"])
+        if watch.interrupted or (message == "User_Requested_Stop" and not watch.settled):
             raise KeyboardInterrupt
         self._last = result if statistics["success"] else None
         x = result["x"].full().ravel()
-        # A minimum time is often found long before IPOPT is sure that there is no shorter one.
         met = program.violation(x, result["g"].full().ravel()) <= MET
+        if watch.settled:
+            x, met, message = watch.best, True, f"no better by {BETTER:.1%} in {PATIENCE} iterations"
         missing = program.layout.columns(x)[:, program.layout.missing].reshape(-1, 6)
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
             success=(bool(statistics["success"]) or met) and bool(np.isfinite(x).all()),
-            message=str(statistics["return_status"]),
+            message=message,
             iterations=int(statistics["iter_count"]),
             slack=float(np.linalg.norm(missing, axis=1).max(initial=0.0) * program.scenario.robot.force_scale),
         )
@@ -136,12 +140,16 @@ def _broken(error: RuntimeError) -> SolverError:
 
 
 class _Watch(ca.Callback):
-    """Tells a progress function about each iteration of the solver, and stops it when a person presses Ctrl-C."""
+    """Looks at each iteration of the solver, tells a progress function, and stops it when there is no use to go on.
+
+    A person may press Ctrl-C. Or the search settled: a minimum time is often found long before IPOPT is sure that there
+    is no shorter one, and where much costs nothing it wanders about between solutions that are as good as each other.
+    """
 
     def __init__(self, program: Program):
         super().__init__()
         self._sizes = {"x": program.problem["x"].numel(), "g": program.problem["g"].numel(), "f": 1}
-        self._bounds = (program.lower_g, program.upper_g)
+        self._program = program
         self.begin(None)
         self.construct("watch", {})
 
@@ -149,7 +157,16 @@ class _Watch(ca.Callback):
         """Start to count anew."""
         self._progress = progress
         self._iteration = 0
+        self.best = np.zeros(0)  # iterate of those that meet all constraints
+        self._objective = np.inf  # its
+        self._mark = np.inf  # the objective that a later one has to be better than
+        self._since = 0  # the last iteration that was on the way to a better one
         self.interrupted = False
+
+    @property
+    def settled(self) -> bool:
+        """Whether `best` is as good as it gets."""
+        return len(self.best) > 0 and self._iteration - self._since > PATIENCE
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -170,12 +187,28 @@ class _Watch(ca.Callback):
 
     def eval(self, arg: Sequence[ca.DM]) -> list[int]:
         try:
+            x, g, objective = arg[0].full().ravel(), arg[2].full().ravel(), float(arg[1])
+            self._keep(x, g, objective)
+            # What making up for what g misses would change, to first order.
+            low, high = self._program.lower_g, self._program.upper_g
+            if objective + arg[4].full().ravel() @ (g - np.clip(g, low, high)) < self._better():
+                self._since = self._iteration
             if self._progress is not None:
-                g = arg[2].full().ravel()
-                low, high = self._bounds
                 infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
-                self._progress(self._iteration, float(arg[1]), infeasibility)
+                self._progress(self._iteration, objective, infeasibility)
             self._iteration += 1
         except KeyboardInterrupt:
             self.interrupted = True
-        return [int(self.interrupted)]
+        return [int(self.interrupted or self.settled)]
+
+    def _better(self) -> float:
+        """Objective that makes it worth to go on."""
+        return self._mark - BETTER * abs(self._mark) if np.isfinite(self._mark) else np.inf
+
+    def _keep(self, x: np.ndarray, g: np.ndarray, objective: float) -> None:
+        """Keep the best iterate that meets all constraints."""
+        if self._program.violation(x, g) > MET or objective >= self._objective:
+            return
+        if objective < self._better():
+            self._mark = objective
+        self.best, self._objective = x, objective

@@ -8,9 +8,12 @@ solver; what it misses between the grid points a finer grid and a little distanc
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +21,12 @@ from pydantic import Field
 
 from ..errors import InputError, SolverError
 from ..models import Robot
-from ..models.parsing import validate
+from ..models.parsing import to_yaml, validate
 from ..models.robot import MobileCarrier, Name, NonNegative, Part, Positive, Vector3
 from ..solvers import Certificate, TensionProblem, certify, solve_batch
 from ..workspace.pose import masked_problem
+from ..writing import whole_file
+from .bottlenecks import Bottleneck, bottlenecks
 from .course import Course, PathLimits
 from .path import AnyPath, Curve, LinePath, Motion, SamplePath, TimedPath, WaypointPath
 from .phase_plane import phase_plane, proofs
@@ -62,6 +67,8 @@ class Timing:
         See `TimingStatus`.
     course
         The robot and the geometry that was timed.
+    limits
+        What beside the tensions was limited.
     margin
         How far every tension stays inside its limits [N].
     s
@@ -85,6 +92,7 @@ class Timing:
 
     status: TimingStatus
     course: Course = field(repr=False)
+    limits: PathLimits = field(repr=False)
     margin: float
     s: np.ndarray = field(repr=False)
     sd: np.ndarray = field(repr=False)
@@ -114,7 +122,7 @@ class Timing:
         InputError
             If there is no law.
         """
-        return self._timed(self.course.path)
+        return self.timed(self.course.path)
 
     def task(self, name: str = "timed") -> Task:
         """A task that fixes this motion of platform and carriers: `plan` audits it.
@@ -128,7 +136,7 @@ class Timing:
         base: HoldBase | GivenBase = HoldBase(kind="hold")
         if course.carriers:
             paths: dict[str, AnyPath] = {
-                carriers[index].name: self._timed(path) if index in course.moving else path
+                carriers[index].name: self.timed(path) if index in course.moving else path
                 for index, path in course.carriers.items()
             }
             base = GivenBase(kind="given", paths=paths)
@@ -147,17 +155,61 @@ class Timing:
         platform, carriers = self.course.at(s)
         return platform.timed(sd, sdd), carriers.timed(sd, sdd)
 
+    @cached_property
+    def bottlenecks(self) -> list[Bottleneck]:
+        """The stretches of the path on which one limit is what keeps the motion from being faster, in order.
+
+        Empty without a law.
+        """
+        return bottlenecks(self.course, self.limits, self.margin, self.path) if self.feasible else []
+
+    def summary(self) -> dict[str, Any]:
+        """What `towline time --json` prints, ready for JSON; what does not exist is None."""
+        return {
+            "feasible": self.feasible,
+            "status": self.status.value,
+            "duration": self.duration,
+            "margin": self.margin,
+            "violation": self.violation,
+            "bottlenecks": [each.as_dict() for each in self.bottlenecks],
+            "at": self.at,
+            "blocked": self.blocked.tolist(),
+            "certificate": None if self.certificate is None else self.certificate.as_dict(),
+        }
+
+    def save_task(self, file: str | os.PathLike[str], name: str = "timed") -> Path:
+        """Save `task` as a task file (YAML), whole or not at all: `towline plan` and `plan` read it.
+
+        Raises
+        ------
+        InputError
+            If there is no law, or the place cannot be written to.
+        """
+        path, text = Path(file), to_yaml(self.task(name))
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        return path
+
     def report(self) -> str:
         """What a person wants to know first, as text."""
         head = f"{self.course.robot.name}: timing {self.status.value.upper()}"
         if self.feasible:
-            return f"{head}\n  {self.duration:.6g} s, audit: worst violation {self.violation:.3g} N"
+            lines = [head, f"  {self.duration:.6g} s, audit: worst violation {self.violation:.3g} N"]
+            lines += ["  What is at its limit, and for how long"]
+            return "\n".join(lines + [f"    {each.in_words()}" for each in self.bottlenecks])
         told = [head, f"  at s = {self.at:.4g}"]
         if self.certificate is not None:
             told += [f"  {line}" for line in self.certificate.in_words().splitlines()]
         return "\n".join(told)
 
-    def _timed(self, path: Curve) -> TimedPath:
+    def timed(self, path: Curve) -> TimedPath:
+        """A path of the course, the platform's or a carrier's, with the time law.
+
+        Raises
+        ------
+        InputError
+            If there is no law.
+        """
         if np.isnan(self.sd).any():
             raise InputError(f"timing: is {self.status.value} and has no motion; accepted: a feasible one")
         law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
@@ -313,7 +365,7 @@ def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -
     fastest, Rows = _toppra()
     weight = course.robot.force_scale
     reserve, shrink, failures = RESERVE * weight, 0.0, 0
-    found = _without_law(TimingStatus.NOT_FOUND, course, margin, np.linspace(0, 1, intervals + 1), at=0.0)
+    found = _without_law(TimingStatus.NOT_FOUND, course, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
     for _ in range(ATTEMPTS):
         s = np.linspace(0, 1, intervals + 1)
         plane = phase_plane(course, limits, s, margin + reserve, shrink)
@@ -324,21 +376,21 @@ def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -
                 worst = max(proven, key=lambda proof: proof.certificate.shortfall)
                 told = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
                 blocked = np.array([proof.s for proof in proven])
-                return _without_law(TimingStatus.INFEASIBLE, course, margin, s, blocked=blocked, **told)
+                return _without_law(TimingStatus.INFEASIBLE, course, limits, margin, s, blocked=blocked, **told)
         if law.unlimited:
             raise InputError(
                 "time_along: nothing limits the speed along this path; accepted: a path on which the platform's "
                 "motion takes tension, or limits of speed"
             )
         if law.x is None:
-            found = _without_law(TimingStatus.NOT_FOUND, course, margin, s, at=float(s[law.stuck or 0]))
+            found = _without_law(TimingStatus.NOT_FOUND, course, limits, margin, s, at=float(s[law.stuck or 0]))
             failures += 1
             if failures > FINER_TRIES:
                 return found
             intervals = min(2 * intervals, MOST_INTERVALS)
             continue
         sd, sdd = np.sqrt(law.x), np.diff(law.x) / (2 * np.diff(s))
-        found = Timing(TimingStatus.FEASIBLE, course, margin, s, sd, sdd)
+        found = Timing(TimingStatus.FEASIBLE, course, limits, margin, s, sd, sdd)
         missing, excess, at = _audit(found, limits)
         if missing <= TOLERANCE and excess <= LIMIT_TOLERANCE:
             return replace(found, violation=missing)
@@ -350,8 +402,10 @@ def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -
     return found
 
 
-def _without_law(status: TimingStatus, course: Course, margin: float, s: np.ndarray, **told: Any) -> Timing:
-    return Timing(status, course, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
+def _without_law(
+    status: TimingStatus, course: Course, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
+) -> Timing:
+    return Timing(status, course, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
 
 
 def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:

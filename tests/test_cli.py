@@ -156,7 +156,8 @@ def test_plan_writes_a_file_and_figures(tmp_path):
     assert report["audit"]["worst_violation"] < 1e-6
     saved = xr.load_dataset(tmp_path / report["file"])
     assert saved["tensions"].shape[1] == 6
-    assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == ["base.png", "path.png", "tensions.png"]
+    drawn = sorted(path.name for path in (tmp_path / "pictures").iterdir())
+    assert drawn == ["base.png", "path.png", "tensions.png", "views.png"]
 
 
 FREE_TASK = """\

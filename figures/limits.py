@@ -1,0 +1,89 @@
+"""What a plan limits beside the tensions, over time, each with its limits: a panel a limit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_CURVES = 8  # of a panel; of more the least and the largest at each time
+LEAST = 0.1  # of a limit: a panel is at least so high; a limit that is farther away than that height is told
+
+
+class Limited(NamedTuple):
+    """A quantity over time and its limits.
+
+    Attributes
+    ----------
+    name, unit
+        Of the limit.
+    labels
+        What each curve is about.
+    values
+        (n, k).
+    low, high
+        Infinite: none.
+    """
+
+    name: str
+    unit: str
+    labels: list[str]
+    values: np.ndarray
+    low: float
+    high: float
+
+
+def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
+    """Draw quantities over `times` (n,) [s], one below the other."""
+    canvas = style.figure(5.0, 0.9 + 1.5 * len(quantities))
+    looks: dict[str, int] = {}
+    for row, quantity in enumerate(quantities):
+        last = row + 1 == len(quantities)
+        ax = style.axes(canvas, "time [s]" if last else "", f"[{quantity.unit}]", (len(quantities), 1, row + 1))
+        ax.tick_params(labelbottom=last)
+        _panel(ax, times, quantity, looks)
+    style.legend_below(canvas, *canvas.axes)
+    return canvas
+
+
+def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]) -> None:
+    values, told = quantity.values, []
+    if len(quantity.labels) > MOST_CURVES:
+        least, most = values.min(axis=1), values.max(axis=1)
+        ax.fill_between(times, least, most, color="#cccccc", linewidth=0)
+        for edge in (least, most):
+            ax.plot(times, edge, color="#000000", linewidth=1.0)
+        told.append(f"least and largest of {len(quantity.labels)}")
+    else:
+        for label, curve in zip(quantity.labels, values.T, strict=True):
+            index = looks.setdefault(label, len(looks))
+            ax.plot(times, curve, color=style.colour(index), linestyle=style.line_style(index), label=label)
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+    bounds = [bound for bound in (quantity.low, quantity.high) if np.isfinite(bound)]
+    # What hardly changes beside its limit shall look so.
+    size = max(high - low, LEAST * max((abs(bound) for bound in bounds), default=0.0), 1e-9)
+    near = [bound for bound in bounds if low - size <= bound <= high + size]
+    for bound in near:
+        ax.axhline(bound, **style.LIMIT)
+    told.append(_in_words(quantity) + ("" if near or not bounds else " (far)"))
+    middle, shown = (low + high) / 2, [low, high, *near]
+    ax.set_ylim(min(*shown, middle - size / 2) - 0.1 * size, max(*shown, middle + size / 2) + 0.1 * size)
+    ax.margins(x=0.01)
+    ax.set_title(f"{quantity.name}: {', '.join(told)}", fontsize=9, loc="left")
+
+
+def _in_words(quantity: Limited) -> str:
+    low, high, unit = quantity.low, quantity.high, quantity.unit
+    if low == high:
+        return f"{low:g} {unit}"
+    if low == -high:
+        return f"at most {high:g} {unit} either way"
+    told = [f"{word} {bound:g} {unit}" for word, bound in (("at least", low), ("at most", high)) if np.isfinite(bound)]
+    return ", ".join(told)

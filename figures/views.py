@@ -1,0 +1,82 @@
+"""A plan seen from above and from the side: paths, cables at start and end, reach boxes, places to keep out of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import style
+from .plan import few_ticks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .animation import Scene
+
+VIEWS = (("from above", 0, 1), ("from the side, along y", 0, 2))  # and the axes of {G} that are seen
+FORBIDDEN = {"facecolor": "#e8e8e8", "edgecolor": "#666666", "hatch": "////", "linewidth": 0.8}
+REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewidth": 0.8}
+
+
+def views(scene: Scene) -> Figure:
+    """Draw a scene of a few instants, the first of them the start and the last the end, in two views of equal scale."""
+    canvas = style.figure(5.0, 6.4)
+    panels = [
+        style.axes(canvas, f"{'xyz'[across]} [m]", f"{'xyz'[up]} [m]", (2, 1, row + 1))
+        for row, (_, across, up) in enumerate(VIEWS)
+    ]
+    for ax, (title, across, up) in zip(panels, VIEWS, strict=True):
+        _view(ax, scene, [across, up])
+        ax.set_title(title, fontsize=9)
+    style.legend_below(canvas, panels[0])
+    return canvas
+
+
+def _view(ax: Axes, scene: Scene, seen: list[int]) -> None:
+    from matplotlib.patches import Polygon
+
+    for index, lines in enumerate(scene.obstacles):
+        label = "keep out" if index == 0 else None
+        ax.add_patch(Polygon(_hull(np.vstack(lines)[:, seen]), label=label, **FORBIDDEN))
+    for index, (low, high) in enumerate(scene.boxes):
+        corners = np.array([[x, y] for x in (low[seen[0]], high[seen[0]]) for y in (low[seen[1]], high[seen[1]])])
+        ax.add_patch(Polygon(_hull(corners), label="reach" if index == 0 else None, **REACH))
+    for k, shade, label in ((0, "#bbbbbb", "cables at the start"), (-1, "#777777", "cables at the end")):
+        for cable in range(scene.anchors.shape[1]):
+            ends = np.stack([scene.anchors[k, cable], scene.attachments[k, cable]])[:, seen]
+            ax.plot(*ends.T, color=shade, linewidth=0.8, label=label if cable == 0 else None)
+        body = _hull(scene.attachments[k][:, seen])
+        if len(body) > 1:
+            ax.add_patch(Polygon(body, facecolor=shade, edgecolor=style.colour(0), alpha=0.6))
+    for index, name in enumerate(scene.names):
+        way, drawn = scene.carriers[:, index][:, seen], style.colour(index + 1)
+        if np.ptp(scene.carriers[:, index], axis=0).max() < 1e-9:
+            ax.plot(*way[0], "s", color=drawn, markersize=5, label=f"{name} (at rest)")
+        else:
+            ax.plot(*way.T, color=drawn, label=name)
+    ax.plot(*scene.path[:, seen].T, color=style.colour(0), linewidth=2.0, label="platform")
+    ax.plot(*scene.path[0, seen], "o", color=style.colour(0), markersize=5, label="start")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.autoscale_view()
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(few_ticks())
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Corners of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
+    ordered = sorted(set(map(tuple, points.tolist())))
+
+    def half(row: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+        chain: list[tuple[float, ...]] = []
+        for x, y in row:
+            while len(chain) > 1:
+                (ax, ay), (bx, by) = chain[-2:]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                    break
+                chain.pop()
+            chain.append((x, y))
+        return chain[:-1]
+
+    return np.array([*half(ordered), *half(ordered[::-1])])

@@ -1,0 +1,83 @@
+"""The fastest time law along a task's path, as a rung of planning: `fastest`.
+
+Where the path is followed exactly from rest to rest, `time_along` knows the least time of all time laws: what is
+shorter cannot be, and its law is a plan if it keeps the task's other limits too. Its minimum is that of a grid: it
+differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it counts as proven.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from .path import AnyPath, LinePath, RestPath, WaypointPath
+from .scenario import Scenario
+from .timing import Timing, time_along
+
+__all__ = ["BOUND", "fastest"]
+
+BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
+PIECES = 400  # of a spline that is handed on as points: 1e-6 of its length off at most
+LOOKS = 20_001
+ON_PATH = 2e-6  # of a path's length: how far the handed-on spline may be off
+
+
+def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
+    """The fastest law along the path of a scenario without freedom but its duration, or None; and what is to be said.
+
+    Limits of the task that `time_along` does not know are left out: then its time is a bound still.
+    """
+    task, still = scenario.task, [RestPath]
+    if any(type(path) not in still for path in scenario.carrier_paths.values()):
+        return None, "not asked: carriers move by times of their own"
+    if scenario.wind_box is not None:
+        return None, "not asked: in moving air the drag is no multiple of the speed's square"
+    path = _curve(task.path)
+    if path is None:
+        return None, f"not asked: a path of kind {task.path.kind} with times or speeds of its own at its ends"
+    hard = {name: getattr(task.limits, name) for name in ("platform_speed", "cable_speed")}
+    hard = {name: None if name in task.limits.soft else value for name, value in hard.items()}
+    names = [carrier.name for carrier in scenario.robot.carriers]
+    try:
+        timing = time_along(
+            scenario.robot,
+            path,
+            margin=scenario.hard_margin,
+            carriers={names[index]: its for index, its in scenario.carrier_paths.items()},
+            speed_max=hard["platform_speed"],
+            cable_speed_max=hard["cable_speed"],
+            wind=scenario.wind,
+        )
+    except (InputError, SolverError) as error:
+        return None, f"not asked: {str(error).removeprefix('time_along: ')}"
+    if timing.feasible:
+        return timing, f"the fastest law takes {timing.duration:.6g} s"
+    return timing, f"{timing.status.value}: at {100 * (timing.at or 0.0):.3g} % of the path"
+
+
+def _curve(path: AnyPath) -> AnyPath | None:
+    """The same places, but resting nowhere; None of a path that does not go from rest to rest as long as it likes."""
+    if not path.stretches or getattr(path, "timing", None) != "smooth":
+        return None
+    if isinstance(path, LinePath):
+        return path.model_copy(update={"timing": "uniform"})
+    return _through(path) if isinstance(path, WaypointPath) else None
+
+
+def _through(path: WaypointPath) -> WaypointPath | None:
+    """A natural spline through many points of a smooth one, closest where it starts and ends."""
+    shares = np.linspace(0.0, 1.0, LOOKS)
+    looks = path.by_fraction(shares).pose
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(looks, axis=0), axis=1))])
+    wanted = way[-1] * (1 - np.cos(np.pi * np.arange(PIECES + 1) / PIECES)) / 2
+    at = np.interp(wanted, way, shares)
+    at[[0, -1]] = 0.0, 1.0
+    points = tuple((x, y, z, roll, pitch, yaw) for x, y, z, roll, pitch, yaw in path.by_fraction(at).pose.tolist())
+    spline = WaypointPath(kind="waypoints", frame=path.frame, points=points, timing="uniform")
+    # Between the points: what is across the path counts, where along it is for the time law to say.
+    between = (wanted[1:] + wanted[:-1]) / 2
+    wanted_pose, along, _ = path.by_fraction(np.interp(between, way, shares))
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    off = spline.by_fraction(between / way[-1]).pose - wanted_pose
+    across = off - np.sum(off * along, axis=1, keepdims=True) * along
+    return spline if np.linalg.norm(across, axis=1).max() <= ON_PATH * way[-1] else None

@@ -1,0 +1,93 @@
+"""`Search`: one scenario's programs and audits, solved one after the other, and the record of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from .audit import Audit, audit
+from .finding import PlanStatus
+from .program import build
+from .result import Plan
+from .rows import Mesh
+from .rung import Rung
+from .scenario import Deviation, Scenario
+from .solver import Outcome, Progress, Solver
+
+__all__ = ["Search"]
+
+
+class Verdict:
+    """What a rung will have said; set while it runs."""
+
+    told = ""
+
+
+class Search:
+    """Solves one scenario's programs, and keeps the time that it took and what each rung said."""
+
+    def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
+        self.scenario, self._solvers, self._progress = scenario, solvers, progress
+        self.build_s, self.solve_s = 0.0, 0.0
+        self.rungs: list[Rung] = []
+        self._iterates: list[tuple[int, float, float]] = []
+
+    @contextmanager
+    def rung(self, name: str) -> Iterator[Verdict]:
+        """Record what happens inside as a rung of the ladder."""
+        start, verdict = time.perf_counter(), Verdict()
+        yield verdict
+        self.rungs.append(Rung(name, verdict.told, time.perf_counter() - start))
+
+    def _seen(self, iteration: int, objective: float, infeasibility: float) -> None:
+        """Keep what an iteration came to, and tell whoever asked."""
+        self._iterates.append((iteration, objective, infeasibility))
+        if self._progress is not None:
+            self._progress(iteration, objective, infeasibility)
+
+    def solve(self, name: str, mesh: Mesh, guess: Deviation | None) -> Outcome:
+        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own."""
+        with self.rung(f"{name} of {mesh.steps} steps") as verdict:
+            start = time.perf_counter()
+            if mesh not in self._solvers:
+                self._solvers[mesh] = Solver(build(self.scenario, mesh))
+            solver = self._solvers[mesh]
+            solver.prepare(guess)
+            built = time.perf_counter()
+            at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
+            outcome = solver.solve(at, self._seen)
+            self.build_s += built - start
+            self.solve_s += time.perf_counter() - built
+            verdict.told = f"{outcome.message}, {outcome.iterations} iterations"
+            if mesh.elastic:
+                verdict.told += f", short by {outcome.slack:.3g} N"
+        return outcome
+
+    def plan(self, status: PlanStatus, outcome: Outcome, seen: Audit) -> Plan:
+        """What came of a program."""
+        told = (outcome.iterations, outcome.message)
+        scenario = self.scenario.lasting(outcome.duration)
+        rows = tuple(self._iterates)
+        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told, iterates=rows)
+
+    def audit(self, outcome: Outcome) -> Audit:
+        """What the audit says of a program's motion."""
+        return self.audit_motion(self.scenario.lasting(outcome.duration), outcome.deviation)
+
+    def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
+        """What the audit says of any motion."""
+        with self.rung(name) as verdict:
+            seen = audit(scenario, deviation)
+            verdict.told = "passed" if seen.passed else in_words(seen)
+        return seen
+
+
+def in_words(seen: Audit) -> str:
+    """What the audit objects to, in short."""
+    told = []
+    if seen.violation.max() > seen.tolerance:
+        told.append(f"short by up to {seen.violation.max():.3g} N at t = {seen.times[seen.worst]:.3f} s")
+    if seen.excess:
+        told.append(f"{len(seen.excess)} other limit{'s' * (len(seen.excess) > 1)} broken")
+    return ", ".join(told)

@@ -1,0 +1,104 @@
+"""Where a person lets the planner start: a plan, a timing or a path, as a deviation from the task's references."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from ..errors import InputError
+from ..models.parsing import validate
+from ..models.robot import Part
+from .finding import Finding
+from .guess import initial_guess
+from .path import AnyPath, PathBase, RestPath
+from .scenario import Deviation, Scenario
+from .timing import Timing
+
+__all__ = ["deviation_from"]
+
+
+class _Start(Part):
+    """A path that stands alone, checked as a task's is."""
+
+    start: AnyPath = Field(description="for the platform to start from")
+
+
+def deviation_from(scenario: Scenario, start: Finding | Timing | AnyPath | dict[str, Any]) -> Deviation | None:
+    """What a start deviates by from the references of `scenario`; None: nothing, the task fixes the motion.
+
+    Raises
+    ------
+    InputError
+        If it does not fit, or is none.
+    """
+    if isinstance(start, Finding):
+        return _of_plan(scenario, start)
+    if isinstance(start, Timing):
+        return _of_timing(scenario, start)
+    if isinstance(start, dict):
+        start = validate({"start": start}, _Start, "plan").start
+    if not isinstance(start, PathBase):
+        raise InputError(f"start: {start!r}; accepted: a Plan, a Timing, a path or a mapping with its keys")
+    return _along(scenario, start, {}, start.natural_duration or scenario.duration)
+
+
+def _of_plan(scenario: Scenario, start: Finding) -> Deviation | None:
+    """A plan's own deviation, stretched to this scenario's duration."""
+    if start.deviation is None:
+        return None
+    theirs = start.deviation
+    if start.scenario.owners() != scenario.owners() or theirs.tensions.shape[1] != scenario.robot.m:
+        raise InputError(
+            f"start: is a plan of {start.scenario.robot.name!r} for {start.scenario.task.name!r} with other "
+            "coordinates free; accepted: one whose robot, tube and base leave the same coordinates free"
+        )
+    return _lasting(scenario, theirs)
+
+
+def _of_timing(scenario: Scenario, start: Timing) -> Deviation | None:
+    robot = start.course.robot
+    if robot.name != scenario.robot.name or robot.m != scenario.robot.m:
+        raise InputError(f"start: is a timing of robot {robot.name!r}; accepted: one of {scenario.robot.name!r}")
+    carriers: dict[int, AnyPath] = {
+        index: start.timed(path) for index, path in start.course.carriers.items() if _moves(path)
+    }
+    return _along(scenario, start.path, carriers, start.path.times[-1])
+
+
+def _moves(path: AnyPath) -> bool:
+    return not isinstance(path, RestPath)
+
+
+def _along(scenario: Scenario, path: AnyPath, carriers: dict[int, AnyPath], seconds: float) -> Deviation | None:
+    """The platform on `path`, carriers on theirs or as the planner guesses about it."""
+    if path.frame != scenario.path.frame:
+        raise InputError(f"start: frame: {path.frame!r}; accepted: that of the task's path, {scenario.path.frame!r}")
+    if scenario.count == 0:
+        return None
+    nodes = np.linspace(0.0, seconds, scenario.task.steps + 1)
+    there = scenario.along(path, seconds)
+    about = initial_guess(there, nodes)
+    values = [part.copy() for part in (about.q, about.v, about.a)]
+    wanted, _ = there.references(nodes)
+    mine, bases = scenario.lasting(seconds).references(nodes)
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        for value, at, reference in zip(values, wanted, mine, strict=True):
+            if owner is None:
+                value[:, column] = (at - reference)[:, coordinate]
+        if owner in carriers:
+            its = carriers[owner].at(nodes, seconds)
+            for value, at, reference in zip(values, its, bases[owner], strict=True):
+                value[:, column] = (at - reference)[:, coordinate]
+    q, v, a = values
+    return _lasting(scenario, Deviation(nodes, q, v, a, about.tensions))
+
+
+def _lasting(scenario: Scenario, theirs: Deviation) -> Deviation:
+    """Stretched to the scenario's duration; where that is open it starts from theirs, inside the range."""
+    seconds, span = scenario.duration, scenario.duration_range
+    if span is not None:
+        seconds = float(np.clip(theirs.nodes[-1], span.min, span.max))
+    stretch = seconds / theirs.nodes[-1]
+    return Deviation(theirs.nodes * stretch, theirs.q, theirs.v / stretch, theirs.a / stretch**2, theirs.tensions)
