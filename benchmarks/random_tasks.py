@@ -76,7 +76,7 @@ def wrong(found: Plan) -> str:
         if not ((tensions >= low) & (tensions <= high)).all():
             return "wrong: feasible, but a tension is beyond its limits"
         A = found.scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
-        w = found.scenario.dynamics.required_wrench(*audit.motion, *audit.carriers, wind=found.scenario.task.wind)
+        w = found.scenario.dynamics.required_wrench(*audit.motion, *audit.carriers, wind=found.scenario.wind)
         missing = ((np.einsum("nij,nj->ni", A, tensions) - w) * robot.dof_mask)[:, :3]
         if np.linalg.norm(missing, axis=1).max() > max(audit.tolerance, 1e-6):
             return "wrong: feasible, but the tensions do not give the force"
@@ -89,7 +89,8 @@ def wrong(found: Plan) -> str:
         pose, carriers = audit.motion.pose[row], audit.carriers.pose[row]
         A = found.scenario.dynamics.wrench_matrix(pose, carriers)
         motions = [part[row] for part in (*audit.motion, *audit.carriers)]
-        w = found.scenario.dynamics.required_wrench(*motions, wind=found.scenario.task.wind)
+        wind = audit.certificate_wind or found.scenario.wind
+        w = found.scenario.dynamics.required_wrench(*motions, wind=wind)
         problem = masked_problem(found.scenario.dynamics, A, w, *found.scenario.bounds())
         return "" if certificate.verify(problem) else "wrong: infeasible, but its certificate proves nothing"
     return ""

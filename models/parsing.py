@@ -124,14 +124,14 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     return ": ".join(part for part in (where, _printable(field), _printable(message)) if part) + more
 
 
-_TYPE = re.compile(r"(function-(after|before|plain|wrap)|literal|constrained-\w+)\[.*\]$")  # as pydantic names it
+_TYPE = re.compile(r"(function-(after|before|plain|wrap)|literal|tuple|constrained-\w+)\[.*\]$")  # as pydantic names it
 
 
 def _without_branches(details: list[Any]) -> list[Any]:
     """Pydantic's complaints with one for each choice of types instead of one for each type.
 
-    It names the types in the place. A mapping is meant for the type that takes one; of a plain value all types say what
-    they would have.
+    It names the types in the place. A mapping is meant for the type that takes one, and so is a list; of a plain value
+    all types say what they would have.
     """
     told: list[Any] = []
     while details:
@@ -144,9 +144,12 @@ def _without_branches(details: list[Any]) -> list[Any]:
             continue
         branches = [one for one in details if one["loc"][:at] == place[:at]]
         details = [one for one in details if one["loc"][:at] != place[:at]]
-        taking = [one for one in branches if one["type"] not in ("float_type", "literal_error")]
+        taking = [one for one in branches if one["type"] not in ("float_type", "literal_error", "tuple_type")]
+        listed = [one for one in branches if str(one["loc"][at]).startswith("tuple[") and one["type"] != "tuple_type"]
         if isinstance(first["input"], dict) and taking:
             told += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in taking]
+        elif listed:
+            told += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in listed]
         else:
             plain = [
                 one["msg"].removeprefix("Value error, ") for one in branches if not one["type"].startswith("model")

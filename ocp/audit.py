@@ -2,35 +2,34 @@
 
 Inverse dynamics in {G} and the exact tension solver judge every instant on its own. What counts as violation is the
 distance, in newtons (moments over `Robot.length`), from the wrench that the motion needs to those that the cables can
-give inside their limits less the task's margin.
+give inside their limits less the task's margin. For a box of winds it is the largest such distance of the winds that
+decide (`wind_set`), and where there is none, of winds inside the box too. All other limits are in `checks`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
-from ..models.robot import COORDINATES
-from ..solvers import Certificate, TensionProblem, certify, solve
+from ..models.robot import Vector3
+from ..solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ..workspace.pose import masked_problem
+from .checks import END_TOLERANCE, UNDERACTUATED_TOLERANCE, Seen, excesses
 from .drift import Drift, drift
-from .limits import limits
+from .excess import Excess
 from .path import Motion
 from .scenario import AUDIT_RATE, Deviation, Scenario
-from .task import FreeBase
+from .wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
 
 TOLERANCE = 1e-6  # [N]
-UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
-LIMIT_TOLERANCE = 1e-6  # relative, of the carriers' own limits
-PATH_TOLERANCE = 1e-7  # [m, rad], of the tube
-END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers start and end
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
-RATE_TOLERANCE = 1e-3  # relative, of tension rates: the audited tensions are the planned ones but for the wrench's rest
-LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
+LOOKS = 50  # at a time, for the worst instant of a wind in which there are no tensions
+INNER_WINDS = 8  # of a box of winds, at each instant others
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,13 @@ class Audit:
     tracking_error
         Distance from the path at each time [m].
     excess
-        Other limits that do not hold (carriers, tube, ends, lengths, those of `limits`): sentences, empty if none.
+        Other limits that do not hold (carriers, tube, ends, lengths, those of `limits`), empty if none.
     soft_excess
         Soft limits that are passed, likewise.
     certificate, certificate_time
         The certificate with the largest shortfall and its time [s]; None if there is none.
+    certificate_wind
+        The wind at which it holds [m/s], of a task with a box of winds; None of others.
     drift
         Where the planned tensions alone would take the platform; None for robots that can follow any motion exactly,
         and where there are no tensions.
@@ -69,10 +70,11 @@ class Audit:
     violation: np.ndarray  # (n,)
     tolerance: float
     tracking_error: np.ndarray  # (n,)
-    excess: list[str] = field(default_factory=list)
-    soft_excess: list[str] = field(default_factory=list)
+    excess: list[Excess] = field(default_factory=list)
+    soft_excess: list[Excess] = field(default_factory=list)
     certificate: Certificate | None = None
     certificate_time: float | None = None
+    certificate_wind: Vector3 | None = None
     drift: Drift | None = None
 
     @property
@@ -92,8 +94,8 @@ class Audit:
             "worst_violation": float(self.violation.max()),
             "at_s": float(self.times[self.worst]),
             "tolerance": self.tolerance,
-            "excess": self.excess,
-            "soft_excess": self.soft_excess,
+            "excess": [excess.as_dict() for excess in self.excess],
+            "soft_excess": [excess.as_dict() for excess in self.soft_excess],
             "drift": None if self.drift is None else {k: _number(v) for k, v in self.drift._asdict().items()},
         }
 
@@ -110,37 +112,38 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
     motion, carriers = scenario.motion(times, deviation)
     _refuse_zero_lengths(scenario, times, motion, carriers)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
-    w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.task.wind)
+    w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.wind)
     few = _few_cables(scenario, A)
     tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if few and scenario.count else TOLERANCE
-    verdict = _distribute(scenario, A, w, _wished_tensions(deviation, times, robot.m), few, tolerance)
+    distribute = _Distribution(scenario, A, few, tolerance)
+    verdict = distribute(w, _wished_tensions(deviation, times, robot.m))
+    tensions, wind = verdict.tensions, None
+    if (box := scenario.wind_box) is not None:
+        verdict, wind = _in_all_winds(distribute, box, motion, verdict)
     off_path = scenario.off_path(times, motion, carriers)
-    excess = [
-        *_carrier_excess(scenario, carriers),
-        *_length_excess(scenario, motion, carriers),
-        *_path_excess(scenario, off_path),
-        *_end_excess(scenario, carriers),
-        *_locked_excess(scenario, motion),
-        *verdict.excess,
-    ]
-    hard, soft = _limit_excess(scenario, times, motion, carriers, verdict.tensions)
-    excess += hard
-    followed = few and np.isfinite(verdict.tensions).all()
+    found = excesses(Seen(scenario, deviation, times, motion, carriers, tensions, off_path))
+    if verdict.beyond > TOLERANCE and verdict.at is not None:
+        why = "tensions inside their limits less the margin miss what the cables could give"
+        told = (float(times[verdict.at]), verdict.beyond, 0.0, "N", "exactly", why)
+        found.append(Excess("tensions", "missing wrench", *told))
+    soft = scenario.task.limits.soft
+    followed = few and np.isfinite(tensions).all()
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
         times=times,
         motion=motion,
         carriers=carriers,
-        tensions=verdict.tensions,
+        tensions=tensions,
         tensions_unlimited=(np.linalg.pinv(A, rcond=1e-9) @ w[..., None])[..., 0],
         violation=verdict.violation,
         tolerance=tolerance,
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
-        excess=excess,
-        soft_excess=soft,
+        excess=[excess for excess in found if excess.limit not in soft],
+        soft_excess=[excess for excess in found if excess.limit in soft],
         certificate=verdict.certificate,
         certificate_time=None if verdict.at is None else float(times[verdict.at]),
-        drift=drift(scenario, times, motion, carriers, verdict.tensions) if followed else None,
+        certificate_wind=wind,
+        drift=drift(scenario, times, motion, carriers, tensions) if followed else None,
     )
 
 
@@ -171,52 +174,126 @@ class _Verdict(NamedTuple):
     violation: np.ndarray  # (n,)
     certificate: Certificate | None
     at: int | None  # row of the certificate
-    excess: list[str]  # limits that are missed though what few cables cannot follow is tolerated
+    beyond: float  # [N] by which limits are missed where what few cables cannot follow is tolerated
 
 
-def _distribute(
-    scenario: Scenario, A: np.ndarray, w: np.ndarray, wished: np.ndarray | None, few: bool, tolerance: float
-) -> _Verdict:
-    """Tensions of every instant, or how much is missing; the certificate of the worst.
+class _Distribution:
+    """Tensions of every instant of a motion with wrench matrices A (n, 6, m), for any wrenches that it may need.
 
     Where the tensions nearest to the wished ones, without limits, happen to lie inside the limits they are the answer:
-    a batch of pseudo-inverses finds those. The exact solver judges the others one by one.
+    a batch of pseudo-inverses finds those. The exact solver judges the others, and those that it finds none for one by
+    one.
 
     Of few cables, whose columns do not span all wrenches, a wrench outside of what they span is expected to miss a
     little. Inside of it nothing may: there the limits count as for any robot.
     """
-    robot, (low, high) = scenario.robot, scenario.bounds()
-    scaled_A, scaled_w = _scaled(scenario, A), _scaled(scenario, w)
-    wish = np.zeros((len(w), robot.m)) if wished is None else wished
-    missing = scaled_w - np.einsum("nij,nj->ni", scaled_A, wish)
-    tensions = wish + (np.linalg.pinv(scaled_A, rcond=INDEPENDENT if few else 1e-9) @ missing[..., None])[..., 0]
-    violation = np.linalg.norm(scaled_w - np.einsum("nij,nj->ni", scaled_A, tensions), axis=1)
-    inside = ((tensions >= low) & (tensions <= high)).all(axis=1)
-    good = violation <= (tolerance if few else EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1)))
-    worst: Certificate | None = None
-    at: int | None = None
-    beyond = 0.0
-    for k in np.flatnonzero(~(inside & good)):
-        problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
-        solution = solve(problem)
-        certificate = solution.certificate
-        tensions[k] = np.nan if solution.tensions is None else solution.tensions
-        if solution.tensions is not None:
-            violation[k] = solution.residual
-        elif certificate is None:
-            violation[k] = np.inf
-        else:
-            closest = certificate.closest
-            violation[k] = np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w)
-            if few:
-                tensions[k] = closest
-                inside_range = certify(_inside_range(problem))
-                if inside_range is not None:
-                    certificate, beyond = inside_range, max(beyond, inside_range.shortfall)
-            if worst is None or certificate.shortfall > worst.shortfall:
-                worst, at = certificate, int(k)
-    limits = [f"tensions: {beyond:.3g} N beyond their limits or margin"] if beyond > TOLERANCE else []
-    return _Verdict(tensions, violation, worst, at, limits)
+
+    def __init__(self, scenario: Scenario, A: np.ndarray, few: bool, tolerance: float):
+        self.scenario, self.A, self.few, self.tolerance = scenario, A, few, tolerance
+        self._scaled_A = _scaled(scenario, A)
+        self._inverse = np.linalg.pinv(self._scaled_A, rcond=INDEPENDENT if few else 1e-9)
+
+    def __call__(self, w: np.ndarray, wished: np.ndarray | None, looks: int | None = None) -> _Verdict:
+        """What becomes of the required wrenches w (n, 6), with tensions near the wished ones (n, m).
+
+        With `looks` the largest violation is looked for at so many of the instants without tensions, and then at all
+        near the worst of them; elsewhere the violation is the least that a verified direction proves.
+        """
+        scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
+        robot, (low, high) = scenario.robot, scenario.bounds()
+        scaled_A, scaled_w = self._scaled_A, _scaled(scenario, w)
+        wish = np.zeros((len(w), robot.m)) if wished is None else wished
+        missing = scaled_w - np.einsum("nij,nj->ni", scaled_A, wish)
+        tensions = wish + (self._inverse @ missing[..., None])[..., 0]
+        violation = np.linalg.norm(scaled_w - np.einsum("nij,nj->ni", scaled_A, tensions), axis=1)
+        inside = ((tensions >= low) & (tensions <= high)).all(axis=1)
+        good = violation <= (tolerance if few else EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1)))
+        worst: Certificate | None = None
+        at: int | None = None
+        beyond = 0.0
+        rows = np.flatnonzero(~(inside & good))
+        if rows.size:
+            mask = robot.dof_mask
+            batch = solve_batch(A[rows] * mask[:, None], w[rows] * mask, low, high, wish[rows], length=robot.length)
+            solved = rows[batch.feasible]
+            tensions[solved], violation[solved] = batch.tensions[batch.feasible], batch.residual[batch.feasible]
+            rows, proven = rows[~batch.feasible], batch.shortfall[~batch.feasible]
+            if looks is not None and not few and len(rows) > 2 * looks and np.isfinite(proven).all():
+                violation[rows] = proven
+                tensions[rows] = np.nan
+                rows = _worst_of(rows, looks, lambda k: _distance(scenario, A[k], w[k]))
+        for k in rows:
+            problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
+            solution = solve(problem)
+            certificate = solution.certificate
+            tensions[k] = np.nan if solution.tensions is None else solution.tensions
+            if solution.tensions is not None:
+                violation[k] = solution.residual
+            elif certificate is None:
+                violation[k] = np.inf
+            else:
+                closest = certificate.closest
+                violation[k] = np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w)
+                if few:
+                    tensions[k] = closest
+                    inside_range = certify(_inside_range(problem))
+                    if inside_range is not None:
+                        certificate, beyond = inside_range, max(beyond, inside_range.shortfall)
+                if worst is None or certificate.shortfall > worst.shortfall:
+                    worst, at = certificate, int(k)
+        return _Verdict(tensions, violation, worst, at, beyond)
+
+
+def _worst_of(rows: np.ndarray, looks: int, value: Callable[[int], float]) -> np.ndarray:
+    """Rows about the one of the largest value, looked for evenly and then closer."""
+    stride = -(-len(rows) // looks)
+    while stride > 1:
+        best = int(np.argmax([value(k) for k in rows[::stride]])) * stride
+        rows = rows[max(best - stride, 0) : best + stride + 1]
+        stride = -(-len(rows) // looks)
+    return rows
+
+
+def _distance(scenario: Scenario, A: np.ndarray, w: np.ndarray) -> float:
+    """Of a required wrench from those available [N]."""
+    certificate = certify(masked_problem(scenario.dynamics, A, w, *scenario.bounds()))
+    return 0.0 if certificate is None else certificate.shortfall
+
+
+def _in_all_winds(
+    distribute: _Distribution, box: WindBox, motion: Motion, middle: _Verdict
+) -> tuple[_Verdict, Vector3 | None]:
+    """The verdict of the worst wind of a box at each instant, and the wind of its certificate.
+
+    `middle` is that of the planned tensions. Farther from the available wrenches than at the winds that decide the
+    wrench is nowhere: where these pass, others in the box are tried only to check that.
+    """
+    scenario = distribute.scenario
+    without_air = scenario.dynamics.required_wrench(*motion)
+    wish, n = np.nan_to_num(middle.tensions), len(motion.pose)
+    worst, wind = middle, None if middle.at is None else box.middle
+
+    def judge(winds: np.ndarray) -> None:
+        nonlocal worst, wind
+        push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
+        found = distribute(without_air - push, wish, LOOKS)
+        worse = _shortfall(found) > _shortfall(worst)
+        if worse and found.at is not None:
+            wind = as_wind(winds[found.at])
+        best = found if worse else worst
+        violation = np.maximum(worst.violation, found.violation)
+        worst = _Verdict(middle.tensions, violation, best.certificate, best.at, max(worst.beyond, found.beyond))
+
+    for winds in decisive_winds_at(box, scenario.robot, motion.pose, motion.velocity):
+        judge(winds)
+    if worst.violation.max() <= distribute.tolerance:
+        for winds in inner_winds(box, INNER_WINDS * n).reshape(n, INNER_WINDS, 3).swapaxes(0, 1):
+            judge(winds)
+    return worst, wind
+
+
+def _shortfall(verdict: _Verdict) -> float:
+    return 0.0 if verdict.certificate is None else verdict.certificate.shortfall
 
 
 def at_rest(scenario: Scenario, seen: Audit) -> Audit | None:
@@ -230,10 +307,13 @@ def at_rest(scenario: Scenario, seen: Audit) -> Audit | None:
         if any(np.abs(motions[k]).max() > END_TOLERANCE for k in (1, 2, 4, 5)):
             continue
         A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
-        w = scenario.dynamics.required_wrench(*motions, wind=scenario.task.wind)
-        certificate = certify(masked_problem(scenario.dynamics, A, w, low, high))
-        if certificate is not None:
-            return replace(seen, certificate=certificate, certificate_time=float(seen.times[row]))
+        for wind in scenario.winds_at(*motions[:2]):
+            w = scenario.dynamics.required_wrench(*motions, wind=wind)
+            certificate = certify(masked_problem(scenario.dynamics, A, w, low, high))
+            if certificate is not None:
+                at = None if scenario.wind_box is None else wind
+                time = float(seen.times[row])
+                return replace(seen, certificate=certificate, certificate_time=time, certificate_wind=at)
     return None
 
 
@@ -256,123 +336,8 @@ def _refuse_zero_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, 
     )
 
 
-def _locked_excess(scenario: Scenario, motion: Motion) -> list[str]:
-    """Which coordinates move that the platform does not have: they stay as at home."""
-    off = np.abs(motion.pose - scenario.robot.home).max(axis=0)
-    return [
-        f"platform: {name} moves by {off[i]:.3g}, but it is none of the platform's degrees of freedom"
-        for i, name in enumerate(COORDINATES)
-        if not scenario.robot.dof_mask[i] and off[i] > PATH_TOLERANCE
-    ]
-
-
-def _path_excess(scenario: Scenario, off_path: np.ndarray) -> list[str]:
-    """Whether the platform leaves its tube, one sentence each for position and attitude."""
-    tube, found = scenario.task.tube, []
-    away = float(np.linalg.norm(off_path[:, :3], axis=1).max())
-    if away > tube.radius + PATH_TOLERANCE:
-        found.append(f"platform: {away:.6g} m off its path exceeds the tube's {tube.radius:g} m")
-    turned = float(np.abs(off_path[:, 3:]).max())
-    if turned > tube.turn + PATH_TOLERANCE:
-        found.append(f"platform: {turned:.6g} rad off its path exceeds the tube's {tube.turn:g} rad")
-    return found
-
-
-def _end_excess(scenario: Scenario, carriers: Motion) -> list[str]:
-    """Whether free carriers start and end as the task says."""
-    base = scenario.task.base
-    if not isinstance(base, FreeBase):
-        return []
-    found = []
-    moving = sorted({index for index, _ in scenario.carrier_free})
-    speed = np.abs(carriers.velocity[[0, -1]][:, moving]).max()
-    if base.ends == "rest" and speed > END_TOLERANCE:
-        found.append(f"carriers: {speed:.3g} m/s at an end, which should be at rest")
-    gap = max(np.abs(part[0, moving] - part[-1, moving]).max() for part in carriers)
-    if base.ends == "periodic" and gap > END_TOLERANCE:
-        found.append(f"carriers: end {gap:.3g} away from where they started, in m, m/s or m/s^2")
-    return found
-
-
-def _length_excess(scenario: Scenario, motion: Motion, carriers: Motion) -> list[str]:
-    """Which cables leave the length that the drive keeps, one sentence each."""
-    kept = scenario.robot.fixed_lengths
-    if kept is None:
-        return []
-    off = np.abs(scenario.dynamics.cable_lengths(motion.pose, carriers.pose) - kept).max(axis=0)
-    return [
-        f"cable {i + 1}: its length is up to {off[i]:.3g} m off the fixed {kept[i]:g} m"
-        for i in np.flatnonzero(off > LENGTH_TOLERANCE)
-    ]
-
-
-def _limit_excess(
-    scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, tensions: np.ndarray
-) -> tuple[list[str], list[str]]:
-    """Which of `limits` do not hold, the worst instant of each in a sentence: hard ones and soft ones."""
-    hard: list[str] = []
-    soft: list[str] = []
-    most = scenario.task.limits.tension_rate
-    rates = np.abs(np.diff(tensions, axis=0)) / np.diff(times)[:, None]
-    if most is not None and np.nanmax(rates, initial=0.0) > most * (1 + RATE_TOLERANCE):
-        row, cable = np.unravel_index(np.nanargmax(rates), rates.shape)
-        rate = rates[row, cable]
-        hard.append(f"tension_rate: cable {cable + 1} at t = {times[row]:.3f} s: {rate:.6g} N/s exceeds {most:g} N/s")
-    found = limits(scenario)
-    if not found.all:
-        return hard, soft
-    bodies = [np.hstack(motion), *(np.hstack([part[:, i] for part in carriers]) for i in range(carriers.pose.shape[1]))]
-    values = found.function.map(len(times))(*(body.T for body in bodies), tensions.T).full().T
-    there = np.isfinite(tensions).all(axis=1, keepdims=True)
-    at = 0
-    for limit in found.all:
-        mine = values[:, at : at + len(limit.labels)]
-        at += len(limit.labels)
-        beyond = np.maximum(limit.low - mine, mine - limit.high)
-        # Without tensions nothing is said of what depends on them; any other nan keeps no limit.
-        beyond = np.where(np.isnan(beyond), np.where(there, np.inf, -np.inf), beyond)
-        tolerance = UNDERACTUATED_TOLERANCE if limit.equation else LIMIT_TOLERANCE
-        if beyond.max() <= tolerance * limit.scale:
-            continue
-        row, which = np.unravel_index(beyond.argmax(), beyond.shape)
-        value, bound = mine[row, which], limit.low if mine[row, which] < limit.low else limit.high
-        sentence = (
-            f"{limit.name}: {limit.labels[which]} at t = {times[row]:.3f} s: {value:.6g} {limit.unit}, "
-            f"accepted: {'at least' if bound == limit.low else 'at most'} {bound:g} {limit.unit}"
-        )
-        (hard if limit.soft is None else soft).append(sentence)
-    return hard, soft
-
-
 def _wished_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> np.ndarray | None:
     """The plan's tensions between its nodes, so that a redundant robot keeps the distribution that was planned."""
     if deviation is None:
         return None
     return np.stack([np.interp(times, deviation.nodes, deviation.tensions[:, i]) for i in range(m)], axis=1)
-
-
-def _carrier_excess(scenario: Scenario, carriers: Motion) -> list[str]:
-    """Which limits of carriers do not hold on the dense grid, one sentence each."""
-    found = []
-    for index, limit in scenario.limits.items():
-        name = scenario.robot.carriers[index].name
-        pose, velocity, acceleration = (part[:, index] for part in carriers)
-        tilt = np.arccos(np.clip(np.cos(pose[:, 3]) * np.cos(pose[:, 4]), -1, 1))
-        checks = {
-            "acceleration": (np.linalg.norm(acceleration[:, :3], axis=1), limit.acceleration, "m/s^2"),
-            "speed": (np.linalg.norm(velocity[:, :3], axis=1), limit.speed, "m/s"),
-            "tilt": (tilt, limit.tilt, "rad"),
-            "turn acceleration": (np.abs(acceleration[:, 3:5]).max(axis=1), limit.turn_acceleration, "rad/s^2"),
-        }
-        for quantity, (values, bound, unit) in checks.items():
-            if bound is not None and values.max() > bound * (1 + LIMIT_TOLERANCE):
-                found.append(f"{name}: {quantity} {values.max():.6g} {unit} exceeds {bound:g} {unit}")
-        outside = np.maximum(limit.low - pose[:, :3], pose[:, :3] - limit.high).max()
-        if outside > LIMIT_TOLERANCE:
-            found.append(f"{name}: {outside:.3g} m outside its reach box")
-        stays = scenario.robot.drive == "variable-length" and limit.attitude is not None
-        if stays and max(np.abs(velocity).max(), np.abs(acceleration).max()) > LIMIT_TOLERANCE:
-            found.append(f"{name}: moves, but with the drive variable-length only winches do")
-        if limit.attitude is not None and np.abs(pose[:, 3:] - limit.attitude).max() > LIMIT_TOLERANCE:
-            found.append(f"{name}: turns, but a mobile carrier keeps its attitude")
-    return found

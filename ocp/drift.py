@@ -77,7 +77,7 @@ def _run(
         pose, velocity = state[:, :6], state[:, 6:]
         carrier_pose, tensions = (values[at] for values in inputs)
         return np.hstack(
-            [velocity, scenario.dynamics.acceleration(pose, velocity, tensions, carrier_pose, scenario.task.wind)]
+            [velocity, scenario.dynamics.acceleration(pose, velocity, tensions, carrier_pose, scenario.wind)]
         )
 
     state = np.hstack([motion.pose[rows], motion.velocity[rows]])

@@ -104,11 +104,15 @@ class Finding:
     def certificate(self) -> dict[str, Any] | None:
         """Why there is no feasible motion: where, when and by how much; None for a feasible plan.
 
-        The keys of `solvers.Certificate.as_dict` and `time` [s]; the direction is in {G}.
+        The keys of `solvers.Certificate.as_dict`, `time` [s], and `wind` [m/s] of a task with a box of winds; the
+        direction is in {G}.
         """
         if self.feasible or self.audit.certificate is None:
             return None
-        return {"time": self.audit.certificate_time, **self.audit.certificate.as_dict()}
+        at: dict[str, Any] = {"time": self.audit.certificate_time}
+        if self.audit.certificate_wind is not None:
+            at["wind"] = list(self.audit.certificate_wind)
+        return at | self.audit.certificate.as_dict()
 
     @cached_property
     def missing(self) -> tuple[Missing, ...]:

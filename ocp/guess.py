@@ -112,4 +112,4 @@ def _balance(scenario: Scenario, guess: Deviation) -> tuple[np.ndarray, np.ndarr
     """A (n, 6, m) and w (n, 6) of a motion."""
     platform, carriers = scenario.motion(guess.nodes, guess)
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose)
-    return A, scenario.dynamics.required_wrench(*platform, wind=scenario.task.wind)
+    return A, scenario.dynamics.required_wrench(*platform, wind=scenario.wind)

@@ -194,9 +194,16 @@ def _rate_rows(
         rate = robot.force_scale * rise / (h * float(share))
         if objective.tension_rate is not None:
             cost += float(share) * ca.sumsqr(rate / objective.tension_rate)
-        if most is not None:
-            values.append(rate / (most * (1.0 - mesh.shrink)))
+        if most is None:
+            continue
+        share_of_most = rate / (most * (1.0 - mesh.shrink))
+        if (place := layout.slack_of("tension_rate")) is None:
+            values.append(share_of_most)
             rows += [("tension_rate", -1.0, 1.0)] * robot.m
+        else:
+            for sign in (1.0, -1.0):
+                values.append(sign * share_of_most - columns[0][place])
+                rows += [("tension_rate", -np.inf, 1.0)] * robot.m
     return cost
 
 

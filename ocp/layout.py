@@ -13,10 +13,11 @@ DURATION, MARGIN = "duration", "margin"
 
 @dataclass(frozen=True)
 class Layout:
-    """A point's column: q, v, a (n each), tensions (m), missing wrench (6 or 0), one slack a soft limit, `carried`.
+    """A point's column.
 
-    A smooth scheme's column has jerk and snap after a, times the first and second power of an interval's length at the
-    scenario's duration: so they are of the size of a.
+    That is q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), missing wrenches (6 each or
+    0), one slack a soft limit, `carried`. A smooth scheme's column has jerk and snap after a, times the first and
+    second power of an interval's length at the scenario's duration: so they are of the size of a.
 
     What all nodes share, the duration and the margin, each node carries a copy of, equal to the next one's: so the
     program stays banded.
@@ -25,8 +26,9 @@ class Layout:
     n: int
     m: int
     derivatives: int
+    winds: int
     elastic: bool
-    soft: int
+    soft: tuple[str, ...]
     carried: tuple[str, ...]
 
     @staticmethod
@@ -34,8 +36,9 @@ class Layout:
         """The layout that a scenario needs."""
         carried = [DURATION] * (scenario.duration_range is not None)
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
-        soft = 0 if elastic else len(scenario.task.limits.soft)
-        return Layout(scenario.count, scenario.robot.m, scenario.scheme.derivatives, elastic, soft, tuple(carried))
+        soft = tuple(scenario.task.limits.soft)
+        n, m, derivatives = scenario.count, scenario.robot.m, scenario.scheme.derivatives
+        return Layout(n, m, derivatives, scenario.decisive_winds, elastic, soft, tuple(carried))
 
     @property
     def q(self) -> slice:
@@ -73,16 +76,26 @@ class Layout:
         return slice(self.motion.stop, self.motion.stop + self.m)
 
     @property
-    def missing(self) -> slice:
-        """Missing wrench, of an elastic program."""
+    def wind_tensions(self) -> slice:
+        """Those in the decisive winds of a box, one wind after another, likewise."""
         start = self.tensions.stop
-        return slice(start, start + 6 * self.elastic)
+        return slice(start, start + self.winds * self.m)
+
+    @property
+    def missing(self) -> slice:
+        """Missing wrenches, of an elastic program: of the planned tensions, then of those in each decisive wind."""
+        start = self.wind_tensions.stop
+        return slice(start, start + 6 * (1 + self.winds) * self.elastic)
 
     @property
     def slacks(self) -> slice:
         """How far soft limits are passed, in their scale."""
         start = self.missing.stop
-        return slice(start, start + self.soft)
+        return slice(start, start + len(self.soft))
+
+    def slack_of(self, limit: str) -> int | None:
+        """Place of a soft limit's slack; None if the limit is hard."""
+        return self.slacks.start + self.soft.index(limit) if limit in self.soft else None
 
     @property
     def shared(self) -> slice:

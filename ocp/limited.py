@@ -60,8 +60,8 @@ def _of_limits(found: Finding, rows: np.ndarray) -> list[Limited]:
         curves = values[:, at : at + len(limit.labels)]
         at += len(limit.labels)
         low, high, unit = limit.low, limit.high, limit.unit
-        if unit == "(cosine)":
-            curves, low, high, unit = np.arccos(np.clip(curves, -1, 1)), -np.inf, float(np.arccos(limit.low)), "rad"
+        if limit.cosine:
+            curves, low, high = np.arccos(np.clip(curves, -1, 1)), -np.inf, float(np.arccos(limit.low))
         if low == 0.0 and limit.labels == ["platform"]:
             low = -np.inf  # of a length, which is none to speak of
         for label, curve in zip(limit.labels, curves.T, strict=True):

@@ -48,8 +48,8 @@ class Limit(NamedTuple):
         A typical size in this unit.
     soft
         Amount beyond the bounds that costs one; None: hard.
-    equation
-        Whether the bounds are one: then it holds at the nodes, and between them nearly.
+    cosine
+        Whether values and bounds are cosines of the angle that `unit` is of: they have derivatives where it is zero.
     """
 
     name: str
@@ -60,6 +60,7 @@ class Limit(NamedTuple):
     labels: list[str]
     scale: float
     soft: float | None = None
+    cosine: bool = False
 
     @property
     def equation(self) -> bool:
@@ -135,13 +136,20 @@ def limits(scenario: Scenario) -> Limits:
 
 
 def _all(scenario: Scenario, state: State) -> list[Limit]:
-    found = [*_of_cables(scenario, state), *_of_platform(scenario, state), *_of_carriers(scenario, state)]
+    found = [*_of_cables(scenario, state), *_of_platform(scenario, state)]
+    found += [*_of_carriers(scenario, state), *_soft_of_carriers(scenario, state)]
     found += [limit for place in scenario.task.limits.keep_out for limit in _of_place(state, place)]
     for index, carrier in enumerate(scenario.robot.carriers):
         if isinstance(carrier, QuadrotorCarrier):
             found += _of_quadrotor(state, index, carrier)
-    soft = scenario.task.limits.soft
-    return [limit._replace(soft=soft.get(limit.name)) for limit in found]
+    return [_softened(limit, scenario.task.limits.soft) for limit in found]
+
+
+def _softened(limit: Limit, soft: dict[str, float]) -> Limit:
+    amount = soft.get(limit.name)
+    if amount is not None and limit.cosine:
+        amount *= float(np.sqrt(1 - limit.low**2))  # what the cosine changes by as the angle does
+    return limit._replace(soft=amount)
 
 
 def _cables(m: int) -> list[str]:
@@ -158,6 +166,12 @@ def _of_cables(scenario: Scenario, state: State) -> list[Limit]:
         low, high = asked.cable_length.min, asked.cable_length.max
         size = max(abs(low), abs(high), 1e-3)
         found.append(Limit("cable_length", "m", state.run.lengths, low, high, _cables(robot.m), size))
+    if "margin" in asked.soft:
+        # Hard it bounds the tensions themselves.
+        low, high = ca.DM(robot.t_min), ca.DM(robot.t_max)
+        for inside in (state.tensions - low, high - state.tensions):
+            least = scenario.task.margin
+            found.append(Limit("margin", "N", inside, least, np.inf, _cables(robot.m), robot.force_scale))
     if asked.cable_clearance is not None:
         values, labels = [], []
         for i, j in combinations(range(robot.m), 2):
@@ -189,16 +203,47 @@ def _of_platform(scenario: Scenario, state: State) -> list[Limit]:
         ("platform_turn", body_rate(pose[3:6], velocity[3:6]), asked.platform_turn, "rad/s"),
     ):
         if bound is not None:
-            found.append(Limit(name, unit, ca.norm_2(value + 1e-9), 0.0, bound, ["platform"], bound))
+            found.append(Limit(name, unit, _size(value, bound), 0.0, bound, ["platform"], bound))
     if asked.platform_tilt is not None:
-        # As the cosine, whose derivative exists when level too.
-        upright = ca.cos(pose[3]) * ca.cos(pose[4])
-        found.append(
-            Limit("platform_tilt", "(cosine)", upright, float(np.cos(asked.platform_tilt)), np.inf, ["platform"], 1.0)
-        )
+        found.append(_tilt("platform_tilt", pose, asked.platform_tilt, "platform"))
     if asked.platform_box is not None:
         for axis, low, high in zip(range(3), asked.platform_box.min, asked.platform_box.max, strict=True):
             found.append(Limit("platform_box", "m", pose[axis], low, high, [f"platform {'xyz'[axis]}"], 1.0))
+    return found
+
+
+def _size(value: ca.SX, bound: float) -> ca.SX:
+    """|value|, larger by 5e-7 of the bound there: round at zero, where a motion rests and a norm has a corner."""
+    return ca.sqrt(ca.sumsqr(value) + (1e-3 * bound) ** 2)
+
+
+def _tilt(name: str, pose: ca.SX, most: float, about: str) -> Limit:
+    """As the cosine, whose derivative exists when level too."""
+    upright = ca.cos(pose[3]) * ca.cos(pose[4])
+    return Limit(name, "rad", upright, float(np.cos(most)), np.inf, [about], 1.0, cosine=True)
+
+
+def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:
+    """Carriers' own limits that the task makes soft; the hard ones hold between the nodes too (`interval`)."""
+    found, soft = [], scenario.task.limits.soft
+    for index, limit in scenario.limits.items():
+        name = scenario.robot.carriers[index].name
+        pose, velocity, acceleration = state.carriers[index]
+        for quantity, value, bound, unit in (
+            ("carrier_speed", velocity, limit.speed, "m/s"),
+            ("carrier_acceleration", acceleration, limit.acceleration, "m/s^2"),
+        ):
+            if quantity in soft and bound is not None:
+                found.append(Limit(quantity, unit, _size(value[:3], bound), 0.0, bound, [name], bound))
+        if "carrier_turn_acceleration" in soft and (turn := limit.turn_acceleration) is not None:
+            labels = [f"{name} roll", f"{name} pitch"]
+            found.append(Limit("carrier_turn_acceleration", "rad/s^2", acceleration[3:5], -turn, turn, labels, turn))
+        if "carrier_tilt" in soft and limit.tilt is not None:
+            found.append(_tilt("carrier_tilt", pose, limit.tilt, name))
+        if "carrier_reach" in soft and np.isfinite(limit.low).all():
+            for axis in range(3):
+                bounds = float(limit.low[axis]), float(limit.high[axis])
+                found.append(Limit("carrier_reach", "m", pose[axis], *bounds, [f"{name} {'xyz'[axis]}"], 1.0))
     return found
 
 
@@ -214,28 +259,38 @@ def _of_carriers(scenario: Scenario, state: State) -> list[Limit]:
 
 
 def _of_place(state: State, place: KeepOut) -> list[Limit]:
-    robot, found = state.robot, []
+    robot, riding = state.robot, place.frame == "platform"
+    anchors, attachments = state.anchors, state.attachments
+    carriers = ca.horzcat(*(carrier[0][:3] for carrier in state.carriers))
+    if riding:
+        R, origin = rotation(state.platform[0][3:6]), state.platform[0][:3]
+        anchors, carriers = (R.T @ (points - ca.repmat(origin, 1, points.shape[1])) for points in (anchors, carriers))
+        attachments = ca.SX(ca.DM(robot.attachments.T))
     com = kinematics.transform(state.platform[0], np.array([robot.platform.com]))
-    points = ca.horzcat(com, state.attachments)
-    bodies = {
-        "platform": (place.platform, [(point_outside(place, points[:, i]), "platform") for i in range(robot.m + 1)]),
-        "carriers": (
+    of_platform = ca.horzsplit(ca.horzcat(com, attachments))
+    bodies = [
+        ("keep_out", place.platform, [] if riding else [(point_outside(place, p), "platform") for p in of_platform]),
+        (
+            "carrier_platform_clearance" if riding else "keep_out",
             place.carriers,
-            [(point_outside(place, c[0][:3]), robot.carriers[i].name) for i, c in enumerate(state.carriers)],
-        ),
-        "cables": (
-            place.cables,
             [
-                (cable_outside(place, state.attachments[:, i], state.anchors[:, i]), f"cable {i + 1}")
-                for i in range(robot.m)
+                (point_outside(place, carriers[:, i]), carrier.name)
+                for i, carrier in enumerate(robot.carriers)
+                if carrier.kind != "ground"
             ],
         ),
-    }
-    for distance, outside in bodies.values():
-        if distance is not None:
+        (
+            "cable_platform_clearance" if riding else "keep_out",
+            place.cables,
+            [(cable_outside(place, attachments[:, i], anchors[:, i]), f"cable {i + 1}") for i in range(robot.m)],
+        ),
+    ]
+    found = []
+    for name, distance, outside in bodies:
+        if distance is not None and outside:
             values, labels = zip(*outside, strict=True)
             about = [f"{label} outside {place.name}" for label in labels]
-            found.append(Limit("keep_out", "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
+            found.append(Limit(name, "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
     return found
 
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..models.robot import Vector3
 from ..solvers import Certificate, certify
 from ..workspace.pose import masked_problem
 from .audit import Audit
@@ -27,16 +28,20 @@ class Missing(NamedTuple):
         Its worst instant [s].
     certificate
         The proof of that instant: `demand` is needed along its direction, `support` is available.
+    wind
+        Of a task with a box of winds, that in which it holds [m/s].
     """
 
     start: float
     end: float
     at: float
     certificate: Certificate
+    wind: Vector3 | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """{"from", "to", "at" [s], and the keys of `Certificate.as_dict`} for JSON."""
-        return {"from": self.start, "to": self.end, "at": self.at, **self.certificate.as_dict()}
+        at = {"from": self.start, "to": self.end, "at": self.at}
+        return at | ({} if self.wind is None else {"wind": list(self.wind)}) | self.certificate.as_dict()
 
 
 def missing(scenario: Scenario, seen: Audit) -> tuple[Missing, ...]:
@@ -47,16 +52,21 @@ def missing(scenario: Scenario, seen: Audit) -> tuple[Missing, ...]:
     found = []
     for first, after in sorted(edges):
         row = first + int(seen.violation[first:after].argmax())
-        certificate = _certificate(scenario, seen, row)
-        if certificate is not None:
+        proven = _certificate(scenario, seen, row)
+        if proven is not None:
             start, end, at = (float(seen.times[k]) for k in (first, after - 1, row))
-            found.append(Missing(start, end, at, certificate))
+            found.append(Missing(start, end, at, *proven))
     return tuple(found)
 
 
-def _certificate(scenario: Scenario, seen: Audit, row: int) -> Certificate | None:
-    """Why there are no tensions at one instant of the audit."""
+def _certificate(scenario: Scenario, seen: Audit, row: int) -> tuple[Certificate, Vector3 | None] | None:
+    """Why there are no tensions at one instant of the audit, and in which wind of a box."""
     motions = [part[row] for part in (*seen.motion, *seen.carriers)]
     A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
-    w = scenario.dynamics.required_wrench(*motions, wind=scenario.task.wind)
-    return certify(masked_problem(scenario.dynamics, A, w, *scenario.bounds()))
+    proofs = []
+    for wind in scenario.winds_at(*motions[:2]):
+        w = scenario.dynamics.required_wrench(*motions, wind=wind)
+        certificate = certify(masked_problem(scenario.dynamics, A, w, *scenario.bounds()))
+        if certificate is not None:
+            proofs.append((certificate, None if scenario.wind_box is None else wind))
+    return max(proofs, key=lambda proof: proof[0].shortfall, default=None)

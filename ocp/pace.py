@@ -30,6 +30,8 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
     task, still = scenario.task, [RestPath]
     if any(type(path) not in still for path in scenario.carrier_paths.values()):
         return None, "not asked: carriers move by times of their own"
+    if scenario.wind_box is not None:
+        return None, "not asked: in moving air the drag is no multiple of the speed's square"
     path = _curve(task.path)
     if path is None:
         return None, f"not asked: a path of kind {task.path.kind} with times or speeds of its own at its ends"
@@ -40,11 +42,11 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
         timing = time_along(
             scenario.robot,
             path,
-            margin=task.margin,
+            margin=scenario.hard_margin,
             carriers={names[index]: its for index, its in scenario.carrier_paths.items()},
             speed_max=hard["platform_speed"],
             cable_speed_max=hard["cable_speed"],
-            wind=task.wind,
+            wind=scenario.wind,
         )
     except (InputError, SolverError) as error:
         return None, f"not asked: {str(error).removeprefix('time_along: ')}"

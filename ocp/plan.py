@@ -156,7 +156,7 @@ def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relax
     near = min(max(asked, LONGER * left.shortest), left.longest / LONGER)
     if near < left.shortest or near > LONGEST * asked:
         return None
-    longer = scenario.lasting(near)
+    longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
     seen = search.audit_motion(longer, None, f"audit of {near:.4g} s")
     if not seen.passed:
         return None
@@ -255,8 +255,7 @@ def _refined(search: Search, outcome: Outcome, seen: Audit) -> Plan:
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
         outcome = search.solve("program", mesh, outcome.deviation)
         seen = search.audit(outcome)
-    feasible = seen.passed and outcome.success
-    return search.plan(PlanStatus.FEASIBLE if feasible else PlanStatus.NOT_FOUND, outcome, seen)
+    return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, outcome, seen)
 
 
 def _closest(search: Search, closest: Outcome) -> Plan:

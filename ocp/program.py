@@ -7,6 +7,7 @@ duration T too where the task leaves it open:
     s.t.  A(q_k) t_k = w(q_k, v_k, a_k)                                 at every point that the scheme asks
           (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
           t_min + margin <= t_k <= t_max - margin
+          the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
           the limits of `limits`                                        at every point that the scheme asks
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
 
@@ -90,8 +91,8 @@ class Program:
         return self.scenario.duration / self.mesh.steps
 
     def missing(self, x: np.ndarray) -> float:
-        """Largest missing wrench at a point of a solution x [N]."""
-        wrenches = self.columns(x)[:, self.layout.missing]
+        """Largest missing wrench at a point of a solution x, in any wind [N]."""
+        wrenches = self.columns(x)[:, self.layout.missing].reshape(-1, 6)
         return float(np.linalg.norm(wrenches, axis=1).max(initial=0.0) * self.scenario.robot.force_scale)
 
     def violation(self, x: np.ndarray, g: np.ndarray) -> float:
@@ -112,6 +113,7 @@ class Program:
             columns[:, layout.jerk] = self._step * jerk
             columns[:, layout.snap] = self._step**2 * np.gradient(jerk, nodes, axis=0)
         columns[:, layout.tensions] = deviation.tensions / self.scenario.robot.force_scale
+        columns[:, layout.wind_tensions] = np.tile(columns[:, layout.tensions], layout.winds)
         if (place := layout.at(DURATION)) is not None:
             columns[:, place] = deviation.nodes[-1] / self.scenario.duration
         return columns.ravel()[self.order]
@@ -236,8 +238,9 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
     lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
     low, high = scenario.bounds()
     reserve = np.minimum(mesh.reserve, (high - low) / 4)
-    lower[:, layout.tensions] = (low + reserve) / scenario.robot.force_scale
-    upper[:, layout.tensions] = (high - reserve) / scenario.robot.force_scale
+    for part, count in ((layout.tensions, 1), (layout.wind_tensions, layout.winds)):
+        lower[:, part] = np.tile((low + reserve) / scenario.robot.force_scale, count)
+        upper[:, part] = np.tile((high - reserve) / scenario.robot.force_scale, count)
     lower[:, layout.slacks] = 0.0
     if (place := layout.at(DURATION)) is not None and (span := scenario.duration_range) is not None:
         lower[:, place], upper[:, place] = span.min / scenario.duration, span.max / scenario.duration

@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..models import Robot
-from ..models.robot import COORDINATES
+from ..models.robot import COORDINATES, Vector3
 from ..solvers import Certificate
 from .finding import Finding
+from .task import Task
+from .wind_set import WindBox
 
 LEAST_SHARE = 0.05  # of a direction: what turns it less is not put into words
 Fact = tuple[str, str]  # its name, and the fact with its unit
@@ -104,6 +106,8 @@ def _decisive(plan: Finding) -> str:
     if certificate is None:
         return broken or "see the solver's message"
     short = f"short by {_short(certificate.shortfall)} N at t = {plan.audit.certificate_time:.3f} s"
+    if (wind := plan.audit.certificate_wind) is not None:
+        short += f" at wind {_wind(wind)}"
     return f"{short}, {broken}" if broken else short
 
 
@@ -116,6 +120,7 @@ def _why(plan: Finding) -> list[Fact]:
         pulled = ": the cables can but pull the other way"
         facts += [
             ("time", f"t = {plan.audit.certificate_time:.3f} s of {plan.scenario.duration:g} s"),
+            *([("wind", _wind(wind))] if (wind := plan.audit.certificate_wind) is not None else []),
             ("constraint", _constraint(plan, certificate)),
             ("wrench direction", direction_in_words(certificate, robot)),
             ("as a vector", _vector(certificate)),
@@ -140,7 +145,7 @@ def _constraint(plan: Finding, certificate: Certificate) -> str:
         for name, cables, bound in at
         if cables.size
     ]
-    margin = plan.scenario.task.margin
+    margin = plan.scenario.hard_margin
     return f"tension limits, {'; '.join(told)}" + (f", with the margin of {margin:g} N" if margin else "")
 
 
@@ -224,8 +229,20 @@ def _motion(plan: Finding) -> list[Fact]:
         ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
         ("tracking error", error),
         ("platform", f"up to {_short(speed)} m/s and {_short(acceleration)} m/s^2"),
-        *([("wind", f"({_listed(np.array(task.wind), 'g')}) m/s")] if task.wind is not None else []),
+        *([("wind", _asked_wind(task))] if task.wind is not None else []),
     ]
+
+
+def _wind(wind: Vector3) -> str:
+    return f"({_listed(np.array(wind), 'g')}) m/s"
+
+
+def _asked_wind(task: Task) -> str:
+    """The task's wind, or its box and whose tensions are told."""
+    if isinstance(task.wind, WindBox):
+        box = task.wind
+        return f"any from {_wind(box.min)} to {_wind(box.max)}; the tensions are those in {_wind(box.middle)}"
+    return "" if task.wind is None else _wind(task.wind)
 
 
 def _carriers(plan: Finding) -> list[Fact]:

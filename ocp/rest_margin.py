@@ -57,6 +57,9 @@ def rest_margin(scenario: Scenario) -> RestMargin:
     platform, carriers = scenario.motion(times, deviation)
     still = np.zeros_like(platform.pose)
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose)
-    w = scenario.dynamics.required_wrench(platform.pose, still, still, wind=scenario.task.wind)
-    problems = (masked_problem(scenario.dynamics, *both, *scenario.bounds()) for both in zip(A, w, strict=True))
-    return RestMargin(times, np.array([capacity_margin(problem).value for problem in problems]))
+    margins = np.full(PLACES, np.inf)
+    for wind in scenario.winds_at(platform.pose[0], still[0]):  # at rest they are the same everywhere
+        w = scenario.dynamics.required_wrench(platform.pose, still, still, wind=wind)
+        problems = (masked_problem(scenario.dynamics, *both, *scenario.bounds()) for both in zip(A, w, strict=True))
+        margins = np.minimum(margins, [capacity_margin(problem).value for problem in problems])
+    return RestMargin(times, margins)

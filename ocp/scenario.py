@@ -6,16 +6,22 @@ its home. The deviations are the unknowns of the planner, piecewise polynomials 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from ..errors import InputError
 from ..models import Dynamics, Robot
-from ..models.robot import MobileCarrier, QuadrotorCarrier
+from ..models.robot import MobileCarrier, QuadrotorCarrier, Vector3
+from .clearance import point_outside
 from .path import AnyPath, Motion, RestPath
 from .scheme import LINEAR, SCHEMES, Scheme
 from .task import DurationRange, FreeBase, GivenBase, HoldBase, Task
+from .task_limits import OF_CARRIERS
+from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
@@ -33,6 +39,15 @@ class CarrierLimits:
     tilt: float | None  # [rad]
     turn_acceleration: float | None  # [rad/s^2]
     attitude: np.ndarray | None  # (3,) that it keeps [rad]
+
+    def without(self, soft: Collection[str]) -> CarrierLimits:
+        """The same without the limits that are soft."""
+        dropped: dict[str, Any] = {
+            name: None for name in ("acceleration", "speed", "tilt", "turn_acceleration") if f"carrier_{name}" in soft
+        }
+        if "carrier_reach" in soft:
+            dropped |= {"low": np.full(3, -np.inf), "high": np.full(3, np.inf)}
+        return replace(self, **dropped)
 
     def shrunk(self, share: float) -> CarrierLimits:
         """Acceleration and speed limits less a share of themselves, for what happens between the nodes."""
@@ -110,6 +125,32 @@ class Scenario:
         """What the planner may choose the duration from; None if it is given."""
         return self.task.duration if isinstance(self.task.duration, DurationRange) else None
 
+    @property
+    def wind(self) -> Vector3 | None:
+        """The wind of the planned tensions in {G} [m/s]: of a box its middle; None: no air."""
+        return self.task.wind.middle if isinstance(self.task.wind, WindBox) else self.task.wind
+
+    @property
+    def wind_box(self) -> WindBox | None:
+        """All winds in which tensions have to exist; None if the task has one wind or none."""
+        return self.task.wind if isinstance(self.task.wind, WindBox) else None
+
+    def winds_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[Vector3 | None]:
+        """In which winds tensions have to exist as the platform moves (6,), in {G}: of a box in those that decide.
+
+        [None]: no air.
+        """
+        if self.wind_box is None:
+            return [self.wind]
+        winds = decisive_winds_at(self.wind_box, self.robot, pose[None], velocity[None])
+        return [as_wind(values[0]) for values in winds]
+
+    @property
+    def decisive_winds(self) -> int:
+        """How many winds of the box decide whether tensions exist in all."""
+        aero, box = self.robot.platform.aero, self.wind_box
+        return 0 if aero is None or box is None else len(choices(box, aero))
+
     def lasting(self, seconds: float) -> Scenario:
         """The same with another duration [s]."""
         return replace(self, duration=seconds)
@@ -134,8 +175,13 @@ class Scenario:
         return max(round(self.duration * self.task.output_rate), 1)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Tension limits less the task's margin, (m,) each [N]."""
-        return self.robot.t_min + self.task.margin, self.robot.t_max - self.task.margin
+        """Tension limits less the task's margin where that is hard, (m,) each [N]."""
+        return self.robot.t_min + self.hard_margin, self.robot.t_max - self.hard_margin
+
+    @property
+    def hard_margin(self) -> float:
+        """How far every tension has to stay inside its limits [N]; a soft margin is among `limits`."""
+        return 0.0 if "margin" in self.task.limits.soft else self.task.margin
 
     def references(self, times: np.ndarray) -> tuple[Motion, list[Motion]]:
         """The platform's path, in its own frame, and the carriers' reference motions in {G}."""
@@ -179,9 +225,10 @@ class Scenario:
         return spread
 
     def free_limits(self, shrink: float = 0.0) -> dict[int, CarrierLimits]:
-        """Limits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
+        """Hard limits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
         free = {index for index, _ in self.carrier_free}
-        return {index: limit.shrunk(shrink) for index, limit in self.limits.items() if index in free}
+        soft = self.task.limits.soft
+        return {index: limit.without(soft).shrunk(shrink) for index, limit in self.limits.items() if index in free}
 
     def owners(self) -> list[tuple[int | None, int]]:
         """Whose coordinate each free one is: (None for the platform or the carrier's index, coordinate)."""
@@ -206,6 +253,9 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
             )
     if task.wind is not None and robot.platform.aero is None:
         raise InputError(f"{where}: wind: robot {robot.name!r} has no platform.aero; accepted: none")
+    if isinstance(task.wind, WindBox):
+        _feels_no_tensions(robot, where)
+    _fit_limits(robot, task, where)
     opened = [*POSITION] * (task.tube.radius > 0) + [*ATTITUDE] * (task.tube.turn > 0)
     platform_free = [coordinate for coordinate in opened if robot.dof_mask[coordinate]]
     scenario = Scenario(
@@ -223,6 +273,40 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     _check_times(task, where)
     _check_transcription(task, where)
     return scenario
+
+
+def _feels_no_tensions(robot: Robot, where: str) -> None:
+    """Refuse a box of winds where other tensions are another motion."""
+    for carrier in robot.carriers:
+        if carrier.kind == "quadrotor":
+            raise InputError(
+                f"{where}: wind: is a box, but carrier {carrier.name!r} of kind quadrotor moves with its cables' pull, "
+                "so no motion is the same in every wind; accepted: one wind, (x, y, z) [m/s]"
+            )
+
+
+def _fit_limits(robot: Robot, task: Task, where: str) -> None:
+    """Refuse soft limits of carriers that the robot does not have, and a body nearer to cables than they may be."""
+    kinds = {carrier.kind for carrier in robot.carriers}
+    for name in task.limits.soft:
+        if name in ("thrust", "torque") and "quadrotor" not in kinds:
+            raise InputError(f"{where}: limits.soft: {name!r} is of quadrotors, and robot {robot.name!r} has none")
+        if name == "carrier_reach" and "mobile" not in kinds:
+            raise InputError(f"{where}: limits.soft: {name!r} is of mobile carriers, and robot {robot.name!r} has none")
+        if name.startswith("carrier_") and name in OF_CARRIERS and kinds == {"ground"}:
+            raise InputError(
+                f"{where}: limits.soft: {name!r} is of carriers that move, and robot {robot.name!r} has none"
+            )
+    for place in task.limits.keep_out:
+        if place.frame == "platform" and place.cables is not None:
+            for index, attachment in enumerate(robot.attachments):
+                outside = float(point_outside(place, ca.DM(attachment)))
+                if outside < place.cables:
+                    raise InputError(
+                        f"{where}: limits.keep_out: {place.name!r}: the attachment of cable {index + 1} is always "
+                        f"{outside:.3g} m outside of it; accepted: a shape that leaves attachments outside by as much "
+                        f"as cables: {place.cables:g} m"
+                    )
 
 
 def _frame(robot: Robot, task: Task, where: str) -> bool:

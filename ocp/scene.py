@@ -34,7 +34,7 @@ def scene(plan: Finding, times: np.ndarray) -> Scene:
         names=[robot.carriers[index].name for index in shown],
         bodies=[np.flatnonzero(of_cable == index) for index in shown],
         boxes=[(np.array(c.reach.min), np.array(c.reach.max)) for c in robot.carriers if isinstance(c, MobileCarrier)],
-        obstacles=[outline(place) for place in plan.scenario.task.limits.keep_out],
+        obstacles=[outline(place) for place in plan.scenario.task.limits.keep_out if place.frame == "world"],
         tensions=audit.tensions[rows],
         t_min=robot.t_min,
         t_max=robot.t_max,

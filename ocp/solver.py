@@ -31,7 +31,7 @@ class Outcome:
     success: bool  # whether all constraints are met; the message tells whether it is an optimum too
     message: str
     iterations: int
-    slack: float  # largest missing wrench at a node [N], zero in the rigid program
+    slack: float  # largest missing wrench at a node, in any wind [N], zero in the rigid program
 
 
 # The guess is near: IPOPT's default 0.1 throws it away, and "adaptive" took 8 times as long.

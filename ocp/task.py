@@ -15,6 +15,7 @@ from ..models.robot import Name, NonNegative, Part, Pose, Positive, Vector3
 from .path import AnyPath
 from .scheme import SchemeName
 from .task_limits import TaskLimits
+from .wind_set import WindBox
 
 FREE_TURN = 1.2  # [rad], from the path's angles, short of where Euler angles lose their meaning
 
@@ -132,7 +133,11 @@ class Task(Part):
     base: AnyBase = Field(default=HoldBase(kind="hold"), description="what the carriers do: hold, given or free")
     tube: Tube = Tube()
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
-    wind: Vector3 | None = Field(default=None, description="constant, in {G} [m/s]; none: no air")
+    wind: Vector3 | WindBox | None = Field(
+        default=None,
+        description="on the platform, constant, in {G} [m/s]; a box {min, max}: one motion for which tensions exist in "
+        "each of its winds, the planned ones being those of its middle; none: no air",
+    )
     limits: TaskLimits = TaskLimits()
     steps: int = Field(default=100, ge=4, le=20_000, description="intervals of the transcription")
     scheme: SchemeName = Field(

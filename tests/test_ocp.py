@@ -81,6 +81,11 @@ def support(A, direction, low, high):
     return -linprog(-(direction @ A), bounds=np.stack([low, high], axis=1)).fun
 
 
+def names(seen):
+    """Of the limits that an audit saw passed."""
+    return {excess.limit for excess in seen.excess}
+
+
 @pytest.fixture(scope="module")
 def circle_free():
     return plan(load("wang-flying"), {"name": "circle", "path": CIRCLE, "base": FREE})
@@ -318,13 +323,13 @@ def test_carriers_limits_count_whatever_the_base_does():
     far = {"robot1": [22, 0.45, 1.2, 0, 0, 0], "robot2": [1.275, 20.27, 1.2, 0, 0, 0]}
     found = plan(robot, {"path": rest, "duration": 1, "base": {"kind": "hold", "poses": far}, "tube": {"attitude": 1}})
     assert not found.feasible
-    assert any("reach box" in sentence for sentence in found.audit.excess)
+    assert "carrier_reach" in names(found.audit)
     turned = {"robot1": [2.2, 0.45, 1.2, 0, 0, 0.5]}
     found = plan(robot, {"path": rest, "duration": 1, "base": {"kind": "hold", "poses": turned}})
-    assert any("keeps its attitude" in sentence for sentence in found.audit.excess)
+    assert "carrier_attitude" in names(found.audit)
     fast = {"kind": "line", "start": [2.1, 0.45, 1.2], "end": [2.3, 0.45, 1.2], "timing": "uniform"}
     found = plan(robot, {"path": rest, "duration": 0.1, "base": {"kind": "given", "paths": {"robot1": fast}}})
-    assert any("speed 2 m/s exceeds 1 m/s" in sentence for sentence in found.audit.excess)
+    assert any("robot1 at t = 0.000 s: 2 m/s, accepted: at most 1 m/s" in str(excess) for excess in found.audit.excess)
 
 
 def test_turning_in_place_is_not_infinitely_fast():
@@ -337,12 +342,12 @@ def test_an_unconverged_motion_is_not_feasible(circle_free):
     """The audit looks at tube and ends too, which only a converged program keeps."""
     scenario = lay_out(load("wang-flying"), read_task({"path": CIRCLE, "base": {**FREE, "ends": "rest"}}))
     seen = audit(scenario, circle_free.deviation)
-    assert any("should be at rest" in sentence for sentence in seen.excess)
+    assert "base.ends" in names(seen)
     narrow = {"path": {**CIRCLE, "centre": [0, 0, -1]}, "tube": {"position": 0.5}}
     scenario = lay_out(load("wang-flying"), read_task(narrow))
     nodes = np.linspace(0, 10, 5)
     outside = Deviation(nodes, np.full((5, 3), 0.4), np.zeros((5, 3)), np.zeros((5, 3)), np.ones((5, 6)))
-    assert any("exceeds the tube" in sentence for sentence in audit(scenario, outside).excess)
+    assert "tube.position" in names(audit(scenario, outside))
 
 
 def test_drive_modes_of_three_robots():
@@ -360,7 +365,7 @@ def test_drive_modes_of_three_robots():
     lengths = Dynamics(fixed).cable_lengths(values["pose"].values, values["carrier_pose"].values)
     np.testing.assert_allclose(lengths, 1.2, atol=1e-4)
     held = plan(fixed, {**task, "base": {"kind": "hold"}})
-    assert any("off the fixed 1.2 m" in sentence for sentence in held.audit.excess)
+    assert "cable_length" in names(held.audit)
     with pytest.raises(InputError, match=r"has no carrier that moves .drive: variable-length."):
         plan(Robot.model_validate({**data, "drive": "variable-length"}), task)
 
@@ -395,7 +400,7 @@ def test_what_cannot_move_does_not_move():
         path = {"kind": "line", "start": list(robot.home), "end": list(robot.home + np.array(end))}
         found = plan(robot, {"path": path, "duration": 2})
         assert not found.feasible
-        assert any("none of the platform's degrees of freedom" in sentence for sentence in found.audit.excess)
+        assert "dof" in names(found.audit)
     robot = load("planar-4")
     path = {"kind": "line", "start": list(robot.home), "end": list(robot.home + np.array([0.1, 0, 0.1, 0, 0.05, 0]))}
     assert plan(robot, {"path": path, "duration": 2}).feasible
@@ -428,7 +433,7 @@ def test_variable_length_robots_stay():
     moved = {robot.carriers[0].name: {"kind": "line", "start": start, "end": [start[0] + 0.02, *start[1:]]}}
     path = {"kind": "rest", "pose": list(robot.home)}
     found = plan(robot, {"path": path, "duration": 2, "base": {"kind": "given", "paths": moved}})
-    assert any("only winches do" in sentence for sentence in found.audit.excess)
+    assert "drive" in names(found.audit)
 
 
 def test_saved_samples_are_audited_and_equally_spaced():
@@ -473,7 +478,7 @@ def test_audit_sees_carriers_out_of_their_limits(circle_free):
     good = circle_free.deviation
     fast = Deviation(good.nodes, good.q, good.v, 10 * good.a, good.tensions)
     seen = audit(scenario, fast)
-    assert any("acceleration" in sentence for sentence in seen.excess)
+    assert "carrier_acceleration" in names(seen)
     assert not seen.passed
 
 

@@ -106,10 +106,11 @@ def test_winch_speeds_are_differences_of_lengths():
     bodies = [np.hstack(seen.motion), np.hstack([part[:, 0] for part in seen.carriers])]
     values = all_limits.function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T[1:-1]
     np.testing.assert_allclose(values[:, :8], by_difference, atol=1e-4)
-    np.testing.assert_allclose(values[:, 8], np.linalg.norm(seen.motion.velocity[1:-1, :3], axis=1), atol=1e-8)
+    speed = np.hypot(np.linalg.norm(seen.motion.velocity[1:-1, :3], axis=1), 1e-3 * 9.0)  # round at zero
+    np.testing.assert_allclose(values[:, 8], speed, atol=1e-8)
     slow = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 0.5}})
     assert not slow.feasible
-    assert any(sentence.startswith("cable_speed: cable ") for sentence in slow.audit.excess)
+    assert [excess.limit for excess in slow.audit.excess] == ["cable_speed"]
     soft = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 0.5, "soft": {"cable_speed": 0.1}}})
     assert soft.feasible
     assert soft.audit.soft_excess

@@ -19,6 +19,7 @@ from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
 from towline.models import Dynamics, load
 from towline.ocp import PlanStatus, plan
+from towline.ocp.excess import Excess
 from towline.ocp.report import direction_in_words, missing, sections, verdict
 from towline.ocp.scene import outline, scene
 from towline.ocp.task_limits import Block, Capsule, Sphere
@@ -26,6 +27,7 @@ from towline.solvers import TensionProblem, certify
 
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.2 * np.pi}
 FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
+FAST = Excess("carrier_speed", "quad", 0.5, 3.0, 1.0, "m/s")
 SIDEWAYS = {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}
 
 
@@ -111,18 +113,18 @@ def test_report_of_an_infeasible_plan_tells_the_certificate(impossible):
 
 def test_report_of_a_plan_that_was_not_found_does_not_claim_a_proof(impossible):
     lost = replace(impossible, status=PlanStatus.NOT_FOUND)
-    lost = replace(lost, audit=replace(lost.audit, excess=["quad: speed 3 m/s exceeds 1 m/s"]))
+    lost = replace(lost, audit=replace(lost.audit, excess=[FAST]))
     assert "NOT-FOUND" in verdict(lost)
     assert "1 other limit broken" in verdict(lost)
     assert "Why there is none" not in lost.report()
-    assert facts(lost)["What the closest motion misses", "limit broken"] == "quad: speed 3 m/s exceeds 1 m/s"
+    assert facts(lost)["What the closest motion misses", "limit broken"] == str(FAST)
     only = replace(lost, audit=replace(lost.audit, certificate=None, certificate_time=None))
     assert verdict(only).endswith("NOT-FOUND, 1 other limit broken")
 
 
 def test_soft_limits_that_are_passed_are_told_of_a_feasible_plan(free):
-    passed = replace(free, audit=replace(free.audit, soft_excess=["cable_speed: cable 1: 2 m/s"]))
-    assert facts(passed)["Soft limits passed", "limit"] == "cable_speed: cable 1: 2 m/s"
+    passed = replace(free, audit=replace(free.audit, soft_excess=[FAST]))
+    assert facts(passed)["Soft limits passed", "limit"] == str(FAST)
     assert "Soft limits passed" not in free.report()
 
 
@@ -199,7 +201,7 @@ def test_what_comes_from_files_is_escaped(impossible, tmp_path):
     evil = '<script>alert("1")</script>&amp;'
     robot = load("wang-flying").model_copy(update={"name": evil, "source": evil})
     task = impossible.scenario.task.model_copy(update={"name": evil})
-    audit = replace(impossible.audit, excess=[evil])
+    audit = replace(impossible.audit, excess=[replace(FAST, about=evil)])
     found = replace(impossible, scenario=replace(impossible.scenario, robot=robot, task=task), audit=audit)
     found = replace(found, message=evil, deviation=found.deviation)
     text = found.save_report(tmp_path / "evil.html").read_text()

@@ -1,0 +1,193 @@
+"""The audit by itself: a motion that keeps all is changed by hand to leave one thing, which the audit names."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from towline.models import load
+from towline.ocp.audit import audit
+from towline.ocp.excess import Excess
+from towline.ocp.scenario import Deviation, lay_out
+from towline.ocp.task import read_task
+
+LASTS = 2.0  # [s]
+NODES = np.linspace(0, LASTS, 21)
+RIGHT = {"kind": "line", "start": [0, 0, 1], "end": [0.2, 0.1, 1.1]}
+POINTS = {"kind": "waypoints", "points": [[0, 0, 1], [0.1, 0.1, 1], [0.2, 0, 1.1]]}
+IN_CARRIER = {"kind": "line", "start": [0, 0, -1], "end": [0.05, 0, -1.1], "frame": "quad"}
+ROUND = {"quad": {"kind": "circle", "centre": [0, 0, 0], "radius": 0.05, "rate": 2 * np.pi / LASTS}}
+
+
+def on_the_path(task, robot="ipanema-1"):
+    """The scenario and the deviation that is none."""
+    scenario = lay_out(load(robot), read_task({"duration": LASTS, **task}))
+    none = np.zeros((len(NODES), scenario.count))
+    return scenario, Deviation(NODES, none, none, none, np.zeros((len(NODES), scenario.robot.m)))
+
+
+def moved(scenario, deviation, owner, coordinate, values, bc_type="not-a-knot"):
+    """The deviation with one coordinate along the cubic spline through values at the nodes: a motion, exactly."""
+    curve = CubicSpline(NODES, values, bc_type=bc_type)
+    column = scenario.owners().index((owner, coordinate))
+    parts = []
+    for k, part in enumerate((deviation.q, deviation.v, deviation.a)):
+        parts.append(part.copy())
+        parts[-1][:, column] = curve(NODES, k)
+    return Deviation(NODES, *parts, deviation.tensions)
+
+
+def found(scenario, deviation):
+    """What the audit saw passed, by name."""
+    passed = {}
+    for excess in audit(scenario, deviation).excess:
+        passed.setdefault(excess.limit, []).append(excess)
+    return passed
+
+
+TUBE = {"position": 0.05, "attitude": 0.1, "ends": "exact"}
+SMALL = 1e-4
+
+
+@pytest.mark.parametrize("frame", ["world", "carrier"])
+@pytest.mark.parametrize("coordinate", [0, 2, 4])
+def test_ends_of_the_tube(frame, coordinate):
+    if frame == "world":
+        scenario, none = on_the_path({"path": RIGHT, "tube": TUBE})
+    else:
+        base = {"kind": "given", "paths": ROUND}
+        scenario, none = on_the_path({"path": IN_CARRIER, "tube": TUBE, "base": base}, "wang-flying")
+    assert audit(scenario, none).passed
+    away = moved(scenario, none, None, coordinate, np.full(len(NODES), SMALL))
+    told = found(scenario, away)
+    assert set(told) == {"tube.ends"}
+    assert [excess.time for excess in told["tube.ends"]] == [0, LASTS]
+    assert [excess.value for excess in told["tube.ends"]] == pytest.approx([SMALL] * 2, rel=1e-3)
+    late = moved(scenario, none, None, coordinate, SMALL * NODES**2 * (NODES - LASTS))  # speed at the end alone
+    told = found(scenario, late)
+    assert set(told) == {"tube.ends"}
+    (excess,) = told["tube.ends"]
+    assert excess.time == LASTS
+    assert excess.unit == ("rad/s" if coordinate == 4 else "m/s")
+    assert excess.value == pytest.approx(SMALL * LASTS**2, rel=1e-3)
+    free, _ = on_the_path({"path": RIGHT, "tube": {**TUBE, "ends": "free"}})
+    if frame == "world":
+        assert audit(free, away).passed
+        assert audit(free, late).passed
+
+
+def test_exact_waypoints():
+    tube = {"position": 0.05, "attitude": 0.1, "waypoints": "exact"}
+    scenario, none = on_the_path({"path": POINTS, "tube": tube})
+    assert audit(scenario, none).passed
+    knot = scenario.task.path.knots(LASTS)[1]
+    bump = SMALL * np.exp(-(((NODES - knot) / 0.3) ** 2))
+    told = found(scenario, moved(scenario, none, None, 1, bump))
+    assert set(told) == {"tube.waypoints"}
+    (excess,) = told["tube.waypoints"]
+    assert excess.time == pytest.approx(knot)
+    assert excess.value == pytest.approx(SMALL, rel=0.01)
+    assert excess.about == "platform off point 2"
+    beside = SMALL * np.sin(2 * np.pi * (NODES - knot))
+    assert audit(scenario, moved(scenario, none, None, 1, beside)).excess == []
+
+
+def test_the_tube_and_its_attitude():
+    scenario, none = on_the_path({"path": RIGHT, "tube": {**TUBE, "ends": "free"}})
+    bump = np.sin(np.pi * NODES / LASTS)
+    told = found(scenario, moved(scenario, none, None, 1, 0.051 * bump))["tube.position"]
+    assert told[0].value == pytest.approx(0.051, rel=1e-4)
+    assert told[0].time == pytest.approx(LASTS / 2, abs=0.01)
+    told = found(scenario, moved(scenario, none, None, 3, 0.11 * bump))["tube.attitude"]
+    assert told[0].value == pytest.approx(0.11, rel=1e-4)
+
+
+@pytest.mark.parametrize(("seconds", "bound"), [(0.9, 1.0), (3.2, 3.0)])
+def test_durations_of_a_range(seconds, bound):
+    path = {"kind": "rest", "pose": [0, 0, 1]}
+    scenario, none = on_the_path({"path": path, "duration": {"min": 1, "max": 3}, "tube": TUBE})
+    inside = replace(none, nodes=NODES / LASTS * 2)
+    assert audit(scenario.lasting(2.0), inside).passed
+    told = found(scenario.lasting(seconds), replace(none, nodes=NODES / LASTS * seconds))
+    assert set(told) == {"duration"}
+    assert told["duration"][0].value == pytest.approx(seconds)
+    assert told["duration"][0].bound == bound
+    # The nodes end elsewhere than the motion that was audited.
+    assert set(found(scenario.lasting(2.0), replace(none, nodes=NODES / LASTS * 2.2))) == {"duration"}
+    fixed, none = on_the_path({"path": path, "tube": TUBE})
+    assert set(found(fixed.lasting(2.5), replace(none, nodes=NODES / LASTS * 2.5))) == {"duration"}
+
+
+def test_the_platforms_box():
+    limits = {"platform_box": {"min": [-1, -1, 0], "max": [0.21, 1, 2]}}
+    scenario, none = on_the_path({"path": RIGHT, "tube": {**TUBE, "ends": "free"}, "limits": limits})
+    assert audit(scenario, none).passed
+    told = found(scenario, moved(scenario, none, None, 0, 0.02 * NODES / LASTS))
+    assert set(told) == {"platform_box"}
+    (excess,) = told["platform_box"]
+    assert (excess.time, excess.bound, excess.accepted) == (LASTS, 0.21, "at most")
+    assert excess.value == pytest.approx(0.22)
+
+
+@pytest.mark.parametrize("ends", ["rest", "periodic", "exact"])
+def test_ends_of_carriers(ends):
+    rest = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "base": {"kind": "free", "ends": ends}}
+    scenario, none = on_the_path(rest, "wang-flying")
+    assert audit(scenario, none).passed
+    for values in (SMALL * NODES / LASTS, SMALL * NODES**2):
+        assert set(found(scenario, moved(scenario, none, 0, 1, values))) == {"base.ends"}
+    away = moved(scenario, none, 0, 1, np.full(len(NODES), SMALL))
+    assert set(found(scenario, away)) == ({"base.ends"} if ends == "exact" else set())
+
+
+def test_a_motion_does_not_jump():
+    """Values that belong together nowhere else than in a program that was not solved."""
+    scenario, none = on_the_path({"path": RIGHT, "tube": {**TUBE, "ends": "free"}})
+    for part, unit in (("q", "m"), ("v", "m/s")):
+        values = getattr(none, part).copy()
+        values[10:, 1] += 1e-3
+        told = found(scenario, replace(none, **{part: values}))
+        assert "motion" in told
+        assert told["motion"][0].time >= NODES[9]
+        assert unit in {excess.unit for excess in told["motion"]}
+    base = {"kind": "free", "ends": "free"}
+    scenario, none = on_the_path({"path": {"kind": "rest", "pose": [0, 0, -1]}, "base": base}, "wang-flying")
+    values = none.q.copy()
+    values[5, 0] += 1e-3
+    assert {excess.about for excess in found(scenario, replace(none, q=values))["motion"]} == {"carriers"}
+
+
+def test_soft_limits_are_told_apart():
+    limits = {"platform_speed": 0.05, "platform_acceleration": 0.01, "soft": {"platform_speed": 0.1}}
+    scenario, _ = on_the_path({"path": RIGHT, "limits": limits})
+    seen = audit(scenario, None)
+    assert [excess.limit for excess in seen.excess] == ["platform_acceleration"]
+    assert [excess.limit for excess in seen.soft_excess] == ["platform_speed"]
+    assert not seen.passed
+    speeds = np.linalg.norm(seen.motion.velocity[:, :3], axis=1)
+    assert seen.soft_excess[0].value == pytest.approx(speeds.max(), rel=1e-6)
+    assert seen.soft_excess[0].time == seen.times[speeds.argmax()]
+
+
+def test_an_excess_is_a_sentence_and_data():
+    excess = Excess("cable_speed", "cable 3", 0.25, 1.5, 1.0, "m/s")
+    assert str(excess) == "cable_speed: cable 3 at t = 0.250 s: 1.5 m/s, accepted: at most 1 m/s"
+    told = json.loads(json.dumps(excess.as_dict()))
+    assert told["text"] == str(excess)
+    assert (told["limit"], told["about"], told["time"], told["value"], told["bound"], told["unit"]) == (
+        "cable_speed",
+        "cable 3",
+        0.25,
+        1.5,
+        1.0,
+        "m/s",
+    )
+    nowhere = Excess("duration", "motion", None, np.nan, 1.0, "s", "at least", "why")
+    assert str(nowhere) == "duration: motion: nan s, accepted: at least 1 s (why)"
+    assert nowhere.as_dict()["value"] is None
+    scenario, _ = on_the_path({"path": RIGHT, "limits": {"cable_speed": 0.01}})
+    summary = json.loads(json.dumps(audit(scenario, None).summary()))
+    assert summary["excess"][0]["limit"] == "cable_speed"
+    assert summary["excess"][0]["value"] > 0.01
