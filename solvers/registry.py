@@ -97,7 +97,9 @@ def solve(
     ):
         answer = _ACTIVE_SET.attempt(problem)
         if answer is not None:
-            return TensionSolution(problem, answer[1], answer[0], "active-set", None, time.perf_counter() - start)
+            spent = time.perf_counter() - start
+            proof = _ACTIVE_SET.direction
+            return TensionSolution(problem, answer[1], answer[0], "active-set", None, spent, direction=proof)
     chosen, used_backend = _lookup(method, backend, options)
     required("problem", problem, TensionProblem)
     form = standard_form(problem)

@@ -1,5 +1,6 @@
 """The answer: `TensionSolution`, which judges its own tensions, and its `Status`."""
 
+from collections.abc import Callable
 from enum import StrEnum
 from typing import Any
 
@@ -60,9 +61,22 @@ class TensionSolution:
         Iterations of the method, None if it does not count any.
     detail :
         What there is to say beyond the status, else empty.
+
+    `direction` computes the direction on which the method's own verdict rests, when it is asked for.
     """
 
-    __slots__ = ("_certificate", "backend", "detail", "iterations", "method", "problem", "status", "tensions", "time")
+    __slots__ = (
+        "_certificate",
+        "_direction",
+        "backend",
+        "detail",
+        "iterations",
+        "method",
+        "problem",
+        "status",
+        "tensions",
+        "time",
+    )
 
     def __init__(
         self,
@@ -75,6 +89,7 @@ class TensionSolution:
         certificate: Certificate | None = None,
         iterations: int | None = None,
         detail: str = "",
+        direction: Callable[[TensionProblem], NDArray[np.float64] | None] | None = None,
     ) -> None:
         self.problem = problem
         self.tensions = tensions  # (m,)
@@ -83,6 +98,7 @@ class TensionSolution:
         self.backend = backend
         self.time = time
         self._certificate = certificate
+        self._direction = direction
         self.iterations = iterations
         self.detail = detail
 
@@ -109,10 +125,7 @@ class TensionSolution:
 
     def _own_proof(self) -> Certificate:
         """Return the certificate along the direction on which the method's verdict rests."""
-        from .registry import methods
-
-        method = methods().get(self.method)
-        direction = None if method is None else method.direction(self.problem)
+        direction = None if self._direction is None else self._direction(self.problem)
         certificate = None if direction is None else certificate_along(self.problem, direction)
         if certificate is None:
             raise SolverError(
