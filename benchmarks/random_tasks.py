@@ -51,7 +51,9 @@ def main() -> None:
             print(f"seed {seed}, {outcomes[-1].robot}: {outcomes[-1].told}", flush=True)
     counts = Counter(outcome.told.split(":")[0] for outcome in outcomes)
     times = [outcome.seconds for outcome in outcomes]
-    print(f"{dict(counts)}; median {np.median(times):.2f} s, longest {max(times):.1f} s")
+    slowest = max(outcomes, key=lambda outcome: outcome.seconds)
+    longest = f"longest {slowest.seconds:.1f} s (seed {slowest.seed}, {slowest.robot})"
+    print(f"{dict(counts)}; median {np.median(times):.2f} s, {longest}")
     sys.exit(counts["wrong"] > 0 or counts[PlanStatus.NOT_FOUND] > MOST_NOT_FOUND * len(outcomes))
 
 

@@ -23,7 +23,7 @@ from .scenario import POSITION, Scenario
 __all__ = ["Formation", "clear_formation"]
 
 DISTANCES = ("keep_out", "cable_clearance", "cable_platform_clearance", "carrier_separation", "platform_box")
-PLACES = 240  # along the path
+PLACES = 120  # along the path; the first time every second
 LATERAL, VERTICAL, YAW, SQUEEZE = range(4)
 TRIES = (7, 3, 3, 5)  # of each of these, the first time
 TWO_SIDED = np.array([1.0, 1.0, 1.0, 0.0])  # squeeze is never negative
@@ -32,7 +32,7 @@ MOST_SQUEEZE = 0.8
 ROOM = 0.05  # [m] that a guess stays farther away than it must
 PASSING = 1e3  # cost of a metre beyond a distance
 UNUSUAL = 1e-2  # cost of a formation as far from the usual as is tried
-SMOOTH = UNUSUAL * (PLACES / 10) ** 2  # so that it begins to change a tenth of the path ahead
+AHEAD = 0.1  # of the path: where it begins to change
 
 
 @dataclass(frozen=True)
@@ -67,16 +67,19 @@ def clear_formation(scenario: Scenario) -> Formation | None:
     span = _span(scenario)
     if scenario.relative or not any(limit.name in DISTANCES for limit in found.all) or not span.any():
         return None
-    shares = np.linspace(0.0, 1.0, PLACES + 1)
-    references = _References.at(scenario, shares * scenario.duration)
     beyond = _Distances(scenario, found)
-    shape = np.zeros((PLACES + 1, 4))
+    shares = np.linspace(0.0, 1.0, PLACES // 2 + 1)
+    references = _References.at(scenario, shares * scenario.duration)
+    shape = np.zeros((len(shares), 4))
     if beyond(*_placed(scenario, references, shape)).max() <= 0.0:
         return None
-    for attempt in range(1 + REFINEMENTS):
-        tried = np.clip(shape[:, None] + _tries(span, attempt), -span * TWO_SIDED, span)
-        shape = _best(scenario, references, beyond, tried, span)
-    return Formation(scenario, shares, gaussian_filter1d(shape, PLACES / 60, axis=0, mode="nearest"))
+    shape = _best(scenario, references, beyond, _tried(shape, span, 0), span)
+    finer = np.linspace(0.0, 1.0, PLACES + 1)
+    references = _References.at(scenario, finer * scenario.duration)
+    shape = np.stack([np.interp(finer, shares, column) for column in shape.T], axis=1)
+    for attempt in range(1, 1 + REFINEMENTS):
+        shape = _best(scenario, references, beyond, _tried(shape, span, attempt), span)
+    return Formation(scenario, finer, gaussian_filter1d(shape, PLACES / 60, axis=0, mode="nearest"))
 
 
 @dataclass(frozen=True)
@@ -126,8 +129,8 @@ def _span(scenario: Scenario) -> np.ndarray:
     return np.array([lateral, lateral / 2, min(yaw, np.pi / 2), squeeze])
 
 
-def _tries(span: np.ndarray, attempt: int) -> np.ndarray:
-    """What to add to each of the four, (tries, 4)."""
+def _tried(shape: np.ndarray, span: np.ndarray, attempt: int) -> np.ndarray:
+    """Formations (k, tries, 4) to try about those of shape (k, 4): first all over the span, then near them."""
     step = span * np.where(TWO_SIDED, 2.0, 1.0) / (np.array(TRIES) - 1)
     if attempt == 0:
         levels = [
@@ -136,7 +139,8 @@ def _tries(span: np.ndarray, attempt: int) -> np.ndarray:
         ]
     else:
         levels = [size / 2**attempt * np.array([-1.0, 0.0, 1.0]) for size in step]
-    return np.array(list(product(*(np.unique(level) for level in levels))))
+    changes = np.array(list(product(*(np.unique(level) for level in levels))))
+    return np.clip(shape[:, None] + changes, -span * TWO_SIDED, span)
 
 
 def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -194,12 +198,13 @@ def _best(
     cost = PASSING * passed + UNUSUAL * squares
     for end in (0, -1):
         cost[end] += _end_cost(scenario, size[end])
+    smooth = UNUSUAL * (AHEAD * (count - 1)) ** 2
     came_from = np.zeros((count, tries), dtype=int)
     total = cost[0]
     for k in range(1, count):
         # |p - p'|^2 of all pairs, by their products.
         apart = squares[k - 1][:, None] + squares[k] - 2 * size[k - 1] @ size[k].T
-        reached = total[:, None] + SMOOTH * apart
+        reached = total[:, None] + smooth * apart
         came_from[k] = reached.argmin(axis=0)
         total = reached[came_from[k], np.arange(tries)] + cost[k]
     best = np.zeros(count, dtype=int)
