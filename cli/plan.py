@@ -53,7 +53,7 @@ def plan(
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
     if animate is not None:
         check_film(animate, speed, fps)
-    for file in (target, report, animate):
+    for file in (target, report, animate, figures and figures / "path.png"):
         if file is not None:
             check_writable(file)
     with watching(f"planning {read.name}", quiet=as_json) as watch:

@@ -78,6 +78,8 @@ def _arguments(task: Task) -> dict[str, Any]:
             raise InputError(f"{where}: limits.{name}: is none that timing knows; accepted: {', '.join(known)}")
     if task.limits.soft:
         raise InputError(f"{where}: limits.soft: timing knows hard limits only; accepted: none")
+    if task.wind is not None and not isinstance(task.wind, tuple):
+        raise InputError(f"{where}: wind: is a box, and timing knows still air only; accepted: none, or [0, 0, 0]")
     turns = task.path.kind == "circle" and isinstance(task.duration, float)
     return {
         "margin": task.margin,

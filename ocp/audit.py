@@ -18,11 +18,11 @@ from ..errors import InputError
 from ..models.robot import Vector3
 from ..solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ..workspace.pose import masked_problem
-from .checks import END_TOLERANCE, UNDERACTUATED_TOLERANCE, Seen, excesses
+from .checks import END_TOLERANCE, OF_TENSIONS, UNDERACTUATED_TOLERANCE, Seen, excesses
 from .drift import Drift, drift
 from .excess import Excess
 from .path import Motion
-from .scenario import AUDIT_RATE, Deviation, Scenario
+from .scenario import AUDIT_RATE, LEAST_INTERVALS, Deviation, Scenario
 from .wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
 
 TOLERANCE = 1e-6  # [N]
@@ -106,7 +106,7 @@ def _number(value: float) -> float | None:
 
 
 def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
-    """Audit the motion that `deviation` (None: the references alone) stands for, at `AUDIT_RATE` or a little more."""
+    """Audit the motion that `deviation` (None: the references alone) stands for, at `AUDIT_RATE` or more."""
     times = np.linspace(0.0, scenario.duration, scenario.output_samples * _audits_per_output(scenario) + 1)
     robot = scenario.robot
     motion, carriers = scenario.motion(times, deviation)
@@ -166,7 +166,8 @@ def _scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
 
 def _audits_per_output(scenario: Scenario) -> int:
     """How many audited instants each sample of the output stands for: the saved instants are audited ones."""
-    return max(int(np.ceil(AUDIT_RATE * scenario.duration / scenario.output_samples - 1e-9)), 1)
+    intervals = max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS)
+    return max(int(np.ceil(intervals / scenario.output_samples - 1e-9)), 1)
 
 
 class _Verdict(NamedTuple):
@@ -315,6 +316,16 @@ def at_rest(scenario: Scenario, seen: Audit) -> Audit | None:
                 time = float(seen.times[row])
                 return replace(seen, certificate=certificate, certificate_time=time, certificate_wind=at)
     return None
+
+
+def tensions_may_mend(scenario: Scenario, seen: Audit) -> bool:
+    """Whether the same motion with other tensions may pass an audit that this one did not."""
+    if seen.violation.max() > seen.tolerance or not {excess.limit for excess in seen.excess} <= OF_TENSIONS:
+        return False
+    values = np.linalg.svd(
+        _scaled(scenario, scenario.dynamics.wrench_matrix(seen.motion.pose, seen.carriers.pose)), compute_uv=False
+    )
+    return scenario.robot.m > values.shape[1] or bool((values[:, -1] < INDEPENDENT * values[:, 0]).any())
 
 
 def _inside_range(problem: TensionProblem) -> TensionProblem:

@@ -18,7 +18,7 @@ from .path import Motion, WaypointPath
 from .scenario import Deviation, Scenario
 from .task import FreeBase
 
-__all__ = ["END_TOLERANCE", "LIMIT_TOLERANCE", "UNDERACTUATED_TOLERANCE", "Seen", "excesses"]
+__all__ = ["END_TOLERANCE", "LIMIT_TOLERANCE", "OF_TENSIONS", "UNDERACTUATED_TOLERANCE", "Seen", "excesses"]
 
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 LIMIT_TOLERANCE = 1e-6  # relative, of the carriers' own limits
@@ -30,6 +30,9 @@ DURATION_TOLERANCE = 1e-7  # relative
 ANGLE_TOLERANCE = 1e-6  # [rad]
 JUMP_TOLERANCE = 1e-6  # [m, rad]; ten times that of speeds [m/s, rad/s]: programs meet their equations to 1e-8
 STEP = 1e-5  # [s], of differences
+
+# Limits that depend on which tensions give the wrench: where cables are redundant others may keep them.
+OF_TENSIONS = frozenset({"tension_rate", "thrust", "torque", "force across the thrust"})
 
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 

@@ -26,6 +26,8 @@ from .task_limits import KeepOut
 
 __all__ = ["Limit", "Limits", "limits"]
 
+LEAST_COSINE = 1e-4  # less of a cosine is no scale: of angles below a hundredth of a radian
+
 Motion = tuple[ca.SX, ca.SX, ca.SX]  # pose, velocity, acceleration, (6, 1) each
 
 
@@ -218,9 +220,9 @@ def _size(value: ca.SX, bound: float) -> ca.SX:
 
 
 def _tilt(name: str, pose: ca.SX, most: float, about: str) -> Limit:
-    """As the cosine, whose derivative exists when level too."""
-    upright = ca.cos(pose[3]) * ca.cos(pose[4])
-    return Limit(name, "rad", upright, float(np.cos(most)), np.inf, [about], 1.0, cosine=True)
+    """As the cosine, whose derivative exists when level too; on the scale of what it changes by up to the bound."""
+    upright, low = ca.cos(pose[3]) * ca.cos(pose[4]), float(np.cos(most))
+    return Limit(name, "rad", upright, low, np.inf, [about], max(1.0 - low, LEAST_COSINE), cosine=True)
 
 
 def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..models import Robot
-from .audit import Audit, at_rest
+from .audit import Audit, at_rest, tensions_may_mend
 from .cost import cost
 from .durations import Durations, durations
 from .finding import Relaxed
@@ -131,11 +131,20 @@ def _climb(search: Search, start: Deviation | None) -> Plan:
 
 
 def _fixed_motion(search: Search) -> Plan:
-    """Nothing is free but the tensions: each instant is a tension-distribution problem of its own."""
+    """Nothing is free but the tensions: each instant is a tension-distribution problem of its own.
+
+    Limits on how the tensions change and on what carriers feel of them are kept by some choices of tensions and not by
+    others: where these alone are passed, the program looks for a choice that keeps them.
+    """
     start = time.perf_counter()
     seen = search.audit_motion(search.scenario, None)
     spent = time.perf_counter() - start
     status = PlanStatus.FEASIBLE if seen.passed else PlanStatus.INFEASIBLE
+    if not seen.passed and tensions_may_mend(search.scenario, seen):
+        chosen = _free_motion(search, None)
+        if chosen.feasible:
+            return chosen
+        status = PlanStatus.NOT_FOUND
     relaxed = None if seen.passed else _longer(search, search.scenario, _durations(search, search.scenario))
     return Plan(search.scenario, status, None, seen, build_s=0.0, solve_s=spent, relaxed=relaxed)
 

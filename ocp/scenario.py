@@ -25,6 +25,7 @@ from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
+LEAST_INTERVALS = 200  # of the audit: a motion of a millisecond has an inside too
 MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 
@@ -341,6 +342,11 @@ def _check_times(task: Task, where: str) -> None:
         raise InputError(
             f"{where}: duration: {longest:g} s; accepted: at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the "
             f"audit looks {AUDIT_RATE:g} times a second"
+        )
+    if longest * task.output_rate > MOST_SAMPLES:
+        raise InputError(
+            f"{where}: output_rate: {task.output_rate:g} 1/s for {longest:g} s; accepted: at most "
+            f"{MOST_SAMPLES / longest:g} 1/s, {MOST_SAMPLES} samples in all"
         )
     paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
     if isinstance(task.duration, DurationRange):

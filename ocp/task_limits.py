@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ..models.robot import Box, Finite, NonNegative, Part, Positive, Vector3
@@ -110,7 +111,7 @@ class TaskLimits(Part):
     platform_speed: Positive | None = Field(default=None, description="of its frame's origin [m/s]")
     platform_acceleration: Positive | None = Field(default=None, description="of its frame's origin [m/s^2]")
     platform_turn: Positive | None = Field(default=None, description="angular velocity [rad/s]")
-    platform_tilt: Positive | None = Field(default=None, description="of its z axis from the vertical [rad]")
+    platform_tilt: Positive | None = Field(default=None, le=np.pi, description="of its z axis from the vertical [rad]")
     platform_box: Box | None = Field(default=None, description="where its frame's origin may be, in {G} [m]")
     cable_clearance: Positive | None = Field(
         default=None, description="between cables that share neither anchor nor attachment [m]"

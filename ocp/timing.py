@@ -30,7 +30,7 @@ from .bottlenecks import Bottleneck, bottlenecks
 from .course import Course, PathLimits
 from .path import AnyPath, Curve, LinePath, Motion, SamplePath, TimedPath, WaypointPath
 from .phase_plane import phase_plane, proofs
-from .scenario import AUDIT_RATE, MOST_SAMPLES
+from .scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from .task import GivenBase, HoldBase, Task
 
 TOLERANCE = 1e-6  # [N], as the audit of plans has it
@@ -417,7 +417,7 @@ def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
             f"time_along: the motion takes {duration:g} s; accepted: limits that allow {MOST_SAMPLES / AUDIT_RATE:g} "
             f"s, since the audit looks {AUDIT_RATE:g} times a second"
         )
-    times = np.linspace(0, duration, int(np.ceil(duration * AUDIT_RATE)) + 1)
+    times = np.linspace(0, duration, max(int(np.ceil(duration * AUDIT_RATE)), LEAST_INTERVALS) + 1)
     s, sd, sdd = path.law(times)
     by_s = course.at(s)
     platform, carriers = (motion.timed(sd, sdd) for motion in by_s)

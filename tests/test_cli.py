@@ -144,6 +144,14 @@ steps: 20
 """
 
 
+def test_a_folder_for_figures_that_is_a_file_is_told_before_planning(tmp_path):
+    (tmp_path / "line.yaml").write_text("path: {kind: rest, pose: [0, 0, -1]}\nduration: 1\n")
+    done = run("plan", "wang-flying", "line.yaml", "--figures", "line.yaml", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.glob("*.nc"))
+
+
 def test_plan_writes_a_file_and_figures(tmp_path):
     (tmp_path / "line.yaml").write_text(TASK)
     done = run("plan", "wang-flying", "line.yaml", "--figures", "pictures", "--json", cwd=tmp_path)

@@ -95,6 +95,7 @@ def test_without_a_law_there_is_a_proof_and_no_file(folder):
     [
         ("tube: {position: 0.1}\n", "tube: leaves more open than the pace; accepted: none"),
         ("base: {kind: free}\n", "base.kind: 'free' leaves more open than the pace; accepted: hold, given"),
+        ("wind: {min: [0, 0, 0], max: [1, 0, 0]}\n", "wind: is a box, and timing knows still air only"),
         ("limits: {tension_rate: 3}\n", "limits.tension_rate: is none that timing knows"),
     ],
 )

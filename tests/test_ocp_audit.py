@@ -6,12 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.linalg import block_diag
+from scipy.optimize import linprog
 
-from towline.models import load
+from towline.errors import InputError
+from towline.models import Dynamics, load
+from towline.ocp import PlanStatus, plan
 from towline.ocp.audit import audit
 from towline.ocp.excess import Excess
 from towline.ocp.scenario import Deviation, lay_out
 from towline.ocp.task import read_task
+from towline.ocp.task_limits import TaskLimits
 
 LASTS = 2.0  # [s]
 NODES = np.linspace(0, LASTS, 21)
@@ -191,3 +196,65 @@ def test_an_excess_is_a_sentence_and_data():
     summary = json.loads(json.dumps(audit(scenario, None).summary()))
     assert summary["excess"][0]["limit"] == "cable_speed"
     assert summary["excess"][0]["value"] > 0.01
+
+
+ACROSS = {"kind": "line", "start": [-0.3, 0, 0.6], "end": [0.3, 0, 0.9]}
+
+
+@pytest.mark.parametrize("seconds", [1e-3, 2e-3, 0.0123])
+def test_a_motion_of_milliseconds_is_looked_at_inside_too(seconds):
+    """At its ends and in its middle this line accelerates nowhere; between them it asks for what no cable gives."""
+    found = plan(load("planar-4"), {"path": ACROSS, "duration": seconds})
+    assert found.status is PlanStatus.INFEASIBLE
+    way = np.linalg.norm(np.subtract(ACROSS["end"], ACROSS["start"]))
+    s = np.linspace(0, 1, 10_001)
+    most = (420 * s**2 * (1 - s) ** 2 * np.abs(1 - 2 * s)).max() * way / seconds**2
+    robot = found.scenario.robot
+    given = robot.weight + robot.t_max.sum()
+    assert found.audit.violation.max() > 0.99 * robot.platform.mass * most - given  # instants are near the peak
+
+
+def least_tension_rate(dynamics, motion, seconds, intervals=40):
+    """The least largest rate of any tensions that give what a motion needs at instants, by one linear program."""
+    robot, times = dynamics.robot, np.linspace(0, seconds, intervals + 1)
+    path = motion.at(times, seconds)
+    rows = robot.dof_mask.astype(bool)
+    A = dynamics.wrench_matrix(path.pose)[:, rows]
+    w = dynamics.required_wrench(*path)[:, rows]
+    n, m = len(times), robot.m
+    balance = np.hstack([block_diag(*A), np.zeros((n * A.shape[1], 1))])
+    step = np.kron(np.diff(np.eye(n), axis=0), np.eye(m)) / np.diff(times)[0]
+    change = np.vstack([np.hstack([sign * step, -np.ones((len(step), 1))]) for sign in (1, -1)])
+    box = [*zip(np.tile(robot.t_min, n), np.tile(robot.t_max, n), strict=True), (0, None)]
+    cost = np.append(np.zeros(n * m), 1.0)
+    return linprog(cost, change, np.zeros(len(change)), balance, w.ravel(), box, method="highs").fun
+
+
+def test_tensions_that_change_too_fast_prove_nothing_where_others_do_not():
+    """A fixed motion of a redundant robot: which tensions give it is a choice, and some change slowly."""
+    robot, task = load("planar-4"), read_task({"path": ACROSS, "duration": 1.0, "steps": 20})
+    rate = least_tension_rate(Dynamics(robot), task.path, 1.0)
+    nearest = plan(robot, task).audit
+    assert 1.2 * rate < np.abs(np.diff(nearest.tensions, axis=0)).max() * nearest.rate
+    found = plan(robot, task.model_copy(update={"limits": TaskLimits(tension_rate=1.2 * rate)}))
+    assert found.feasible
+    assert np.abs(np.diff(found.audit.tensions, axis=0)).max() * found.audit.rate <= 1.2 * rate * 1.001
+    # The motion itself is still the task's, and what no choice keeps is not called proven.
+    assert found.tracking_error_max == 0
+    too_slow = plan(robot, task.model_copy(update={"limits": TaskLimits(tension_rate=0.5 * rate)}))
+    assert too_slow.status is PlanStatus.NOT_FOUND
+    assert [excess.limit for excess in too_slow.audit.excess] == ["tension_rate"]
+
+
+@pytest.mark.parametrize(("most", "passes"), [(1e-3, False), (0.00149, False), (0.00151, True), (0.3, True)])
+def test_a_small_tilt_is_told_as_exactly_as_a_large_one(most, passes):
+    rest = {"kind": "rest", "pose": [0, 0, 0.75, 0, 0.0015, 0]}
+    found = plan(load("planar-4"), {"path": rest, "duration": 0.5, "limits": {"platform_tilt": most}})
+    assert found.feasible is passes
+    assert [excess.limit for excess in found.audit.excess] == ([] if passes else ["platform_tilt"])
+
+
+def test_more_samples_than_a_machine_holds_are_refused():
+    with pytest.raises(InputError, match=r"output_rate: 1e\+09 1/s for 2 s; accepted: at most 500000 1/s") as raised:
+        plan(load("planar-4"), {"path": ACROSS, "duration": 2, "output_rate": 1e9})
+    assert "\n" not in str(raised.value)
