@@ -1,8 +1,8 @@
 """What a motion must keep beside its tensions: each limit on its own, from the motion alone, densely.
 
 Each check gives the limits that are passed, worst instant each (`Excess`); an empty list says that all is kept. The
-expressions of `limits` are evaluated here on the dense grid; all else is computed by NumPy, from the task's own numbers
-and by differences, and shares nothing with the nonlinear program.
+expressions of `limits`, the same as the nonlinear program's, are evaluated here on the dense grid; all else is computed
+by NumPy, from the task's own numbers and by differences, and shares nothing with it.
 """
 
 from __future__ import annotations

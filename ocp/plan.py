@@ -241,7 +241,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     steps = scenario.task.steps
     coarse = _coarse(search) if start is None else None
     outcome = search.solve("program", Mesh(steps), start or coarse, coarser=coarse is not None)
-    if not outcome.success:
+    if not outcome.success and search.seconds_left > 0:
         closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             return _closest(search, closest)
@@ -254,7 +254,7 @@ def _refined(search: Search, outcome: Outcome, seen: Audit) -> Plan:
     scenario, steps = search.scenario, search.scenario.task.steps
     reserve, shrink = 0.0, 0.0
     for attempt in range(1, REFINEMENTS + 1):
-        if seen.passed or not outcome.success:
+        if seen.passed or not outcome.success or search.seconds_left <= 0:
             break
         # Between finer nodes less can happen; a little distance from the limits takes care of what still does.
         steps = min(2 * steps, MOST_STEPS)

@@ -46,6 +46,11 @@ class Search:
         if self._progress is not None:
             self._progress(iteration, objective, infeasibility)
 
+    @property
+    def seconds_left(self) -> float:
+        """What the task's time limit leaves to the solver [s]."""
+        return max(self.scenario.task.time_limit - self.solve_s, 0.0)
+
     def knows(self, mesh: Mesh) -> bool:
         """Whether the program of `mesh` has been made: then it may have a solution to start from."""
         return mesh in self._solvers
@@ -63,7 +68,7 @@ class Search:
             solver.prepare(guess, coarser)
             built = time.perf_counter()
             at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-            outcome = solver.solve(at, self._seen, coarser)
+            outcome = solver.solve(at, self._seen, coarser, self.seconds_left)
             self.build_s += built - start
             self.solve_s += time.perf_counter() - built
             verdict.told = f"{outcome.message}, {outcome.iterations} iterations"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -120,11 +121,17 @@ class Solver:
             "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | asked,
         }
 
-    def solve(self, guess: Deviation | None, progress: Progress | None = None, coarser: bool = False) -> Outcome:
+    def solve(
+        self,
+        guess: Deviation | None,
+        progress: Progress | None = None,
+        coarser: bool = False,
+        seconds: float = np.inf,
+    ) -> Outcome:
         """Solve from `guess`; None: from the last solution and its multipliers, or else from a guess of our own.
 
-        A guess is `coarser` if it is the same task's optimum on a coarser mesh. That nothing is found is told, not
-        raised.
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
+        with the best that it has; fatrop does not. That nothing is found is told, not raised.
 
         Raises
         ------
@@ -147,14 +154,14 @@ class Solver:
             start["x0"] = program.pack(guess)
         else:
             start |= {"x0": self._last["x"], "lam_x0": self._last["lam_x"], "lam_g0": self._last["lam_g"]}
-        watch.begin(progress)
+        watch.begin(progress, seconds)
         try:
             result = nlp(**start)
         except RuntimeError as error:
             raise _broken(error) from None
         statistics = nlp.stats()
         stopped = statistics["return_status"] == "User_Requested_Stop"
-        if watch.interrupted or (stopped and not watch.settled):
+        if watch.interrupted or (stopped and not watch.settled and not watch.late):
             raise KeyboardInterrupt
         self._last = result if statistics["success"] else None
         x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
@@ -164,8 +171,10 @@ class Solver:
             # It calls nobody while it solves.
             watch.tell(iterations, float(result["f"]), result["g"].full().ravel())
         met = program.violation(x, result["g"].full().ravel()) <= MET
-        if watch.settled:
-            x, met, message = watch.best, True, f"no better by {BETTER:.1%} in {PATIENCE} iterations"
+        if watch.settled or watch.late:
+            message = "time limit" if watch.late else f"no better by {BETTER:.1%} in {PATIENCE} iterations"
+            if len(watch.best):
+                x, met = watch.best, True
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
@@ -194,9 +203,11 @@ class _Watch(ca.Callback):
         self.begin(None)
         self.construct("watch", {})
 
-    def begin(self, progress: Progress | None) -> None:
+    def begin(self, progress: Progress | None, seconds: float = np.inf) -> None:
         """Start to count anew."""
         self._progress = progress
+        self._deadline = time.perf_counter() + seconds
+        self.late = False  # whether the time is up
         self._iteration = 0
         self.best = np.zeros(0)  # iterate of those that meet all constraints
         self._objective = np.inf  # its
@@ -245,7 +256,8 @@ class _Watch(ca.Callback):
             self._iteration += 1
         except KeyboardInterrupt:
             self.interrupted = True
-        return [int(self.interrupted or self.settled)]
+        self.late = time.perf_counter() > self._deadline
+        return [int(self.interrupted or self.settled or self.late)]
 
     def _better(self) -> float:
         """Objective that makes it worth to go on."""

@@ -87,7 +87,8 @@ class FreeBase(Part):
         default=0.0,
         ge=0,
         lt=1.5,
-        description="largest angle to the vertical [rad] of carriers that can tilt; 0: keep the attitude",
+        description="largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have the "
+        "limit of the robot's file",
     )
     turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
     ends: Literal["free", "rest", "periodic", "exact"] = Field(
@@ -149,6 +150,9 @@ class Task(Part):
         default="ipopt", description="of the nonlinear program; fatrop takes tasks without periodic ends"
     )
     objective: Objective = Objective()
+    time_limit: Positive = Field(
+        default=600.0, description="of all runs of the solver together [s]; then the best motion so far is taken"
+    )
     output_rate: Positive = Field(
         default=100.0, description="samples of the saved trajectory, each of them audited [1/s]"
     )

@@ -97,6 +97,15 @@ def test_quadrotors_are_guessed_to_tilt_as_their_cables_pull():
     np.testing.assert_allclose(carriers.pose[:, :, 3:], robot.carrier_home[None, :, 3:].repeat(5, axis=0), atol=1e-6)
 
 
+def test_a_time_limit_ends_a_search():
+    robot = load("multi-quadrotor-4")
+    found = plan(robot, there_and_back(steps=16, time_limit=0.5))
+    assert found.status == "not-found"
+    assert found.message == "time limit"
+    assert found.solve_s < 20  # one iteration and what it takes to guess
+    assert "time limit" in found.report()
+
+
 def test_four_quadrotors_go_through_a_slot_and_back():
     robot = load("multi-quadrotor-4")
     found = plan(robot, there_and_back())
