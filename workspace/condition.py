@@ -24,7 +24,6 @@ __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
 class Condition(Part, ABC):
     """A question about a place that has the answer yes or no. A condition of your own has a `kind` and `_holds`."""
 
-    kind: str
     kinds: ClassVar[dict[str, type[Condition]]] = {}
 
     def __init__(self, **fields: Any):
@@ -36,8 +35,8 @@ class Condition(Part, ABC):
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
         super().__pydantic_init_subclass__(**options)
-        for kind in get_args(cls.model_fields["kind"].annotation):
-            Condition.kinds[kind] = cls
+        if "kind" in cls.model_fields:
+            Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
         """Whether the condition holds, (n,) of bool; False where a number of the place is not finite.
@@ -47,7 +46,7 @@ class Condition(Part, ABC):
         InputError
             If the robot is none that the condition can be asked about.
         """
-        finite = np.isfinite(places.pose).all(axis=1) & np.isfinite(places.carriers).all(axis=(1, 2))
+        finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
         if finite.all():
             return self._holds(robot, places)
         held = np.zeros(len(places), dtype=bool)

@@ -21,6 +21,8 @@ from ..places import Places
 
 __all__ = ["ExistsPlacement"]
 
+ROUNDS = 6  # from a box to a sphere and back
+
 
 class ExistsPlacement(Condition):
     """A condition holds for the carriers as they are or for another placement of the mobile ones in their reach.
@@ -76,23 +78,37 @@ class ExistsPlacement(Condition):
         fits = np.ones(len(places), dtype=bool)
         if robot.fixed_lengths is not None:
             ends, starts = attachments(robot, placed), anchors(robot, placed)
-            away = starts - ends
-            distance = np.linalg.norm(away, axis=-1, keepdims=True)
-            shift = away * (robot.fixed_lengths[:, None] / np.maximum(distance, 1e-12) - 1.0)
             for cable, i in enumerate(robot.carrier_of_cable):
+                away, length = starts[:, cable] - ends[:, cable], robot.fixed_lengths[cable]
+                shift = _onto_sphere(away, length) - away
                 if i not in mobile:
-                    fits &= np.abs(shift[:, cable]).max(axis=-1) <= 1e-9
+                    fits &= np.abs(shift).max(axis=-1) <= 1e-9
                     continue
-                carriers[:, i, :3] += shift[:, cable]
-                low, high = np.array(boxes[i].min), np.array(boxes[i].max)
-                fits &= ((carriers[:, i, :3] >= low) & (carriers[:, i, :3] <= high)).all(axis=-1)
+                low = np.array(boxes[i].min) - carriers[:, i, :3] + away
+                high = np.array(boxes[i].max) - carriers[:, i, :3] + away
+                at = away
+                # To the sphere and back into the box: the two meet in a patch, if they do.
+                for _ in range(ROUNDS):
+                    at = np.clip(_onto_sphere(at, length), low, high)
+                at = _onto_sphere(at, length)
+                fits &= np.all((at >= low - 1e-9) & (at <= high + 1e-9), axis=-1)
+                carriers[:, i, :3] += at - away
         return placed, fits
+
+
+def _onto_sphere(away: np.ndarray, length: float) -> np.ndarray:
+    return away * (length / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12))
 
 
 @lru_cache(maxsize=4)
 def _shares(dimensions: int, count: int, seed: int) -> np.ndarray:
-    """Numbers of (0, 1) that fill the cube evenly, (count, dimensions)."""
+    """Numbers of (0, 1) that fill the cube evenly, (count, dimensions); every other row is at a corner of the boxes.
+
+    Where a condition only just holds, carriers are at the ends of their reach. The last three numbers, which turn the
+    platform, stay inside.
+    """
     from scipy.stats import qmc
 
-    power = max(int(count - 1).bit_length(), 0)
-    return qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(power)[:count]
+    shares = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(int(count - 1).bit_length())[:count]
+    shares[::2, :-3] = np.round(shares[::2, :-3])
+    return shares

@@ -73,6 +73,10 @@ class Interference(Condition):
     clearance: NonNegative = Field(default=0.0, description="least distance of cables and attachments from these [m]")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+        with np.errstate(over="ignore", invalid="ignore"):  # of places beyond all measure
+            return self._free(robot, places)
+
+    def _free(self, robot: Robot, places: Places) -> np.ndarray:
         starts, ends = anchors(robot, places), attachments(robot, places)
         free = np.ones(len(places), dtype=bool)
         if self.between_cables is not None:

@@ -36,4 +36,4 @@ class Lengths(Condition):
                 raise InputError(f"lengths.{name}: has {len(value)} numbers; accepted: one, or {robot.m}, one a cable")
         lengths = dynamics_of(robot).cable_lengths(places.pose, places.carriers)
         most = np.inf if self.max is None else self.max
-        return ((lengths >= self.min) & (lengths <= most)).all(axis=1)
+        return np.all((lengths >= self.min) & (lengths <= most), axis=1)
