@@ -41,7 +41,7 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
 def cross_sections(
     points: np.ndarray, heights: list[float], thickness: float, marks: np.ndarray | None = None
 ) -> Figure:
-    """Draw the points of {G} that lie within `thickness` / 2 of each of some heights, from above.
+    """Draw the points of {G} that lie within `thickness` / 2 of each of some heights, from above, at one scale.
 
     Parameters
     ----------
@@ -53,11 +53,17 @@ def cross_sections(
         Points to mark, (k, 3) [m].
     """
     canvas = style.figure(2.4 * len(heights), 2.8)
+    shown = [points[np.abs(points[:, 2] - height) <= thickness / 2][:, :2] for height in heights]
+    every = np.vstack([*shown, *([] if marks is None else [marks[:, :2]])])
     for column, height in enumerate(heights):
         ax = style.axes(canvas, "x [m]", "y [m]", (1, len(heights), column + 1))
-        near = points[np.abs(points[:, 2] - height) <= thickness / 2]
-        _panel(ax, {"": near[:, :2]}, None if marks is None else marks[:, :2])
-        ax.set_title(f"z = {height:g} m ± {500 * thickness:g} mm, {len(near)} points", fontsize=8)
+        _panel(ax, {"": shown[column]}, None if marks is None else marks[:, :2])
+        ax.set_title(f"z = {height:g} m ± {500 * thickness:g} mm, {len(shown[column])} points", fontsize=8)
+        if len(every):
+            low, high = every.min(axis=0), every.max(axis=0)
+            middle, half = (low + high) / 2, 0.55 * max(float((high - low).max()), 1e-6)
+            ax.set_xlim(middle[0] - half, middle[0] + half)
+            ax.set_ylim(middle[1] - half, middle[1] + half)
     return canvas
 
 

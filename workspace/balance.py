@@ -29,7 +29,7 @@ __all__ = [
     "rows_of",
 ]
 
-PLACES_AT_ONCE = 4096
+PLACES_AT_ONCE = 8192
 
 
 def dynamics_of(robot: Robot) -> Dynamics:
