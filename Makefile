@@ -11,7 +11,7 @@ demo: .venv/core.stamp
 test: lint types unit
 
 setup: .venv/dev.stamp
-	$(INSTALL) ".[viewer,cluster,mujoco,timing,bench,notebooks,docs,dev]"
+	$(INSTALL) ".[viewer,cluster,mujoco,timing,mesh,bench,notebooks,docs,dev]"
 
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
@@ -33,5 +33,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,dev,mujoco,timing]"
+	$(INSTALL) ".[bench,dev,mujoco,timing,mesh]"
 	touch $@

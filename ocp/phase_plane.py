@@ -1,7 +1,7 @@
 """Limits of a motion along a path as half-planes in its phase plane, and the proof where they leave nothing.
 
 With u = d2s/dt2 and x = (ds/dt)^2 the needed wrench is a u + b x + c (`course`), so each facet of the available wrench
-set (`available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
+set (`solvers.available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 
 from ..errors import InputError, SolverError
 from ..solvers import Certificate, TensionProblem, certify
+from ..solvers.available_wrench import Facets, facets
 from ..solvers.certificate import certificate_along
 from ..workspace.pose import masked_problem
-from .available_wrench import Facets, facets
 from .course import Course, PathLimits, Wrench
 
 FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables lies in it

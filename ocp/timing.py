@@ -1,9 +1,9 @@
 """`time_along`: the fastest time law along a given path that keeps every tension inside its limits.
 
-Along a path only s(t) is left to choose. The available wrench set at each s (`available_wrench`) and the wrench that
-the motion needs (`course`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds the fastest law
-inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the exact tension
-solver; what it misses between the grid points a finer grid and a little distance from the limits make good.
+Along a path only s(t) is left to choose. The available wrench set at each s (`solvers.available_wrench`) and the wrench
+that the motion needs (`course`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds the fastest
+law inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the exact
+tension solver; what it misses between the grid points a finer grid and a little distance from the limits make good.
 """
 
 from __future__ import annotations

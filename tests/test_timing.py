@@ -10,9 +10,9 @@ from towline.errors import InputError, SolverError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import Task, TimingStatus, plan, time_along
-from towline.ocp.available_wrench import facets
 from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, TimedPath, WaypointPath
 from towline.solvers import TensionProblem, capacity_margin, solve
+from towline.solvers.available_wrench import facets
 
 GRAVITY = 9.81
 HOVER = RestPath(kind="rest", pose=(50, 50, 100, 0, 0, 0))

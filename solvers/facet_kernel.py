@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solvers.kernels.jit import jit
+from .kernels.jit import jit
 
 __all__ = ["facets", "full_rank"]
 

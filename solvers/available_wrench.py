@@ -1,4 +1,4 @@
-"""The available wrench set as half-spaces, for a whole path at once: `facets`.
+"""The available wrench set as half-spaces, for many wrench matrices at once: `facets`.
 
 The set {A t : t_min <= t <= t_max} is a zonotope. The normals of its facets are orthogonal to rank - 1 columns of A,
 and the facets lie at the support values along them: hyperplane shifting (Bouchard, Gosselin, Moore 2010; Gouttefarde,
@@ -82,13 +82,18 @@ def facets(A: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> Facets:
     return Facets(normals, least, most, outside, offset)
 
 
-def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
-    """Rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None: all of R^n."""
+def spans(A: np.ndarray) -> np.ndarray:
+    """Whether the columns of each A (N, n, m) span R^n, (N,) of bool."""
     from .facet_kernel import full_rank
 
-    count = len(columns)
-    full = np.empty(count, dtype=np.bool_)
-    full_rank(np.ascontiguousarray(columns), RANK, full)
+    full = np.empty(len(A), dtype=np.bool_)
+    full_rank(np.ascontiguousarray(A), RANK, full)
+    return full
+
+
+def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
+    """Rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None: all of R^n."""
+    full = spans(columns)
     found: list[tuple[np.ndarray, np.ndarray | None]] = [(np.flatnonzero(full), None)] if full.any() else []
     flat = np.flatnonzero(~full)
     if flat.size:

@@ -1,0 +1,79 @@
+"""Workspaces as pictures: points seen along the axes of {G}, and cross sections at heights."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import style
+from .plan import few_ticks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+VIEWS = ((0, 1), (0, 2), (1, 2))  # axes of {G} that are seen: from above, along y, along x
+MOST_POINTS = 20_000  # of a series in a panel: more are not seen, and files grow
+
+
+def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) -> Figure:
+    """Draw points of {G} as seen from above and from two sides, at equal scales.
+
+    Parameters
+    ----------
+    points
+        (n, 3) [m] by label, drawn in their order.
+    marks
+        Points to mark, such as anchors, (k, 3) [m].
+    """
+    canvas = style.figure(7.2, 3.0)
+    panels = [
+        style.axes(canvas, f"{'xyz'[across]} [m]", f"{'xyz'[up]} [m]", (1, 3, column + 1))
+        for column, (across, up) in enumerate(VIEWS)
+    ]
+    for ax, seen in zip(panels, VIEWS, strict=True):
+        _panel(ax, {label: some[:, seen] for label, some in points.items()}, None if marks is None else marks[:, seen])
+    style.legend_below(canvas, panels[0])
+    return canvas
+
+
+def cross_sections(
+    points: np.ndarray, heights: list[float], thickness: float, marks: np.ndarray | None = None
+) -> Figure:
+    """Draw the points of {G} that lie within `thickness` / 2 of each of some heights, from above, at one scale.
+
+    Parameters
+    ----------
+    points
+        (n, 3) [m].
+    heights, thickness
+        [m].
+    marks
+        Points to mark, (k, 3) [m].
+    """
+    canvas = style.figure(2.4 * len(heights), 2.8)
+    shown = [points[np.abs(points[:, 2] - height) <= thickness / 2][:, :2] for height in heights]
+    every = np.vstack([*shown, *([] if marks is None else [marks[:, :2]])])
+    for column, height in enumerate(heights):
+        ax = style.axes(canvas, "x [m]", "y [m]", (1, len(heights), column + 1))
+        _panel(ax, {"": shown[column]}, None if marks is None else marks[:, :2])
+        ax.set_title(f"z = {height:g} m ± {500 * thickness:g} mm, {len(shown[column])} points", fontsize=8)
+        if len(every):
+            low, high = every.min(axis=0), every.max(axis=0)
+            middle, half = (low + high) / 2, 0.55 * max(float((high - low).max()), 1e-6)
+            ax.set_xlim(middle[0] - half, middle[0] + half)
+            ax.set_ylim(middle[1] - half, middle[1] + half)
+    return canvas
+
+
+def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) -> None:
+    for index, (label, some) in enumerate(points.items()):
+        shown = some[:: -(-len(some) // MOST_POINTS)] if len(some) else some
+        # Raster images inside: tens of thousands of shapes make files that no viewer likes.
+        ax.plot(*shown.T, ".", color=style.colour(index), markersize=1.2, label=label or None, rasterized=True)
+    if marks is not None:
+        ax.plot(*marks.T, "^", color="#000000", markersize=4, label="anchors")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.xaxis.set_major_locator(few_ticks())
+    ax.yaxis.set_major_locator(few_ticks())

@@ -1,0 +1,187 @@
+"""Paper C's workspaces: three robots tow a load, with cables of fixed length, of variable length, or both (section 5).
+
+As in the paper, 60 000 loops each draw a place and ask whether the cables can hold the load there:
+
+- W1, fixed length: robot-ends anywhere in their boxes, any posture in (-1, 1) rad, cables of 1.2 m. The position
+  follows: where three spheres about the robot-ends meet, the lower of the two points.
+- W2, variable length: robot-ends in the middle of their boxes. The position is uniform in the box of Eq. 15, down to
+  the ground; the lengths follow (Eq. 1).
+- W3, both: robot-ends anywhere in their boxes, position uniform in the box of all of these.
+
+A loop's share of accepted samples is not the volume of a workspace where the robot-ends move too: a position belongs to
+it as soon as one of their placements will do. So volumes come from positions that are uniform in a box and, for each, a
+search for a placement and a posture (`ExistsPlacement`), which can miss but not invent.
+
+The paper's own figures contradict each other in two ways, whatever the sizes of the boxes, which it does not print.
+It says that W1 lies inside W2, but W1 reaches up to 1.38 m by its ranges and W2 to 1.18 m. And with the robot-ends in
+the middle of their boxes, cables of 1.2 m hold the load at 0.54 m, while W1's least height is printed as 0.6 m.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..figures import style
+from ..figures import workspace as figures
+from ..models import Robot
+from ..models.robot import Box, MobileCarrier
+from ..workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
+from ..workspace.balance import anchors, attachments
+from ..workspace.volume import Volume, volume
+from .towing_plans import Drive, robot
+
+__all__ = ["PRINTED", "Loops", "draw", "hanging", "loops", "placed_as_both", "volume_of"]
+
+LOOPS = 60_000
+POSTURE = 1.0  # [rad], the most of each angle
+DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")
+# Ranges of x, y and z in sections 5.1 to 5.3 [m].
+PRINTED = {
+    "fixed-length": ((1.15, 1.34), (0.7, 1.18), (0.6, 1.38)),
+    "variable-length": ((0.31, 2.2), (0.45, 2.0), (0.0, 1.18)),
+    "both": ((0.15, 2.3), (0.2, 2.2), (0.0, 1.38)),
+}
+SECTIONS = [0.6, 0.9, 1.2]  # heights of figure 4 [m]
+TRIES = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """What 60 000 loops of one system type found.
+
+    Attributes
+    ----------
+    robot, places
+        The system and where it was asked.
+    held
+        Where the condition holds, (n,) of bool.
+    seconds
+        Wall time of drawing and asking.
+    """
+
+    robot: Robot
+    places: Places
+    held: np.ndarray  # (n,)
+    seconds: float
+
+    @property
+    def points(self) -> np.ndarray:
+        """Positions of the platform where the condition holds, (k, 3) [m]."""
+        return self.places.pose[self.held, :3]
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """Least and most of x, y and z, (3, 2) [m]."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)], axis=1)
+
+
+def loops(drive: Drive, condition: Condition | None = None, count: int = LOOPS, seed: int = 0) -> Loops:
+    """Draw places of one system type and ask whether a condition holds there; None: force balance, as the paper's.
+
+    With `EquilibriumPosture` and fixed lengths the places that come back are where the load hangs.
+    """
+    system, asked = robot("wang-ctmrts", drive), condition or ForceBalance()
+    make_ready(system)
+    asked.holds(system, Places.at_home(system, system.home))
+    start = time.perf_counter()
+    places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]))
+    held = asked.holds(system, places)
+    return Loops(system, places, held, time.perf_counter() - start)
+
+
+def volume_of(drive: Drive, samples: int = LOOPS, tries: int = TRIES, seed: int = 0) -> Volume:
+    """Volume of the positions that one system type can hold, in some placement and posture [m^3]."""
+    system = robot("wang-ctmrts", drive)
+    low, high = _box(system)
+    rng = np.random.default_rng([seed, 3 + DRIVES.index(drive)])
+    poses = np.zeros((samples, 6))
+    poses[:, :3] = rng.uniform(low, high, (samples, 3))
+    condition = ExistsPlacement(condition=ForceBalance(), tries=tries, turn=POSTURE)
+    held = condition.holds(system, Places.at_home(system, poses))
+    return volume(int(held.sum()), samples, float(np.prod(high - low)))
+
+
+def placed_as_both(places: Places) -> np.ndarray:
+    """Whether places are in W3 by its definition: above the ground, robot-ends in their boxes, forces balanced."""
+    system = robot("wang-ctmrts", "both")
+    low, high = _reach(system)
+    ends = places.carriers[:, :, :3]
+    within = np.all((ends >= low - 1e-12) & (ends <= high + 1e-12), axis=(1, 2)) & (places.pose[:, 2] > 0)
+    return within & ForceBalance().holds(system, places)
+
+
+def hanging(system: Robot, angles: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Poses (n, 6) of a platform on three cables of given lengths at given attitudes; nan where they do not reach.
+
+    The distance of anchor and attachment is |b_i - P - R p_i| = L_i: P lies on spheres about b_i - R p_i. Of the two
+    points that three spheres share it is the lower.
+
+    Parameters
+    ----------
+    angles
+        (roll, pitch, yaw), (n, 3) [rad].
+    carriers
+        (n, c, 6) in {G} [m, rad].
+    lengths
+        (3,) [m].
+    """
+    pose = np.concatenate([np.zeros_like(angles), angles], axis=1)
+    places = Places(pose, carriers)
+    centres = anchors(system, places) - attachments(system, places)  # (n, 3, 3)
+    a, b = centres[:, 1] - centres[:, 0], centres[:, 2] - centres[:, 0]
+    normal = np.cross(a, b)
+    square = np.einsum("ni,ni->n", normal, normal)[:, None]
+    aa, bb = (np.einsum("ni,ni->n", x, x)[:, None] for x in (a, b))
+    first, second = lengths[0] ** 2 - lengths[1:] ** 2
+    # In the plane of the centres: 2 a . p = first + |a|^2, 2 b . p = second + |b|^2.
+    foot = np.cross(normal, (second + bb) * a - (first + aa) * b) / (2.0 * square)
+    rest = lengths[0] ** 2 - np.einsum("ni,ni->n", foot, foot)[:, None]
+    with np.errstate(invalid="ignore"):
+        across = normal * np.sqrt(rest / square)
+    down = np.where(across[:, 2:] > 0, -across, across)
+    pose[:, :3] = centres[:, 0] + foot + down
+    return pose
+
+
+def draw(found: dict[str, Loops], folder: Path) -> list[Path]:
+    """Save the projections of figures 3, 5 and 6 and the cross sections of figure 4 as PNG; `found` by drive."""
+    names = {"fixed-length": "figure-3", "variable-length": "figure-5", "both": "figure-6"}
+    files = []
+    for drive, system in found.items():
+        canvas = figures.projections({drive: system.points}, system.robot.home_anchors)
+        files.append(style.save(canvas, folder / f"{names[drive]}-{drive}.png"))
+    if "fixed-length" in found:
+        fixed = found["fixed-length"]
+        canvas = figures.cross_sections(fixed.points, SECTIONS, 0.02)
+        files.append(style.save(canvas, folder / "figure-4-sections.png"))
+    return files
+
+
+def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
+    """Places of one system type, uniform in what its drive moves."""
+    carriers = np.tile(system.carrier_home, (count, 1, 1))
+    if system.drive != "variable-length":
+        carriers[:, :, :3] = rng.uniform(*_reach(system), carriers[:, :, :3].shape)
+    angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
+    if system.fixed_lengths is not None:
+        return Places(hanging(system, angles, carriers, system.fixed_lengths), carriers)
+    low, high = _box(system)
+    return Places(np.concatenate([rng.uniform(low, high, (count, 3)), angles], axis=1), carriers)
+
+
+def _reach(system: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the reach boxes, (3, 3) each [m]."""
+    boxes: list[Box] = [carrier.reach for carrier in system.carriers if isinstance(carrier, MobileCarrier)]
+    return np.array([box.min for box in boxes]), np.array([box.max for box in boxes])
+
+
+def _box(system: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """The box of Eq. 15, of all places that the robot-ends may have, down to the ground: corners (3,) each [m]."""
+    ends = [system.carrier_home[:, :3]] if system.drive == "variable-length" else list(_reach(system))
+    low, high = np.min(ends, axis=(0, 1)), np.max(ends, axis=(0, 1))
+    low[2] = 0.0
+    return low, high

@@ -1,0 +1,113 @@
+"""The boundary of a workspace as a mesh of triangles, from values on a grid: marching cubes (scikit-image), and STL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..models import Robot
+from ..writing import whole_file
+from .condition import Condition
+from .places import Places
+
+__all__ = ["Mesh", "boundary", "boundary_of_values"]
+
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles, counter-clockwise seen from outside.
+
+    Attributes
+    ----------
+    vertices
+        In {G}, (n, 3) [m].
+    faces
+        Indices of vertices, (k, 3); none if there is nothing to bound.
+    """
+
+    vertices: np.ndarray  # (n, 3)
+    faces: np.ndarray  # (k, 3)
+
+    @property
+    def volume(self) -> float:
+        """Volume inside [m^3], by the divergence theorem."""
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6.0)
+
+    def save(self, path: str | Path) -> Path:
+        """Save as binary STL, in metres; whole or not at all."""
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+        records = np.zeros(len(corners), dtype=_RECORD)
+        records["normal"], records["corners"] = normals / np.where(sizes > 0, sizes, 1.0), corners
+        with whole_file(Path(path)) as temporary, temporary.open("wb") as stream:
+            stream.write(b"towline workspace, metres".ljust(80))
+            stream.write(np.uint32(len(records)).astype("<u4").tobytes())
+            stream.write(records.tobytes())
+        return Path(path)
+
+
+def boundary(
+    robot: Robot,
+    condition: Condition,
+    low: np.ndarray,
+    high: np.ndarray,
+    cells: int = 48,
+    attitude: np.ndarray | None = None,
+) -> Mesh:
+    """Mesh of the boundary of the positions where a condition holds, at one attitude, with the carriers at home.
+
+    Parameters
+    ----------
+    low, high
+        Corners of the box to look in, (3,) in {G} [m].
+    cells
+        Along the longest edge of the box. The mesh is right to about half the size of a cell.
+    attitude
+        (roll, pitch, yaw) [rad]; None: that of home.
+
+    Raises
+    ------
+    InputError
+        If the box is flat or there are too few cells.
+    """
+    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    if low.shape != (3,) or high.shape != (3,) or not (high > low).all():
+        raise InputError(f"box: from {low.tolist()} to {high.tolist()}; accepted: three numbers each, low below high")
+    if cells < 2:
+        raise InputError(f"cells: is {cells}; accepted: 2 and more")
+    counts = np.maximum(np.ceil((high - low) / ((high - low).max() / cells)).astype(int), 1) + 1
+    axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
+    poses = np.empty((int(np.prod(counts)), 6))
+    poses[:, :3] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    poses[:, 3:] = robot.home[3:] if attitude is None else attitude
+    held = condition.holds(robot, Places.at_home(robot, poses))
+    return boundary_of_values(held.reshape(counts) - 0.5, low, high)
+
+
+def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
+    """Mesh of where values on a grid cross zero, positive inside; closed at the faces of the box.
+
+    Parameters
+    ----------
+    values
+        (a, b, c), at points evenly spaced from `low` to `high`, ends included, two or more along each axis.
+    """
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError:
+        raise InputError("scikit-image: is not installed; accepted: pip install 'towline[mesh]'") from None
+    if not (values > 0).any():
+        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
+    spacing = (np.asarray(high) - low) / (np.array(values.shape) - 1)
+    # Just outside the box nothing is inside, so that the mesh is closed.
+    padded = np.pad(values, 1, constant_values=float(min(values.min(), -values.max())))
+    vertices, faces, _, _ = marching_cubes(padded, 0.0, spacing=tuple(spacing), gradient_direction="ascent")
+    # The layer added is a cell away; what it bounds ends at the box.
+    return Mesh(np.clip(vertices - spacing + low, low, high), faces.astype(np.intp))

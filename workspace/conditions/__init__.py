@@ -1,0 +1,30 @@
+"""What a place may be asked: one condition a file, each of them answered for many places at once."""
+
+from .dynamic import Dynamic
+from .equilibrium_posture import EquilibriumPosture
+from .exists_placement import ExistsPlacement
+from .force_balance import ForceBalance
+from .interference import BoxObstacle, CapsuleObstacle, Interference, SphereObstacle
+from .lengths import Lengths
+from .margin import Margin
+from .static_equilibrium import StaticEquilibrium
+from .wrench_closure import WrenchClosure
+from .wrench_feasible import WrenchFeasible
+from .wrench_with_tolerance import WrenchWithTolerance
+
+__all__ = [
+    "BoxObstacle",
+    "CapsuleObstacle",
+    "Dynamic",
+    "EquilibriumPosture",
+    "ExistsPlacement",
+    "ForceBalance",
+    "Interference",
+    "Lengths",
+    "Margin",
+    "SphereObstacle",
+    "StaticEquilibrium",
+    "WrenchClosure",
+    "WrenchFeasible",
+    "WrenchWithTolerance",
+]

@@ -1,0 +1,147 @@
+"""Equilibrium posture, the third of paper C's conditions: at a position, the platform finds an attitude to hang at.
+
+Attitude (roll, pitch, yaw) and tensions are solved for together, six equations
+
+    S (A(x, theta) t - w) = 0,      S: moments divided by `Robot.length`
+
+by Newton's method from the level platform. With three cables there are six unknowns; with more, each step is the one of
+least norm, tensions in units of the weight, and which tensions balance at the attitude found is asked again. Where the
+drive keeps the cables' lengths, the position is unknown too, and l_i(x, theta) = L_i are three more equations.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from ...errors import InputError
+from ...models import Robot
+from ...models.batch import call, compiled
+from ..balance import can_give, dynamics_of, rest_wrench
+from ..condition import Condition
+from ..places import Places
+
+__all__ = ["EquilibriumPosture"]
+
+STEPS = 20
+STRIDE = 0.5  # [rad], the most that one step turns the platform
+SOLVED = 1e-9  # of the weight, largest residual
+AT_ONCE = 4096
+
+
+class EquilibriumPosture(Condition):
+    """At the position of the place, the platform has an attitude at which tensions inside the limits hold it at rest.
+
+    The attitude of the place does not count. One attitude is looked for, the one that Newton's method finds from level:
+    no is "not found". With the drive fixed-length the position is found as well, beginning at that of the place: where
+    the platform then hangs is what `postures` returns.
+    """
+
+    kind: Literal["equilibrium-posture"] = "equilibrium-posture"
+
+    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+        pose, tensions = self.postures(robot, places)
+        if robot.m <= 3:
+            low, high = robot.t_min, robot.t_max
+            return np.all((tensions >= low) & (tensions <= high), axis=1)
+        held = np.all(np.isfinite(pose), axis=1)
+        held[held] = can_give(robot, Places(pose[held], places.carriers[held]), rest_wrench(robot)[None])
+        return held
+
+    def postures(self, robot: Robot, places: Places) -> tuple[np.ndarray, np.ndarray]:
+        """Poses (n, 6) with the attitudes found and tensions (n, m) [N], of any sign; nan where none was found.
+
+        Raises
+        ------
+        InputError
+            If the platform cannot turn about all three axes, has fewer than three cables or no weight.
+        """
+        if robot.drive == "fixed-length" and robot.m > 3:
+            raise InputError(f"robot: {robot.name!r} has {robot.m} cables of fixed length; accepted: three")
+        if robot.dof_mask.sum() < 6 or robot.m < 3 or robot.weight == 0:
+            raise InputError(
+                f"robot: {robot.name!r} has {robot.m} cables, weight {robot.weight:g} N and the dof "
+                f"{', '.join(robot.platform.dof)}; accepted: three cables or more, a weight, and all six coordinates"
+            )
+        pose = places.pose.copy()
+        pose[:, 3:] = 0.0
+        tensions = np.full((len(places), robot.m), robot.weight / robot.m)
+        for start in range(0, len(places), AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            _solve(robot, pose[part], tensions[part], places.carriers[part])
+        return pose, tensions
+
+
+def _solve(robot: Robot, pose: np.ndarray, tensions: np.ndarray, carriers: np.ndarray) -> None:
+    """Take pose (n, 6) and tensions (n, m) to a balance in place, or to nan."""
+    key: Any = robot  # frozen, so it has a hash, which a type checker does not see
+    function = _balance(key)
+    unknown = slice(3 if robot.fixed_lengths is None else 0, 6)
+    turned = 3 - unknown.start
+    left = np.arange(len(pose))
+    for _ in range(STEPS):
+        arguments = {"pose": pose[left], "tensions": tensions[left], "carrier_pose": carriers[left]}
+        result = call(function, arguments, threads=1)
+        error, jacobian = result["error"], result["jacobian"]
+        good = np.isfinite(error).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
+        open_ = good & ~(np.abs(error).max(axis=1) <= SOLVED)
+        lost = left[~good]
+        pose[lost], tensions[lost] = np.nan, np.nan
+        left, error, jacobian = left[open_], error[open_], jacobian[open_]
+        if not left.size:
+            return
+        step = -_least_norm(jacobian, error)
+        angles = step[:, turned : turned + 3]
+        step *= np.minimum(1.0, STRIDE / np.maximum(np.abs(angles).max(axis=1), 1e-300))[:, None]
+        pose[left, unknown] += step[:, : turned + 3]
+        tensions[left] += robot.weight * step[:, turned + 3 :]
+    pose[left], tensions[left] = np.nan, np.nan
+
+
+def _least_norm(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Return x (n, k) of least norm with J x = error, nan where J (n, rows, k) has not full rank."""
+    if jacobian.shape[1] < jacobian.shape[2]:
+        turned = jacobian.transpose(0, 2, 1)
+        return (turned @ _least_norm(jacobian @ turned, error)[..., None])[..., 0]
+    try:
+        return np.linalg.solve(jacobian, error[..., None])[..., 0]
+    except np.linalg.LinAlgError:  # one of them is exactly singular
+        return np.array([_one(J, e) for J, e in zip(jacobian, error, strict=True)])
+
+
+def _one(J: np.ndarray, error: np.ndarray) -> np.ndarray:
+    try:
+        return np.linalg.solve(J, error)
+    except np.linalg.LinAlgError:
+        return np.full(J.shape[1], np.nan)
+
+
+@lru_cache(maxsize=16)
+def _balance(robot: Any) -> ca.Function:
+    """Residual of the balance in units of the weight, of fixed lengths in `Robot.length`, and its Jacobian.
+
+    The Jacobian is for (position where lengths are fixed, attitude, tensions in units of the weight).
+    """
+    dynamics = dynamics_of(robot)
+    pose, tensions = ca.SX.sym("pose", 6), ca.SX.sym("tensions", robot.m)
+    carriers = ca.SX.sym("carrier_pose", len(robot.carriers), 6)
+    A = dynamics.wrench_matrix(pose, carriers)
+    scale = ca.DM([1.0] * 3 + [1.0 / robot.length] * 3) / robot.weight
+    error = scale * (A @ tensions - ca.DM(rest_wrench(robot)))
+    first = 3
+    if robot.fixed_lengths is not None:
+        missing = (dynamics.cable_lengths(pose, carriers) - ca.DM(robot.fixed_lengths)) / robot.length
+        error, first = ca.vertcat(error, missing), 0
+    jacobian = ca.horzcat(ca.jacobian(error, pose)[:, first:], ca.jacobian(error, tensions) * robot.weight)
+    function = ca.Function(
+        "balance",
+        [pose, tensions, carriers],
+        [error, ca.densify(jacobian)],
+        ["pose", "tensions", "carrier_pose"],
+        ["error", "jacobian"],
+    )
+    compiled(function)
+    return function

@@ -1,0 +1,114 @@
+"""For robots whose carriers can be placed: somewhere in their reach boxes a condition holds.
+
+The placements tried are the same for every place, points of a scrambled Sobol sequence in the product of the boxes, so
+that the answer for a place depends on nothing else. It is one-sided: yes is proved by a placement, no is "not found".
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...errors import InputError
+from ...models import Robot
+from ...models.robot import MobileCarrier, NonNegative
+from ..balance import anchors, attachments
+from ..condition import AnyCondition, Condition
+from ..places import Places
+
+__all__ = ["ExistsPlacement"]
+
+ROUNDS = 6  # from a box to a sphere and back
+
+
+class ExistsPlacement(Condition):
+    """A condition holds for the carriers as they are or for another placement of the mobile ones in their reach.
+
+    With the drive fixed-length the carriers are placed at their cables' lengths from the attachments. With the drive
+    variable-length mobile carriers stay where they are.
+    """
+
+    kind: Literal["exists-placement"] = "exists-placement"
+    condition: AnyCondition
+    tries: Annotated[int, Field(ge=1, le=1_000_000)] = Field(default=32, description="placements that are tried")
+    turn: NonNegative = Field(
+        default=0.0, description="roll, pitch and yaw are tried too, up to this from the attitude of the place [rad]"
+    )
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+        mobile = [i for i, carrier in enumerate(robot.carriers) if isinstance(carrier, MobileCarrier)]
+        if robot.drive == "variable-length":
+            mobile = []
+        if not mobile and not self.turn:
+            raise InputError(
+                f"exists-placement: robot {robot.name!r} has no carrier to place; accepted: mobile carriers and a "
+                "drive other than variable-length, or turn > 0"
+            )
+        if robot.drive == "fixed-length" and len(set(robot.carrier_of_cable)) < robot.m:
+            raise InputError(
+                f"exists-placement: carriers of {robot.name!r} hold several cables of fixed length; "
+                "accepted: one cable each"
+            )
+        held = np.zeros(len(places), dtype=bool)
+        if robot.drive != "fixed-length":
+            held = self.condition.holds(robot, places)
+        for shares in _shares(3 * len(mobile) + 3, self.tries, self.seed):
+            left = np.flatnonzero(~held)
+            if not left.size:
+                break
+            placed, fits = self._place(robot, mobile, places.only(left), shares)
+            left, placed = left[fits], placed.only(fits)
+            held[left] = self.condition.holds(robot, placed)
+        return held
+
+    def _place(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> tuple[Places, np.ndarray]:
+        """Places with the carriers at `shares` of their boxes, and whether all of them fit there."""
+        pose, carriers = places.pose.copy(), places.carriers.copy()
+        if self.turn:
+            pose[:, 3:] += self.turn * (2.0 * shares[-3:] - 1.0) * robot.dof_mask[3:]
+        boxes = {i: carrier.reach for i, carrier in enumerate(robot.carriers) if isinstance(carrier, MobileCarrier)}
+        for k, i in enumerate(mobile):
+            low, high = np.array(boxes[i].min), np.array(boxes[i].max)
+            carriers[:, i, :3] = low + shares[3 * k : 3 * k + 3] * (high - low)
+        placed = Places(pose, carriers)
+        fits = np.ones(len(places), dtype=bool)
+        if robot.fixed_lengths is not None:
+            ends, starts = attachments(robot, placed), anchors(robot, placed)
+            for cable, i in enumerate(robot.carrier_of_cable):
+                away, length = starts[:, cable] - ends[:, cable], robot.fixed_lengths[cable]
+                shift = _onto_sphere(away, length) - away
+                if i not in mobile:
+                    fits &= np.abs(shift).max(axis=-1) <= 1e-9
+                    continue
+                low = np.array(boxes[i].min) - carriers[:, i, :3] + away
+                high = np.array(boxes[i].max) - carriers[:, i, :3] + away
+                at = away
+                # To the sphere and back into the box: the two meet in a patch, if they do.
+                for _ in range(ROUNDS):
+                    at = np.clip(_onto_sphere(at, length), low, high)
+                at = _onto_sphere(at, length)
+                fits &= np.all((at >= low - 1e-9) & (at <= high + 1e-9), axis=-1)
+                carriers[:, i, :3] += at - away
+        return placed, fits
+
+
+def _onto_sphere(away: np.ndarray, length: float) -> np.ndarray:
+    return away * (length / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12))
+
+
+@lru_cache(maxsize=4)
+def _shares(dimensions: int, count: int, seed: int) -> np.ndarray:
+    """Numbers of (0, 1) that fill the cube evenly, (count, dimensions); every other row is at a corner of the boxes.
+
+    Where a condition only just holds, carriers are at the ends of their reach. The last three numbers, which turn the
+    platform, stay inside.
+    """
+    from scipy.stats import qmc
+
+    shares = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(int(count - 1).bit_length())[:count]
+    shares[::2, :-3] = np.round(shares[::2, :-3])
+    return shares

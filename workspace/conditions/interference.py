@@ -1,0 +1,166 @@
+"""Interference: cables stay clear of each other, of the platform's body and of obstacles.
+
+Cables are the straight segments from anchor to attachment. Distances of segments: Ericson, Real-Time Collision
+Detection, 5.1.9; whether a segment enters a box: its 5.3.3.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...models import Robot
+from ...models.robot import Box, NonNegative, Part, Positive, Vector3
+from ..balance import anchors, attachments, in_platform
+from ..condition import Condition
+from ..places import Places
+
+__all__ = ["BoxObstacle", "CapsuleObstacle", "Interference", "SphereObstacle"]
+
+_BISECTIONS = 40  # of a cable: its point nearest to a box, to 1e-12 of its length
+
+
+class SphereObstacle(Part):
+    """A ball."""
+
+    kind: Literal["sphere"]
+    centre: Vector3 = Field(description="in {G} [m]")
+    radius: Positive = Field(description="[m]")
+
+
+class CapsuleObstacle(Part):
+    """All within a radius of a segment."""
+
+    kind: Literal["capsule"]
+    start: Vector3 = Field(description="in {G} [m]")
+    end: Vector3 = Field(description="in {G} [m]")
+    radius: Positive = Field(description="[m]")
+
+
+class BoxObstacle(Part):
+    """A box along the axes of {G}."""
+
+    kind: Literal["box"]
+    min: Vector3 = Field(description="lowest corner in {G} [m]")
+    max: Vector3 = Field(description="highest corner in {G} [m]")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+            if low > high:
+                raise ValueError(f"min must not exceed max, but along {axis} min is {low:g} and max is {high:g}")
+        return self
+
+
+Obstacle = Annotated[SphereObstacle | CapsuleObstacle | BoxObstacle, Field(discriminator="kind")]
+
+
+class Interference(Condition):
+    """Cables are free: of each other by a distance, of the platform's box, of obstacles by a distance.
+
+    Cables that share an anchor or an attachment at home are not held apart from each other.
+    """
+
+    kind: Literal["interference"] = "interference"
+    between_cables: NonNegative | None = Field(default=None, description="least distance of two cables [m]; none: any")
+    platform: Box | None = Field(
+        default=None, description="the platform's body in its own frame, which no cable may enter [m]; none: no body"
+    )
+    obstacles: tuple[Obstacle, ...] = Field(default=(), description="what cables keep away from")
+    clearance: NonNegative = Field(default=0.0, description="least distance of cables and attachments from these [m]")
+
+    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+        with np.errstate(over="ignore", invalid="ignore"):  # of places beyond all measure
+            return self._free(robot, places)
+
+    def _free(self, robot: Robot, places: Places) -> np.ndarray:
+        starts, ends = anchors(robot, places), attachments(robot, places)
+        free = np.ones(len(places), dtype=bool)
+        if self.between_cables is not None:
+            for i, j in _apart(robot):
+                distance = segment_distance(starts[:, i], ends[:, i], starts[:, j], ends[:, j])
+                free &= distance >= self.between_cables
+        if self.platform is not None:
+            low, high = np.array(self.platform.min), np.array(self.platform.max)
+            for cable in range(robot.m):
+                free &= ~_enters(low, high, robot.attachments[cable], in_platform(places, starts[:, cable]))
+        for obstacle in self.obstacles:
+            for cable in range(robot.m):
+                free &= _outside(obstacle, starts[:, cable], ends[:, cable]) >= self.clearance
+        return free
+
+
+def segment_distance(p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.ndarray) -> np.ndarray:
+    """Distance of the segments p to p_end and q to q_end, (n, 3) each, (n,) [m]."""
+    along, across, between = p_end - p, q_end - q, p - q
+    a, e, f = _dot(along, along), _dot(across, across), _dot(across, between)
+    b, c = _dot(along, across), _dot(along, between)
+    tiny = np.finfo(float).tiny
+    beside = a * e - b * b
+    # On parallel lines every s will do, and 0 is one.
+    s = np.where(beside > 1e-14 * a * e, np.clip((b * f - c * e) / np.maximum(beside, tiny), 0.0, 1.0), 0.0)
+    t = np.clip((b * s + f) / np.maximum(e, tiny), 0.0, 1.0)
+    s = np.clip((b * t - c) / np.maximum(a, tiny), 0.0, 1.0)
+    gap = between + s[:, None] * along - t[:, None] * across
+    return np.sqrt(_dot(gap, gap))
+
+
+def _apart(robot: Robot) -> list[tuple[int, int]]:
+    """Pairs of cables without a common end."""
+    ends = (robot.home_anchors, robot.home_attachments)
+    return [
+        (i, j)
+        for i, j in combinations(range(robot.m), 2)
+        if all(np.linalg.norm(points[i] - points[j]) > 1e-9 for points in ends)
+    ]
+
+
+def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
+    """Distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; zero or less where they meet."""
+    if isinstance(obstacle, BoxObstacle):
+        return _from_box(np.array(obstacle.min), np.array(obstacle.max), p, p_end)
+    if isinstance(obstacle, SphereObstacle):
+        start = end = np.array(obstacle.centre)
+    else:
+        start, end = np.array(obstacle.start), np.array(obstacle.end)
+    shape = p.shape
+    return segment_distance(p, p_end, np.broadcast_to(start, shape), np.broadcast_to(end, shape)) - obstacle.radius
+
+
+def _from_box(low: np.ndarray, high: np.ndarray, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
+    """Distance of segments from a box, zero inside: convex along the segment, so its slope's sign is bisected."""
+    along = p_end - p
+    first, last = np.zeros(len(p)), np.ones(len(p))
+    for _ in range(_BISECTIONS):
+        middle = (first + last) / 2
+        at = p + middle[:, None] * along
+        falling = _dot(at - np.clip(at, low, high), along) < 0
+        first, last = np.where(falling, middle, first), np.where(falling, last, middle)
+    at = p + last[:, None] * along
+    return np.linalg.norm(at - np.clip(at, low, high), axis=1)
+
+
+def _enters(low: np.ndarray, high: np.ndarray, attachment: np.ndarray, anchor: np.ndarray) -> np.ndarray:
+    """Whether the segments from an attachment (3,) to anchors (n, 3), in the platform frame, enter its box.
+
+    To touch the surface is not to enter: attachments lie on it.
+    """
+    slack = 1e-9 * max(float(np.abs(high - low).max()), 1e-9)
+    low, high = low + slack, high - slack
+    if (low >= high).any():
+        return np.zeros(len(anchor), dtype=bool)
+    along = anchor - attachment
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at_low, at_high = (low - attachment) / along, (high - attachment) / along
+    still = along == 0.0
+    beside = still & ((attachment <= low) | (attachment >= high))
+    entry = np.where(still, -np.inf, np.minimum(at_low, at_high)).max(axis=1)
+    leave = np.where(still, np.inf, np.maximum(at_low, at_high)).min(axis=1)
+    return ~beside.any(axis=1) & (np.maximum(entry, 0.0) < np.minimum(leave, 1.0))
+
+
+def _dot(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.einsum("ni,ni->n", x, y)

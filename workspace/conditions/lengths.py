@@ -1,0 +1,39 @@
+"""Length limits: every cable is as long as its winch allows."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...errors import InputError
+from ...models import Robot
+from ...models.robot import NonNegative, Positive
+from ..balance import dynamics_of
+from ..condition import Condition
+from ..places import Places
+
+__all__ = ["Lengths"]
+
+
+class Lengths(Condition):
+    """Each cable's length lies between a least and a most."""
+
+    kind: Literal["lengths"] = "lengths"
+    min: NonNegative | tuple[NonNegative, ...] = Field(default=0.0, description="of all cables or of each [m]")
+    max: Positive | tuple[Positive, ...] | None = Field(default=None, description="of all cables or of each [m]")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.max is not None and np.ndim(self.min) == np.ndim(self.max) == 0 and np.greater(self.min, self.max):
+            raise ValueError(f"min must not exceed max, but they are {self.min} m and {self.max} m")
+        return self
+
+    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+        for name, value in (("min", self.min), ("max", self.max)):
+            if isinstance(value, tuple) and len(value) != robot.m:
+                raise InputError(f"lengths.{name}: has {len(value)} numbers; accepted: one, or {robot.m}, one a cable")
+        lengths = dynamics_of(robot).cable_lengths(places.pose, places.carriers)
+        most = np.inf if self.max is None else self.max
+        return np.all((lengths >= self.min) & (lengths <= most), axis=1)
