@@ -87,8 +87,8 @@ class FreeBase(Part):
         default=0.0,
         ge=0,
         lt=1.5,
-        description="largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have the "
-        "limit of the robot's file",
+        description="largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have "
+        "the limit of the robot's file",
     )
     turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
     ends: Literal["free", "rest", "periodic", "exact"] = Field(
