@@ -18,12 +18,12 @@ from typing import Any, Literal, NamedTuple
 
 from ..models import Robot, load
 from ..ocp import Planner, Task
-from ..ocp.audit import audit
-from ..ocp.program import build
-from ..ocp.rows import Mesh
-from ..ocp.scenario import lay_out
-from ..ocp.scheme import SCHEMES
-from ..ocp.solver import Solver
+from ..ocp.audits.audit import audit
+from ..ocp.nlp.program import build
+from ..ocp.nlp.rows import Mesh
+from ..ocp.nlp.solver import Solver
+from ..ocp.tasks.scenario import lay_out
+from ..ocp.tasks.scheme import SCHEMES
 from ..studies import towing_plans
 from ..studies.flying_circle import tasks
 from .machine import machine

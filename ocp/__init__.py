@@ -2,8 +2,8 @@
 
 from .plan import Planner, plan
 from .result import Plan, PlanStatus
-from .task import Task, read_task
-from .timing import Timing, TimingStatus, time_along
+from .tasks.task import Task, read_task
+from .timing.timing import Timing, TimingStatus, time_along
 
 __all__ = [
     "Plan",

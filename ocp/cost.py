@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .finding import Finding
+from .reports.finding import Finding
 
 __all__ = ["cost"]
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .scenario import Scenario
+from .tasks.scenario import Scenario
 
 __all__ = ["Durations", "durations"]
 

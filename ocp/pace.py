@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError, SolverError
-from .path import AnyPath, LinePath, RestPath, WaypointPath
-from .scenario import Scenario
-from .timing import Timing, time_along
+from .tasks.path import AnyPath, LinePath, RestPath, WaypointPath
+from .tasks.scenario import Scenario
+from .timing.timing import Timing, time_along
 
 __all__ = ["BOUND", "fastest"]
 

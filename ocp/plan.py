@@ -16,21 +16,21 @@ from dataclasses import replace
 from typing import Any
 
 from ..models import Robot
-from .audit import Audit, at_rest, tensions_may_mend
+from .audits.audit import Audit, at_rest, tensions_may_mend
 from .cost import cost
 from .durations import Durations, durations
-from .finding import Relaxed
+from .nlp.rows import Mesh
+from .nlp.solver import Outcome, Progress, Solver
 from .pace import BOUND, fastest
-from .path import AnyPath
+from .reports.finding import Relaxed
 from .rest_margin import rest_margin
 from .result import Plan, PlanStatus
-from .rows import Mesh
-from .scenario import Deviation, Scenario, lay_out
 from .search import Search
-from .solver import Outcome, Progress, Solver
 from .start import deviation_from
-from .task import Task, read_task
-from .timing import Timing
+from .tasks.path import AnyPath
+from .tasks.scenario import Deviation, Scenario, lay_out
+from .tasks.task import Task, read_task
+from .timing.timing import Timing
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600

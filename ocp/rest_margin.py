@@ -12,8 +12,8 @@ import numpy as np
 
 from ..solvers import capacity_margin
 from ..workspace.pose import masked_problem
-from .guess import initial_guess
-from .scenario import Scenario
+from .nlp.guess import initial_guess
+from .tasks.scenario import Scenario
 
 __all__ = ["RestMargin", "rest_margin"]
 

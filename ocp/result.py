@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from ..figures import animation, style
 from ..writing import whole_file
-from .drawings import drawings
-from .finding import Finding, PlanStatus
-from .report import as_text
-from .report_page import page
-from .scene import scene
-from .trajectory import trajectory
+from .reports.drawings import drawings
+from .reports.finding import Finding, PlanStatus
+from .reports.report import as_text
+from .reports.report_page import page
+from .reports.scene import scene
+from .reports.trajectory import trajectory
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,14 +6,14 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from .audit import Audit, audit
-from .finding import PlanStatus
-from .program import build
+from .audits.audit import Audit, audit
+from .nlp.program import build
+from .nlp.rows import Mesh
+from .nlp.solver import Outcome, Progress, Solver
+from .reports.finding import PlanStatus
+from .reports.rung import Rung
 from .result import Plan
-from .rows import Mesh
-from .rung import Rung
-from .scenario import Deviation, Scenario
-from .solver import Outcome, Progress, Solver
+from .tasks.scenario import Deviation, Scenario
 
 __all__ = ["Search"]
 

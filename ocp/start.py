@@ -10,11 +10,11 @@ from pydantic import Field
 from ..errors import InputError
 from ..models.parsing import validate
 from ..models.robot import Part
-from .finding import Finding
-from .guess import initial_guess
-from .path import AnyPath, PathBase, RestPath
-from .scenario import Deviation, Scenario
-from .timing import Timing
+from .nlp.guess import initial_guess
+from .reports.finding import Finding
+from .tasks.path import AnyPath, PathBase, RestPath
+from .tasks.scenario import Deviation, Scenario
+from .timing.timing import Timing
 
 __all__ = ["deviation_from"]
 

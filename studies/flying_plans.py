@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..ocp import Task
-from ..ocp.path import CirclePath, LinePath, SamplePath
-from ..ocp.task import FreeBase, GivenBase
+from ..ocp.tasks.path import CirclePath, LinePath, SamplePath
+from ..ocp.tasks.task import FreeBase, GivenBase
 from . import flying_circle
 
 START, END, SECONDS = np.array([-20.0, -30.0, 40.0]), np.array([40.0, 20.0, 102.45]), 10.0  # VI.A [m], [s]

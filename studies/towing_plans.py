@@ -15,8 +15,8 @@ import numpy as np
 from ..models import Robot, load
 from ..models.statics import equilibria
 from ..ocp import Task
-from ..ocp.path import AnyPath, LinePath
-from ..ocp.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
+from ..ocp.tasks.path import AnyPath, LinePath
+from ..ocp.tasks.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
 
 Drive = Literal["fixed-length", "variable-length", "both"]
 Aim = Literal["effort", "time"]

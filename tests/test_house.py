@@ -44,7 +44,7 @@ def test_imports_only_point_down():
 
 def test_the_import_test_can_see():
     """It would notice: planning does import models and solvers."""
-    seen = {other for path in (ROOT / "ocp").glob("*.py") for other in imported_rooms(path)}
+    seen = {other for path in (ROOT / "ocp").rglob("*.py") for other in imported_rooms(path)}
     assert {"models", "solvers"} <= seen
 
 

@@ -12,9 +12,9 @@ from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.models.statics import equilibria
 from towline.ocp import PlanStatus, Task, plan, read_task
-from towline.ocp.audit import audit
-from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
-from towline.ocp.scenario import Deviation, lay_out
+from towline.ocp.audits.audit import audit
+from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
+from towline.ocp.tasks.scenario import Deviation, lay_out
 
 GRAVITY = 9.81
 HOVER = [50, 50, 100, 0, 0, 0]

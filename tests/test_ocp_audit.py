@@ -12,11 +12,11 @@ from scipy.optimize import linprog
 from towline.errors import InputError
 from towline.models import Dynamics, load
 from towline.ocp import PlanStatus, plan
-from towline.ocp.audit import audit
-from towline.ocp.excess import Excess
-from towline.ocp.scenario import Deviation, lay_out
-from towline.ocp.task import read_task
-from towline.ocp.task_limits import TaskLimits
+from towline.ocp.audits.audit import audit
+from towline.ocp.audits.excess import Excess
+from towline.ocp.tasks.scenario import Deviation, lay_out
+from towline.ocp.tasks.task import read_task
+from towline.ocp.tasks.task_limits import TaskLimits
 
 LASTS = 2.0  # [s]
 NODES = np.linspace(0, LASTS, 21)

@@ -7,10 +7,10 @@ import pytest
 from towline.errors import InputError
 from towline.models import load
 from towline.ocp import Planner, plan
-from towline.ocp.program import build
-from towline.ocp.rows import Mesh
-from towline.ocp.scenario import lay_out
-from towline.ocp.task import Task
+from towline.ocp.nlp.program import build
+from towline.ocp.nlp.rows import Mesh
+from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.task import Task
 from towline.studies import flying_circle, towing_plans
 
 LINE = {

@@ -5,10 +5,10 @@ import pytest
 
 from towline.models import load
 from towline.ocp import plan
-from towline.ocp.formation import clear_formation
-from towline.ocp.guess import initial_guess
-from towline.ocp.scenario import lay_out
-from towline.ocp.task import Task
+from towline.ocp.nlp.formation import clear_formation
+from towline.ocp.nlp.guess import initial_guess
+from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.task import Task
 
 HALF_SLOT, HALF_WALL = 0.5, 0.2  # [m]
 APART = 0.6  # [m]

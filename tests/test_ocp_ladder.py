@@ -13,9 +13,9 @@ from towline.ocp.cost import cost
 from towline.ocp.durations import durations
 from towline.ocp.pace import fastest
 from towline.ocp.rest_margin import rest_margin
-from towline.ocp.scenario import lay_out
 from towline.ocp.start import deviation_from
-from towline.ocp.task import Task
+from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.task import Task
 from towline.solvers import capacity_margin
 from towline.workspace import pose_problem
 
@@ -203,7 +203,7 @@ class TestTiming:
         assert timing.duration <= durations(given).shortest
 
     def test_without_toppra_the_ladder_goes_on(self, monkeypatch):
-        monkeypatch.delitem(sys.modules, "towline.ocp.toppra_law", raising=False)
+        monkeypatch.delitem(sys.modules, "towline.ocp.timing.toppra_law", raising=False)
         monkeypatch.setitem(sys.modules, "toppra", None)
         monkeypatch.setitem(sys.modules, "toppra.algorithm", None)
         found = plan(

@@ -10,11 +10,11 @@ from hypothesis.extra.numpy import arrays
 from towline.errors import InputError
 from towline.models import load
 from towline.ocp import plan
-from towline.ocp.clearance import between_cables, cable_outside, point_outside
-from towline.ocp.limits import limits
-from towline.ocp.scenario import lay_out
-from towline.ocp.task import Task
-from towline.ocp.task_limits import Block, Capsule, Sphere
+from towline.ocp.tasks.clearance import between_cables, cable_outside, point_outside
+from towline.ocp.tasks.limits import limits
+from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.task import Task
+from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 
 SHARES = np.linspace(0, 1, 201)
 points = arrays(np.float64, (4, 3), elements=st.floats(-2, 2).map(lambda x: round(x, 3)))

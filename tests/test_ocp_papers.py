@@ -5,7 +5,7 @@ import pytest
 
 from towline.models import Dynamics, load
 from towline.ocp import plan
-from towline.ocp.path import Motion
+from towline.ocp.tasks.path import Motion
 from towline.studies import flying_plans, towing_plans
 
 
@@ -97,7 +97,7 @@ def test_paper_c_carries_its_load(name, drive, aim, steps):
 
 def test_drift_is_that_of_a_falling_mass():
     """Tensions that are too small by a known force: half a t^2 off after each window and after the whole."""
-    from towline.ocp.drift import drift
+    from towline.ocp.audits.drift import drift
 
     robot = load("point-mass-3")
     task = {"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 0.5}

@@ -6,14 +6,15 @@ from scipy.integrate import quad
 
 from towline.errors import InputError
 from towline.models import Robot, load
-from towline.ocp import plan, spline
-from towline.ocp.audit import audit
-from towline.ocp.program import build
-from towline.ocp.rows import Mesh
-from towline.ocp.scenario import Deviation, lay_out
-from towline.ocp.scheme import SCHEMES
-from towline.ocp.solver import Solver
-from towline.ocp.task import Task
+from towline.ocp import plan
+from towline.ocp.audits.audit import audit
+from towline.ocp.nlp.program import build
+from towline.ocp.nlp.rows import Mesh
+from towline.ocp.nlp.solver import Solver
+from towline.ocp.tasks import spline
+from towline.ocp.tasks.scenario import Deviation, lay_out
+from towline.ocp.tasks.scheme import SCHEMES
+from towline.ocp.tasks.task import Task
 from towline.studies import flying_circle, towing_plans
 
 GRAVITY = 9.81

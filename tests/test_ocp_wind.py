@@ -7,9 +7,9 @@ from scipy.optimize import linprog
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import PlanStatus, plan
-from towline.ocp.scenario import lay_out
-from towline.ocp.task import read_task
-from towline.ocp.wind_set import WindBox, decisive_winds_at, inner_winds
+from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.task import read_task
+from towline.ocp.tasks.wind_set import WindBox, decisive_winds_at, inner_winds
 from towline.solvers import TensionProblem, certify
 
 GRAVITY = 9.81

@@ -19,10 +19,10 @@ from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
 from towline.models import Dynamics, load
 from towline.ocp import PlanStatus, plan
-from towline.ocp.excess import Excess
-from towline.ocp.report import direction_in_words, missing, sections, verdict
-from towline.ocp.scene import outline, scene
-from towline.ocp.task_limits import Block, Capsule, Sphere
+from towline.ocp.audits.excess import Excess
+from towline.ocp.reports.report import direction_in_words, missing, sections, verdict
+from towline.ocp.reports.scene import outline, scene
+from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 from towline.solvers import TensionProblem, certify
 
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.2 * np.pi}

@@ -10,7 +10,7 @@ from towline.errors import InputError, SolverError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import Task, TimingStatus, plan, time_along
-from towline.ocp.path import CirclePath, LinePath, RestPath, SamplePath, TimedPath, WaypointPath
+from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, TimedPath, WaypointPath
 from towline.solvers import TensionProblem, capacity_margin, solve
 from towline.solvers.available_wrench import facets
 
@@ -362,7 +362,7 @@ def test_without_the_extra_it_says_how_to_install_it(monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "toppra"]:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "toppra", None)
-    monkeypatch.delitem(sys.modules, "towline.ocp.toppra_law", raising=False)
+    monkeypatch.delitem(sys.modules, "towline.ocp.timing.toppra_law", raising=False)
     monkeypatch.delattr(sys.modules["towline.ocp"], "toppra_law", raising=False)
     robot = point_mass([[0, 0, 4]], ["z"])
     with pytest.raises(SolverError, match=r"pip install 'towline\[timing\]'"):

@@ -1,0 +1,115 @@
+"""Where the planner starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ...models.robot import QuadrotorCarrier
+from ..tasks.scenario import POSITION, Deviation, Scenario
+from .formation import clear_formation
+
+__all__ = ["initial_guess"]
+
+ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
+
+
+def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
+    """A guess that needs nothing from the user.
+
+    Carriers that may go anywhere keep their places about the platform, as at home, or draw together where the task
+    keeps them from obstacles (`formation`); others stay. Quadrotors tilt as their thrust has to point. The tensions are
+    those of least norm, cut to their limits.
+    """
+    formation = clear_formation(scenario)
+    if formation is None:
+        guess = _about_home(scenario, nodes)
+    else:
+        guess = _in_formation(scenario, formation.motion(nodes), nodes)
+    if any(isinstance(scenario.robot.carriers[index], QuadrotorCarrier) for index, _ in scenario.carrier_free):
+        for _ in range(ATTITUDES_MEET):
+            guess = _tilted(scenario, _pulled(scenario, guess))
+    return _pulled(scenario, guess)
+
+
+def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
+    """Carriers that may go anywhere, about the platform as at home."""
+    robot = scenario.robot
+    n = scenario.count
+    q, v, a = (np.zeros((len(nodes), n)) for _ in range(3))
+    platform, carriers = scenario.references(nodes)
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        if owner is None or scenario.relative or coordinate not in POSITION:
+            continue
+        if robot.carriers[owner].kind in ("prescribed", "quadrotor"):
+            offset = robot.carrier_home[owner, coordinate] - robot.home[coordinate]
+            q[:, column] = platform.pose[:, coordinate] + offset - carriers[owner].pose[:, coordinate]
+            v[:, column] = platform.velocity[:, coordinate] - carriers[owner].velocity[:, coordinate]
+            a[:, column] = platform.acceleration[:, coordinate] - carriers[owner].acceleration[:, coordinate]
+    return Deviation(nodes, q, v, a, np.zeros((len(nodes), robot.m)))
+
+
+def _in_formation(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], nodes: np.ndarray) -> Deviation:
+    """The deviation at `nodes` that brings platform (n, 6) and carriers (n, c, 6) to `poses` there."""
+    platform, carriers = scenario.references(nodes)
+    values = []
+    for owner, coordinate in scenario.owners():
+        mine = poses[0] if owner is None else poses[1][:, owner]
+        reference = platform if owner is None else carriers[owner]
+        values.append(mine[:, coordinate] - reference.pose[:, coordinate])
+    return _spline(scenario, nodes, np.stack(values, axis=1))
+
+
+def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
+    """Cubic splines through q (n, count) at `nodes`: at rest at the ends where the task says so."""
+    ends = scenario.task.tube.ends, getattr(scenario.task.base, "ends", "free")
+    v, a = np.zeros_like(q), np.zeros_like(q)
+    for column, (owner, _) in enumerate(scenario.owners()):
+        resting = ends[0] == "exact" if owner is None else ends[1] in ("rest", "exact")
+        curve = CubicSpline(nodes, q[:, column], bc_type="clamped" if resting else "not-a-knot")
+        v[:, column], a[:, column] = curve(nodes, 1), curve(nodes, 2)
+    return Deviation(nodes, q, v, a, np.zeros((len(nodes), scenario.robot.m)))
+
+
+def _pulled(scenario: Scenario, guess: Deviation) -> Deviation:
+    """The same motion with the tensions of least norm, cut to their limits."""
+    A, w = _balance(scenario, guess)
+    least = (np.linalg.pinv(A, rcond=1e-6) @ w[..., None])[..., 0]
+    return replace(guess, tensions=np.clip(least, *scenario.bounds()))
+
+
+def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
+    """The same with each quadrotor's thrust along the force that its motion and its cables need."""
+    robot = scenario.robot
+    A, _ = _balance(scenario, guess)
+    _, carriers = scenario.motion(guess.nodes, guess)
+    references = scenario.references(guess.nodes)[1]
+    q = guess.q.copy()
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        if owner is None or coordinate not in (3, 4):
+            continue
+        carrier = robot.carriers[owner]
+        if not isinstance(carrier, QuadrotorCarrier):
+            continue
+        cables = robot.carrier_of_cable == owner
+        pull = -np.einsum("nij,nj->ni", A[:, :3, cables], guess.tensions[:, cables])
+        needed = carrier.mass * (carriers.acceleration[:, owner, :3] - robot.gravity) - pull
+        roll, pitch = _pointing(needed, carriers.pose[:, owner, 5])
+        q[:, column] = (roll if coordinate == 3 else pitch) - references[owner].pose[:, coordinate]
+    return _spline(scenario, guess.nodes, q)
+
+
+def _pointing(force: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Roll and pitch (n,) of a frame whose z axis, (sin p cos r, -sin r, cos p cos r) but for yaw, is along force."""
+    x = np.cos(yaw) * force[:, 0] + np.sin(yaw) * force[:, 1]
+    y = -np.sin(yaw) * force[:, 0] + np.cos(yaw) * force[:, 1]
+    return -np.arcsin(y / np.linalg.norm(force, axis=1)), np.arctan2(x, force[:, 2])
+
+
+def _balance(scenario: Scenario, guess: Deviation) -> tuple[np.ndarray, np.ndarray]:
+    """A (n, 6, m) and w (n, 6) of a motion."""
+    platform, carriers = scenario.motion(guess.nodes, guess)
+    A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose)
+    return A, scenario.dynamics.required_wrench(*platform, wind=scenario.wind)

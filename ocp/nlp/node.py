@@ -1,0 +1,164 @@
+"""What a program asks of one node: the balance A t = w, the limits that hold at an instant, and what it costs."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from ...models.rotation import rotation
+from ...models.wind import aerodynamic_wrench
+from ..tasks.limits import limits as limits_of
+from ..tasks.scenario import POSITION, Scenario
+from ..tasks.wind_set import decisive_winds
+from .layout import MARGIN, Layout
+from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions
+
+__all__ = ["node_function"]
+
+SLACK_COST = 1e2  # of a missing wrench as large as the weight
+WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
+
+
+def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Function, list[Row]]:
+    """Cost and constraints of one node: the balance A t = w and the limits that hold at an instant."""
+    robot, dynamics = scenario.robot, scenario.dynamics
+    x = ca.SX.sym("x", layout.width)
+    parameters = ca.SX.sym("p", 18 * (1 + len(robot.carriers)))
+    platform, *carriers = motions(scenario, layout, x, parameters)
+    tensions = robot.force_scale * x[layout.tensions]
+    wind = scenario.wind
+    pose_rows = [ca.vertcat(*(carrier[k].T for carrier in carriers)) for k in range(3)]
+    if scenario.relative:
+        A = dynamics.relative.wrench_matrix(platform[0])
+        w = dynamics.relative.required_wrench(*platform, *carriers[0], wind=wind)
+    else:
+        A = dynamics.wrench_matrix(platform[0], pose_rows[0])
+        w = dynamics.required_wrench(*platform, *pose_rows, wind=wind)
+    scale = robot.force_scale * np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
+    balance = ((A @ tensions - w) / ca.DM(scale))[moving]
+    in_world = _in_world(scenario, platform, carriers)
+    balances = [balance]
+    for others, push in _in_decisive_winds(scenario, layout, x, in_world, carriers):
+        balances.append(((A @ others - w + push) / ca.DM(scale))[moving])
+    cost = _node_cost(scenario, layout, x)
+    if mesh.elastic:
+        missing = ca.reshape(x[layout.missing], 6, 1 + layout.winds)
+        balances = [each - missing[moving, i] for i, each in enumerate(balances)]
+        cost = OTHER_COSTS * cost + SLACK_COST * ca.sumsqr(missing)
+
+    values: list[ca.SX] = balances
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    rows: list[Row] = [(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving]
+    if robot.fixed_lengths is not None and not scenario.relative:
+        lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
+        values.append((lengths / robot.fixed_lengths) ** 2)  # squared: no square root in the derivatives
+        rows += [(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
+    for index, limit in scenario.free_limits(mesh.shrink).items():
+        name, acceleration = robot.carriers[index].name, carriers[index][2]
+        if limit.acceleration is not None:
+            values.append(ca.sumsqr(acceleration[0:3]) / limit.acceleration**2)
+            rows.append((f"{name} acceleration", -np.inf, 1.0))
+        if (index, 3) in scenario.carrier_free and limit.turn_acceleration is not None:
+            values.append(acceleration[3:5] / limit.turn_acceleration)
+            rows += [(f"{name} turn acceleration", -1.0, 1.0)] * 2
+    if (place := layout.at(MARGIN)) is not None:
+        low, high = (np.tile(bound / robot.force_scale, 1 + layout.winds) for bound in scenario.bounds())
+        all_tensions = ca.vertcat(x[layout.tensions], x[layout.wind_tensions])
+        values += [all_tensions - x[place] - low, high - x[place] - all_tensions]
+        rows += [("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
+    cost += _limit_rows(scenario, mesh, layout, x, [in_world, *carriers], tensions, values, rows)
+    return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)], differentiated(2, 1)), rows
+
+
+def _in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.SX]]) -> list[ca.SX]:
+    """The platform's pose, velocity and acceleration in {G}."""
+    if not scenario.relative:
+        return platform
+    return list(scenario.dynamics.relative.motion_in_world(*platform, *carriers[0]))
+
+
+def _in_decisive_winds(
+    scenario: Scenario, layout: Layout, x: ca.SX, platform: list[ca.SX], carriers: list[list[ca.SX]]
+) -> list[tuple[ca.SX, ca.SX]]:
+    """For each decisive wind of a box its tensions (m, 1) [N], and by how much more it pushes than the box's middle."""
+    box, robot = scenario.wind_box, scenario.robot
+    if box is None:
+        return []
+    pose, velocity, _ = platform
+    found = []
+    middle = aerodynamic_wrench(robot, pose, velocity, ca.DM(box.middle))
+    R_A = rotation(carriers[0][0][3:6])
+    for i, wind in enumerate(decisive_winds(box, robot, pose, velocity)):
+        push = aerodynamic_wrench(robot, pose, velocity, wind) - middle
+        if scenario.relative:
+            push = ca.vertcat(R_A.T @ push[0:3], R_A.T @ push[3:6])
+        start = layout.wind_tensions.start + i * robot.m
+        found.append((robot.force_scale * x[start : start + robot.m], push))
+    return found
+
+
+def _limit_rows(
+    scenario: Scenario,
+    mesh: Mesh,
+    layout: Layout,
+    x: ca.SX,
+    motions: list[list[ca.SX]],
+    tensions: ca.SX,
+    values: list[ca.SX],
+    rows: list[Row],
+) -> ca.SX | float:
+    """Add the limits of `limits`, in units of their scale; return what passing the soft ones costs."""
+    limits = limits_of(scenario)
+    cost, at, weight = 0.0, 0, OTHER_COSTS if mesh.elastic else 1.0
+    if (place := layout.slack_of("tension_rate")) is not None:  # its rows are of two nodes (`interval`)
+        most = scenario.task.limits.tension_rate or 0.0
+        cost += weight * (x[place] * most / scenario.task.limits.soft["tension_rate"]) ** 2
+    if not limits.all:
+        return cost
+    evaluated = limits.function(*(ca.vertcat(*motion) for motion in motions), tensions)
+    paid: set[str] = set()  # limits of one name share a slack
+    for limit in limits.all:
+        size = limit.values.numel()
+        value = evaluated[at : at + size] / limit.scale
+        at += size
+        reserve = 0.0 if limit.equation else mesh.shrink * limit.scale
+        low, high = (limit.low + reserve) / limit.scale, (limit.high - reserve) / limit.scale
+        if limit.soft is None:
+            values.append(value)
+            rows += [(f"{limit.name} of {label}", low, high) for label in limit.labels]
+            continue
+        slack = x[layout.slacks][layout.soft.index(limit.name)]
+        if limit.name not in paid:
+            cost += weight * (slack * limit.scale / limit.soft) ** 2
+            paid.add(limit.name)
+        for sign, bound in ((1.0, low), (-1.0, -high)):
+            if np.isfinite(bound):
+                values.append(sign * value + slack)
+                rows += [(f"{limit.name} of {label}", bound, np.inf) for label in limit.labels]
+    return cost
+
+
+def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:
+    robot, objective = scenario.robot, scenario.task.objective
+    tension_scale = objective.tension or robot.force_scale
+    deviation_scale = objective.deviation or _tenth_of_tube(scenario)
+    cost = ca.sumsqr(robot.force_scale * x[layout.tensions] / tension_scale)
+    if layout.winds:
+        # Enough to choose among those that spare cables leave open.
+        cost += WIND_COST / layout.winds * ca.sumsqr(robot.force_scale * x[layout.wind_tensions] / tension_scale)
+    q, a = x[layout.q], x[layout.a]
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        if owner is None:
+            arm = 1.0 if coordinate in POSITION else robot.length
+            if np.isfinite(deviation_scale):
+                cost += (arm * q[column] / deviation_scale) ** 2
+        else:
+            cost += (q[column] / objective.carrier_offset) ** 2 + (a[column] / objective.carrier_acceleration) ** 2
+    return cost
+
+
+def _tenth_of_tube(scenario: Scenario) -> float:
+    tube = scenario.task.tube
+    turn = 0.0 if tube.attitude == "free" else tube.turn
+    return 0.1 * max(tube.radius, scenario.robot.length * turn)

@@ -1,0 +1,260 @@
+"""The nonlinear program of a scenario: inverse dynamics at the points of a scheme, exact integrators between them.
+
+Unknown at each point k are the free coordinates q_k, their rates v_k and accelerations a_k, and the tensions t_k; the
+duration T too where the task leaves it open:
+
+    min   mean over time of sum |quantity / what costs one|^2  (+ T / time - margin)   (`task.Objective`)
+    s.t.  A(q_k) t_k = w(q_k, v_k, a_k)                                 at every point that the scheme asks
+          (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
+          t_min + margin <= t_k <= t_max - margin
+          the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
+          the limits of `limits`                                        at every point that the scheme asks
+          tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
+
+What holds at one point is in `node`, what binds an interval's in `interval`. Tensions are in units of
+`Robot.force_scale`, the weight, moments over `Robot.length`. Which solver it is for decides how the same unknowns and
+rows are put in order (`stages`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..tasks import spline
+from ..tasks.path import WaypointPath
+from ..tasks.scenario import ATTITUDE, Deviation, Scenario
+from .interval import Points, interval_of, points
+from .layout import DURATION, MARGIN, Layout
+from .node import node_function
+from .rows import Mesh, Row, stretch
+from .stages import Block, Stages, all_at_once, put_in_order, stage_by_stage
+
+__all__ = ["Program", "build"]
+
+
+@dataclass(frozen=True)
+class Program:
+    """A nonlinear program in CasADi's form, its bounds, and how to read its solution.
+
+    Attributes
+    ----------
+    problem
+        {"x", "f", "g"} for `casadi.nlpsol`.
+    lower, upper, lower_g, upper_g
+        Bounds of x and g.
+    order
+        Which entry of the points' columns, one after the other, each unknown is.
+    stages
+        Sizes of its stages; None where it is not in the order of stages.
+    """
+
+    scenario: Scenario
+    mesh: Mesh
+    layout: Layout
+    shares: np.ndarray  # (k,) of the duration, where the points are
+    problem: dict[str, ca.MX]
+    lower: np.ndarray
+    upper: np.ndarray
+    lower_g: np.ndarray
+    upper_g: np.ndarray
+    order: np.ndarray
+    stages: Stages | None
+
+    def columns(self, x: np.ndarray) -> np.ndarray:
+        """The unknowns of each point, one row a point; zero what it does not have."""
+        found = np.zeros(len(self.shares) * self.layout.width)
+        found[self.order] = x
+        return found.reshape(-1, self.layout.width)
+
+    def duration(self, x: np.ndarray) -> float:
+        """The duration that a solution x has [s]."""
+        place = self.layout.at(DURATION)
+        return self.scenario.duration if place is None else float(self.columns(x)[0, place] * self.scenario.duration)
+
+    def read(self, x: np.ndarray) -> Deviation:
+        """The deviation that a solution x stands for."""
+        layout, columns, scheme = self.layout, self.columns(x), self.scenario.scheme
+        asked = scheme.asked(self.mesh.steps)
+        tensions = columns[asked, layout.tensions] * self.scenario.robot.force_scale
+        if len(asked) < len(columns):
+            tensions = np.stack([np.interp(self.shares, self.shares[asked], t) for t in tensions.T], axis=1)
+        q, v, a = (columns[:, part] for part in (layout.q, layout.v, layout.a))
+        jerk = columns[:, layout.jerk] / self._step if scheme.smooth else None
+        return Deviation(self.shares * self.duration(x), q, v, a, tensions, scheme, jerk)
+
+    @property
+    def _step(self) -> float:
+        """Length of an interval at the scenario's duration [s]."""
+        return self.scenario.duration / self.mesh.steps
+
+    def missing(self, x: np.ndarray) -> float:
+        """Largest missing wrench at a point of a solution x, in any wind [N]."""
+        wrenches = self.columns(x)[:, self.layout.missing].reshape(-1, 6)
+        return float(np.linalg.norm(wrenches, axis=1).max(initial=0.0) * self.scenario.robot.force_scale)
+
+    def violation(self, x: np.ndarray, g: np.ndarray) -> float:
+        """How far x and its constraints g are beyond their bounds at most; infinite if they are no numbers."""
+        beyond = [self.lower - x, x - self.upper, self.lower_g - g, g - self.upper_g]
+        worst = float(np.concatenate(beyond).max())
+        return worst if np.isfinite(worst) else np.inf
+
+    def pack(self, deviation: Deviation) -> np.ndarray:
+        """The x that a deviation at the points stands for, slacks zero."""
+        layout = self.layout
+        columns = np.zeros((len(self.shares), layout.width))
+        for part, values in ((layout.q, deviation.q), (layout.v, deviation.v), (layout.a, deviation.a)):
+            columns[:, part] = values
+        if self.scenario.scheme.smooth:
+            a, nodes = deviation.a, deviation.nodes
+            jerk = np.gradient(a, nodes, axis=0) if deviation.jerk is None else deviation.jerk
+            columns[:, layout.jerk] = self._step * jerk
+            columns[:, layout.snap] = self._step**2 * np.gradient(jerk, nodes, axis=0)
+        columns[:, layout.tensions] = deviation.tensions / self.scenario.robot.force_scale
+        columns[:, layout.wind_tensions] = np.tile(columns[:, layout.tensions], layout.winds)
+        if (place := layout.at(DURATION)) is not None:
+            columns[:, place] = deviation.nodes[-1] / self.scenario.duration
+        return columns.ravel()[self.order]
+
+
+def build(scenario: Scenario, mesh: Mesh) -> Program:
+    """The nonlinear program of `scenario` on `mesh`."""
+    steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
+    shares, asked = scheme.shares(steps), scheme.asked(steps)
+    times = shares * scenario.duration
+    parameters = ca.DM(_parameters(scenario, times))
+    node, node_rows = node_function(scenario, mesh, layout)
+    interval = interval_of(scenario, mesh, layout)
+    arrange = stage_by_stage if scenario.task.solver == "fatrop" else all_at_once
+    unknowns = arrange(scenario, layout, steps, interval.flow)
+    X, X_end = unknowns.columns, unknowns.ends
+
+    cost, node_values = node.map(len(asked))(_picked(X, asked), parameters[:, asked.tolist()])
+    weights = ca.DM(scheme.quadrature(steps)[asked]).T
+    groups, given = _groups(X, scheme.size), _groups(parameters, scheme.size)
+    given_end = parameters[:, scheme.size :: scheme.size]
+    interval_cost, interval_values = interval.function.map(steps)(groups, X_end, given, given_end)
+    objective = ca.dot(cost, weights) + ca.sum2(interval_cost) / steps + _shared_cost(scenario, layout, X[:, 0])
+
+    first = interval.gaps if unknowns.gaps is not None else 0  # a program in stages has those as its gaps
+    blocks = [
+        Block(node_values, node_rows, asked // scheme.size),
+        Block(interval_values[first:, :], interval.rows[first:], np.arange(steps)),
+        *_single_rows(scenario, layout, X, X_end, steps),
+    ]
+    g, rows, stages = put_in_order(unknowns, blocks)
+    lower, upper = _simple_bounds(scenario, mesh, layout, times)
+    return Program(
+        scenario=scenario,
+        mesh=mesh,
+        layout=layout,
+        shares=shares,
+        problem={"x": unknowns.x, "f": objective, "g": g},
+        lower=np.where(unknowns.copies, -np.inf, lower[unknowns.order]),
+        upper=np.where(unknowns.copies, np.inf, upper[unknowns.order]),
+        lower_g=np.array([row[1] for row in rows]),
+        upper_g=np.array([row[2] for row in rows]),
+        order=unknowns.order,
+        stages=stages,
+    )
+
+
+def _picked(X: ca.MX, points: np.ndarray) -> ca.MX:
+    return X if len(points) == X.shape[1] else X[:, points.tolist()]
+
+
+def _groups(values: ca.MX | ca.DM, size: int) -> ca.MX | ca.DM:
+    """Columns of each interval but its end's, one below the other."""
+    return ca.reshape(values[:, :-1], values.shape[0] * size, -1)
+
+
+def _parameters(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
+    """Reference motions at the nodes, one column a node: platform, then each carrier; pose, velocity, acceleration."""
+    platform, carriers = scenario.references(nodes)
+    return np.hstack([part for motion in (platform, *carriers) for part in motion]).T
+
+
+def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
+    """What the duration costs and the margin earns."""
+    objective, cost = scenario.task.objective, 0.0
+    if (place := layout.at(DURATION)) is not None and objective.time is not None:
+        cost += x[place] * scenario.duration / objective.time
+    if (place := layout.at(MARGIN)) is not None and objective.margin is not None:
+        cost -= x[place] * scenario.robot.force_scale / objective.margin
+    return cost
+
+
+def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
+    """What is asked once: periodic ends, waypoints, and how the acceleration starts and ends."""
+    found = _waypoint_rows(scenario, layout, X, X_end, steps)
+    carriers: list[int] = []
+    if getattr(scenario.task.base, "ends", None) == "periodic":
+        carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
+        picked = [block * layout.n + i for block in range(layout.derivatives) for i in carriers]
+        rows: list[Row] = [("periodic", 0.0, 0.0)] * len(picked)
+        found.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
+    if not scenario.scheme.continuous and layout.n:
+        k = steps - 1
+        left = _polynomials(scenario, layout, X, X_end, steps, k).acceleration[-1]
+        rows = [("acceleration", 0.0, 0.0)] * layout.n
+        found.append(Block(X_end[layout.a, k] - left, rows, np.array([k])))
+    if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
+        # Values at the nodes leave a cubic spline one freedom at each end, which would be used where nobody looks.
+        rows = [("snap", 0.0, 0.0)] * len(ending)
+        for k in (0, steps - 1):
+            change = (X_end[layout.snap, k] - X[layout.snap, k])[ending]
+            found.append(Block(change, rows, np.array([k])))
+    return found
+
+
+def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int, k: int) -> Points:
+    """Of interval k."""
+    size = scenario.scheme.size
+    given = scenario.duration / steps
+    columns = [*(X[:, k * size + i] for i in range(size)), X_end[:, k]]
+    return points(scenario, layout, given * stretch(layout, columns[0]), given, columns)
+
+
+def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
+    """No deviation of the platform at the waypoints: the polynomial of the interval that each of them lies in."""
+    path = scenario.task.path
+    platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
+    if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
+        return []
+    found = []
+    for share in path.knots(scenario.duration)[1:-1] / scenario.duration:
+        k = min(int(share * steps), steps - 1)
+        position = _polynomials(scenario, layout, X, X_end, steps, k).position
+        rows: list[Row] = [("waypoint", 0.0, 0.0)] * len(platform)
+        found.append(Block(spline.value(position, share * steps - k)[platform], rows, np.array([k])))
+    return found
+
+
+def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the unknowns themselves: tensions, attitude in the tube, what is fixed at the ends, what is shared."""
+    n = layout.n
+    lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
+    low, high = scenario.bounds()
+    reserve = np.minimum(mesh.reserve, (high - low) / 4)
+    for part, count in ((layout.tensions, 1), (layout.wind_tensions, layout.winds)):
+        lower[:, part] = np.tile((low + reserve) / scenario.robot.force_scale, count)
+        upper[:, part] = np.tile((high - reserve) / scenario.robot.force_scale, count)
+    lower[:, layout.slacks] = 0.0
+    if (place := layout.at(DURATION)) is not None and (span := scenario.duration_range) is not None:
+        lower[:, place], upper[:, place] = span.min / scenario.duration, span.max / scenario.duration
+    if (place := layout.at(MARGIN)) is not None:
+        lower[:, place] = 0.0
+    tube, ends = scenario.task.tube, getattr(scenario.task.base, "ends", "free")
+    references = scenario.references(nodes[[0, -1]])[1]
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        if owner is None and coordinate in ATTITUDE:
+            lower[:, column], upper[:, column] = -tube.turn, tube.turn
+        for end in (0, -1):
+            if (tube.ends if owner is None else ends) == "exact":
+                lower[end, [column, n + column]] = upper[end, [column, n + column]] = 0.0
+            elif owner is not None and ends == "rest":
+                # The deviation undoes what speed the reference has there.
+                lower[end, n + column] = upper[end, n + column] = -references[owner].velocity[end, coordinate]
+    return lower.ravel(), upper.ravel()

@@ -1,0 +1,78 @@
+"""What the parts of a program share: how finely it looks, its rows, and which motions its unknowns stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+from ..tasks.scenario import Scenario
+from ..tasks.spline import Values
+from .layout import DURATION, Layout
+
+__all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "spread", "stretch"]
+
+OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
+Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """How finely and how carefully a program looks at its scenario.
+
+    Attributes
+    ----------
+    steps
+        Intervals.
+    reserve
+        Further distance from the tension limits [N], for what happens between the nodes.
+    shrink
+        Share by which the carriers' speed and acceleration limits, and those of the task, are lowered, likewise.
+    elastic
+        Let A t = w + s with a high cost on the slack s, so that there always is a solution.
+    """
+
+    steps: int
+    reserve: float = 0.0
+    shrink: float = 0.0
+    elastic: bool = False
+
+
+def stretch(layout: Layout, x: Values) -> Values:
+    """The duration of column x, relative to that of the references."""
+    place = layout.at(DURATION)
+    return 1.0 if place is None else x[place]
+
+
+def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
+    """Options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
+
+    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
+    long.
+    """
+    return {"cse": True, "is_diff_in": [i < unknown for i in range(inputs)]}
+
+
+def spread(scenario: Scenario, owner: int | None) -> ca.DM:
+    """From free coordinates to the six of the platform (None) or of a carrier, (6, n)."""
+    chosen = ca.DM(6, scenario.count)
+    for column, (whose, coordinate) in enumerate(scenario.owners()):
+        if whose == owner:
+            chosen[coordinate, column] = 1
+    return chosen
+
+
+def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> list[list[ca.SX]]:
+    """Platform and carriers as symbols, [pose, velocity, acceleration] each: reference plus deviation."""
+    owners: list[int | None] = [None, *range(len(scenario.robot.carriers))]
+    scale = stretch(layout, x)
+    found = []
+    for position, owner in enumerate(owners):
+        chosen = spread(scenario, owner)
+        reference = ca.vertsplit(parameters[18 * position : 18 * (position + 1)], 6)
+        deviation = (x[layout.q], x[layout.v], x[layout.a])
+        found.append(
+            [at / scale**k + chosen @ off for k, (at, off) in enumerate(zip(reference, deviation, strict=True))]
+        )
+    return found

@@ -1,0 +1,272 @@
+"""IPOPT or fatrop for a program: from a guess, a motion or its own last solution, and what came of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ...errors import SolverError
+from ..tasks.scenario import Deviation
+from .guess import initial_guess
+from .program import Program
+
+__all__ = ["Outcome", "Progress", "Solver"]
+
+MET = 1e-8  # what constraints of a program may miss, in its units
+BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
+PATIENCE = 30  # iterations without a better one
+Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the solver came back with."""
+
+    deviation: Deviation
+    duration: float  # [s]
+    success: bool  # whether all constraints are met; the message tells whether it is an optimum too
+    message: str
+    iterations: int
+    slack: float  # largest missing wrench at a node, in any wind [N], zero in the rigid program
+
+
+# The guess is near: IPOPT's default 0.1 throws it away, and "adaptive" took 8 times as long.
+_FROM_A_GUESS = {"mu_init": 1e-2}
+
+
+# A motion that was found on another mesh or for another task is nearer: a minimum time of three robots took 96
+# iterations from the coarser mesh instead of more than 150.
+_FROM_A_MOTION = {"mu_init": 1e-3}
+
+
+# The same task's optimum on a coarser mesh is nearer still: paper F's circle then takes 5 to 8 iterations from N = 100
+# to 1600, and 6 to 40 from the barrier above.
+_FROM_COARSER = {"mu_init": 1e-5}
+
+
+# A solution with its multipliers is the nearest.
+_FROM_A_SOLUTION = {
+    "mu_init": 1e-6,
+    "warm_start_init_point": "yes",
+    "warm_start_bound_push": 1e-6,
+    "warm_start_bound_frac": 1e-6,
+    "warm_start_slack_bound_push": 1e-6,
+    "warm_start_slack_bound_frac": 1e-6,
+    "warm_start_mult_bound_push": 1e-6,
+}
+
+
+_STARTS: dict[str, dict[str, Any]] = {
+    "guess": _FROM_A_GUESS,
+    "motion": _FROM_A_MOTION,
+    "coarser": _FROM_COARSER,
+    "solution": _FROM_A_SOLUTION,
+}
+
+
+FATROP_STATUS = {0: "Solve_Succeeded", 1: "Maximum_Iterations_Exceeded"}  # fatrop's numbers in IPOPT's words
+
+
+class Solver:
+    """IPOPT or fatrop for one program, to be run from several guesses, or from its own last solution."""
+
+    def __init__(self, program: Program, max_iterations: int = 400):
+        self.program = program
+        self._watch = _Watch(program)
+        self._max_iterations = max_iterations
+        self._solvers: dict[str, ca.Function] = {}
+        self._last: dict[str, ca.DM] | None = None
+
+    def prepare(self, guess: Deviation | None, coarser: bool = False) -> ca.Function:
+        """The solver for a run from `guess`, made when it is first asked for."""
+        own = "guess" if self._last is None else "solution"
+        start = own if guess is None else "coarser" if coarser else "motion"
+        if start not in self._solvers:
+            self._solvers[start] = self._make(_STARTS[start])
+        return self._solvers[start]
+
+    def _make(self, start: dict[str, Any]) -> ca.Function:
+        name, common = self.program.scenario.task.solver, {"print_time": False, "error_on_fail": False}
+        options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
+        try:
+            return ca.nlpsol("planner", name, self.program.problem, common | options)
+        except RuntimeError as error:
+            raise _broken(error) from None
+
+    def _ipopt(self, start: dict[str, Any]) -> dict[str, Any]:
+        quiet = {"print_level": 0, "sb": "yes"}
+        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
+        return {"ipopt": quiet | accuracy | start, "iteration_callback": self._watch}
+
+    def _fatrop(self, start: dict[str, Any]) -> dict[str, Any]:
+        program = self.program
+        if program.stages is None:
+            raise SolverError("planner: fatrop needs a program in stages")
+        stages = program.stages
+        # Of what `start` says it knows this much, by names of its own.
+        words = {"mu_init": "mu_init", "warm_start_bound_push": "bound_push", "warm_start_bound_frac": "bound_frac"}
+        asked = {words[key]: value for key, value in start.items() if key in words}
+        return {
+            "structure_detection": "manual",
+            "N": len(stages.rows) - 1,
+            "nx": stages.states,
+            "nu": stages.controls,
+            "ng": stages.rows,
+            "equality": (program.lower_g == program.upper_g).tolist(),
+            "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | asked,
+        }
+
+    def solve(
+        self,
+        guess: Deviation | None,
+        progress: Progress | None = None,
+        coarser: bool = False,
+        seconds: float = np.inf,
+    ) -> Outcome:
+        """Solve from `guess`; None: from the last solution and its multipliers, or else from a guess of our own.
+
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
+        with the best that it has; fatrop does not. That nothing is found is told, not raised.
+
+        Raises
+        ------
+        SolverError
+            If CasADi or IPOPT break.
+        KeyboardInterrupt
+            If a person stopped it.
+        """
+        program, watch = self.program, self._watch
+        start: dict[str, Any] = {
+            "lbx": program.lower,
+            "ubx": program.upper,
+            "lbg": program.lower_g,
+            "ubg": program.upper_g,
+        }
+        nlp = self.prepare(guess, coarser)
+        if guess is not None or self._last is None:
+            if guess is None:
+                guess = initial_guess(program.scenario, program.shares * program.scenario.duration)
+            start["x0"] = program.pack(guess)
+        else:
+            start |= {"x0": self._last["x"], "lam_x0": self._last["lam_x"], "lam_g0": self._last["lam_g"]}
+        watch.begin(progress, seconds)
+        try:
+            result = nlp(**start)
+        except RuntimeError as error:
+            raise _broken(error) from None
+        statistics = nlp.stats()
+        stopped = statistics["return_status"] == "User_Requested_Stop"
+        if watch.interrupted or (stopped and not watch.settled and not watch.late):
+            raise KeyboardInterrupt
+        self._last = result if statistics["success"] else None
+        x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
+        message = statistics["return_status"]
+        if isinstance(message, int):
+            message = FATROP_STATUS.get(message, f"fatrop's status {message}")
+            # It calls nobody while it solves.
+            watch.tell(iterations, float(result["f"]), result["g"].full().ravel())
+        met = program.violation(x, result["g"].full().ravel()) <= MET
+        if watch.settled or watch.late:
+            message = "time limit" if watch.late else f"no better by {BETTER:.1%} in {PATIENCE} iterations"
+            if len(watch.best):
+                x, met = watch.best, True
+        return Outcome(
+            deviation=program.read(x),
+            duration=program.duration(x),
+            success=(bool(statistics["success"]) or met) and bool(np.isfinite(x).all()),
+            message=str(message),
+            iterations=iterations,
+            slack=program.missing(x),
+        )
+
+
+def _broken(error: RuntimeError) -> SolverError:
+    return SolverError(f"planner: CasADi failed ({str(error).splitlines()[-1]})")
+
+
+class _Watch(ca.Callback):
+    """Looks at each iteration of the solver, tells a progress function, and stops it when there is no use to go on.
+
+    A person may press Ctrl-C. Or the search settled: a minimum time is often found long before IPOPT is sure that there
+    is no shorter one, and where much costs nothing it wanders about between solutions that are as good as each other.
+    """
+
+    def __init__(self, program: Program):
+        super().__init__()
+        self._sizes = {"x": program.problem["x"].numel(), "g": program.problem["g"].numel(), "f": 1}
+        self._program = program
+        self.begin(None)
+        self.construct("watch", {})
+
+    def begin(self, progress: Progress | None, seconds: float = np.inf) -> None:
+        """Start to count anew."""
+        self._progress = progress
+        self._deadline = time.perf_counter() + seconds
+        self.late = False  # whether the time is up
+        self._iteration = 0
+        self.best = np.zeros(0)  # iterate of those that meet all constraints
+        self._objective = np.inf  # its
+        self._mark = np.inf  # the objective that a later one has to be better than
+        self._since = 0  # the last iteration that was on the way to a better one
+        self.interrupted = False
+
+    @property
+    def settled(self) -> bool:
+        """Whether `best` is as good as it gets."""
+        return len(self.best) > 0 and self._iteration - self._since > PATIENCE
+
+    def tell(self, iteration: int, objective: float, g: np.ndarray) -> None:
+        """Tell whoever asked."""
+        if self._progress is not None:
+            low, high = self._program.lower_g, self._program.upper_g
+            infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
+            self._progress(iteration, objective, infeasibility)
+
+    def get_n_in(self) -> int:
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, i: int) -> str:
+        return ca.nlpsol_out(i)
+
+    def get_name_out(self, i: int) -> str:
+        return "stop"
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        name = ca.nlpsol_out(i)
+        size = self._sizes.get({"lam_x": "x", "lam_g": "g"}.get(name, name), 0)
+        return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
+
+    def eval(self, arg: Sequence[ca.DM]) -> list[int]:
+        try:
+            x, g, objective = arg[0].full().ravel(), arg[2].full().ravel(), float(arg[1])
+            self._keep(x, g, objective)
+            # What making up for what g misses would change, to first order.
+            missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
+            if objective + arg[4].full().ravel() @ missed < self._better():
+                self._since = self._iteration
+            self.tell(self._iteration, objective, g)
+            self._iteration += 1
+        except KeyboardInterrupt:
+            self.interrupted = True
+        self.late = time.perf_counter() > self._deadline
+        return [int(self.interrupted or self.settled or self.late)]
+
+    def _better(self) -> float:
+        """Objective that makes it worth to go on."""
+        return self._mark - BETTER * abs(self._mark) if np.isfinite(self._mark) else np.inf
+
+    def _keep(self, x: np.ndarray, g: np.ndarray, objective: float) -> None:
+        """Keep the best iterate that meets all constraints."""
+        if self._program.violation(x, g) > MET or objective >= self._objective:
+            return
+        if objective < self._better():
+            self._mark = objective
+        self.best, self._objective = x, objective

@@ -1,0 +1,155 @@
+"""In which order a program's unknowns and rows stand: all at once for IPOPT, stage by stage for fatrop.
+
+fatrop factorises along the time: each stage k has states x_k and controls u_k, its dynamics x_{k+1} = F(x_k, u_k), and
+rows of x_k and u_k alone. The state of a node is its motion and what all nodes share; its tensions too, if their rates
+count. Controls are the rest of its column, the columns of the interval's inner points, and what is free of the next
+state (its acceleration, or its snap). What an interval's rows say of its end they say of F.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ..tasks.scenario import Scenario
+from .layout import Layout
+from .rows import Row
+
+__all__ = ["Block", "Stages", "Unknowns", "all_at_once", "put_in_order", "stage_by_stage"]
+
+
+class Block(NamedTuple):
+    """Rows of the same kind: one column a stage."""
+
+    values: ca.MX  # (r, k)
+    rows: list[Row]  # r
+    stages: np.ndarray  # (k,)
+
+
+class Stages(NamedTuple):
+    """Sizes of the stages 0 to N: states, controls and rows of each."""
+
+    states: list[int]
+    controls: list[int]
+    rows: list[int]
+
+
+class Unknowns(NamedTuple):
+    """A program's unknowns, and the columns that they make.
+
+    Attributes
+    ----------
+    columns
+        (width, points), zero where a point has no such unknown.
+    ends
+        (width, N), the column at the end of each interval, as the interval's rows see it.
+    order
+        Which entry of the columns, one after the other, each unknown is.
+    copies
+        Which unknowns are such an entry once more, as the control of the stage before.
+    gaps
+        x_{k+1} - F(x_k, u_k), (states, N); None where the interval's own rows say so.
+    controls
+        How many each stage has; empty where there are no stages.
+    """
+
+    x: ca.MX
+    columns: ca.MX
+    ends: ca.MX
+    order: np.ndarray
+    copies: np.ndarray
+    gaps: ca.MX | None
+    controls: list[int]
+
+
+def _exists(scenario: Scenario, layout: Layout, steps: int) -> np.ndarray:
+    """(points, width): where the balance is not asked there are neither tensions nor slacks."""
+    scheme = scenario.scheme
+    there = np.zeros((steps * scheme.size + 1, layout.width), dtype=bool)
+    there[scheme.asked(steps)] = True
+    there[:, layout.motion] = there[:, layout.shared] = True
+    return there
+
+
+def _gathered(x: ca.MX, where: np.ndarray) -> ca.MX:
+    """A matrix of entries of x; zero where its place is -1. `where` has a row for each of its columns."""
+    flat = where.ravel()
+    if np.array_equal(flat, np.arange(x.numel())):
+        return ca.reshape(x, where.shape[1], -1)
+    places = np.where(flat < 0, x.numel(), flat)
+    return ca.reshape(ca.vertcat(x, 0.0)[places.tolist()], where.shape[1], -1)
+
+
+def all_at_once(scenario: Scenario, layout: Layout, steps: int, flow: ca.Function) -> Unknowns:
+    """Point after point, each unknown once."""
+    there = _exists(scenario, layout, steps)
+    order = np.flatnonzero(there)
+    where = np.full(there.size, -1)
+    where[order] = np.arange(len(order))
+    x = ca.MX.sym("x", len(order))
+    columns = _gathered(x, where.reshape(there.shape))
+    size = scenario.scheme.size
+    return Unknowns(x, columns, columns[:, size::size], order, np.zeros(len(order), dtype=bool), None, [])
+
+
+def stage_by_stage(scenario: Scenario, layout: Layout, steps: int, flow: ca.Function) -> Unknowns:
+    """State and controls of one stage after the other's."""
+    there, width, size = _exists(scenario, layout, steps), layout.width, scenario.scheme.size
+    state, free = _parts(scenario, layout)
+    order: list[int] = []
+    ends = np.full((steps, width), -1)
+    copies: list[int] = []
+    controls = []
+    for k in range(steps + 1):
+        points = there[k * size : (k + 1) * size].copy()
+        points[0, state] = False
+        own = np.flatnonzero(points) + k * size * width
+        order += [*(k * size * width + state), *own]
+        if k < steps:
+            ends[k, free] = np.arange(len(free)) + len(order)
+            copies += ends[k, free].tolist()
+            order += ((k + 1) * size * width + free).tolist()
+        controls.append(len(own) + (len(free) if k < steps else 0))
+    places = np.array(order)
+    copied = np.zeros(len(places), dtype=bool)
+    copied[copies] = True
+    where = np.full(there.size, -1)
+    where[places[~copied]] = np.flatnonzero(~copied)
+    x = ca.MX.sym("x", len(places))
+    columns = _gathered(x, where.reshape(there.shape))
+    groups = ca.reshape(columns[:, :-1], width * size, -1)
+    # A smooth scheme's acceleration follows from its snap first, then the rest from its acceleration.
+    end = _gathered(x, ends)
+    for _ in range(1 + scenario.scheme.smooth):
+        end = flow.map(steps)(groups, end)
+    gaps = columns[state.tolist(), size::size] - end[state.tolist(), :]
+    return Unknowns(x, columns, end, places, copied, gaps, controls)
+
+
+def _parts(scenario: Scenario, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """Which entries of a node's column are its state, and which of those the stage before chooses."""
+    at = np.arange(layout.width)
+    rated = scenario.task.objective.tension_rate is not None or scenario.task.limits.tension_rate is not None
+    tensions = at[layout.tensions] if rated else at[:0]
+    top = layout.snap if scenario.scheme.smooth else layout.a
+    return np.concatenate([at[layout.motion], at[layout.shared], tensions]), np.concatenate([at[top], tensions])
+
+
+def put_in_order(unknowns: Unknowns, blocks: list[Block]) -> tuple[ca.MX, list[Row], Stages | None]:
+    """All rows as one column with their bounds; those of a program in stages stage by stage, its gaps first."""
+    rows = [row for block in blocks for row in block.rows * len(block.stages)]
+    values = ca.vertcat(*(ca.vec(block.values) for block in blocks))
+    if unknowns.gaps is None:
+        return values, rows, None
+    states, steps = unknowns.gaps.shape
+    gaps: list[Row] = [("gap", 0.0, 0.0)]
+    rows = gaps * (states * steps) + rows
+    values = ca.vertcat(ca.vec(unknowns.gaps), values)
+    own = np.concatenate([np.repeat(block.stages, len(block.rows)) for block in blocks])
+    stage = np.concatenate([np.repeat(np.arange(steps), states), own])
+    order = np.argsort(stage, kind="stable")
+    counts = np.bincount(own, minlength=steps + 1)
+    sizes = Stages([states] * (steps + 1), unknowns.controls, counts.tolist())
+    return values[order.tolist()], [rows[i] for i in order], sizes

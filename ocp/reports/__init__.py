@@ -1,0 +1,1 @@
+"""What a plan tells: its figures as data, as text, as a page, as pictures and films."""

@@ -1,0 +1,316 @@
+"""The limits of a scenario beside tensions and wrench balance, each with the name that a person knows it by.
+
+A limit is an expression of everything that there is at one instant (`State`), with bounds in its own unit. The program
+keeps it at its nodes, the audit evaluates the same expression on its dense grid: a limit that holds at the nodes and
+not between them is seen there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...models import Robot, kinematics
+from ...models.cables.pulley import Exit
+from ...models.forward import pull_on_carrier
+from ...models.robot import QuadrotorCarrier, inertia_matrix
+from ...models.rotation import body_acceleration, body_rate, rotation
+from .clearance import between_cables, between_points, cable_outside, point_outside
+from .scenario import Scenario
+from .task_limits import KeepOut
+
+__all__ = ["Limit", "Limits", "limits"]
+
+LEAST_COSINE = 1e-4  # less of a cosine is no scale: of angles below a hundredth of a radian
+
+Motion = tuple[ca.SX, ca.SX, ca.SX]  # pose, velocity, acceleration, (6, 1) each
+
+
+class Limit(NamedTuple):
+    """Values that stay between bounds.
+
+    Attributes
+    ----------
+    name
+        The physical name, that of the task's or robot's field.
+    unit
+        Of values and bounds.
+    values
+        (k, 1).
+    low, high
+        The bounds of each; infinite: none.
+    labels
+        What each value is about: "cable 3", "quad1".
+    scale
+        A typical size in this unit.
+    soft
+        Amount beyond the bounds that costs one; None: hard.
+    cosine
+        Whether values and bounds are cosines of the angle that `unit` is of: they have derivatives where it is zero.
+    """
+
+    name: str
+    unit: str
+    values: ca.SX
+    low: float
+    high: float
+    labels: list[str]
+    scale: float
+    soft: float | None = None
+    cosine: bool = False
+
+    @property
+    def equation(self) -> bool:
+        """Whether it is met at nodes only, and between them nearly."""
+        return self.low == self.high
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that a limit may be about, at one instant, in {G}."""
+
+    robot: Robot
+    platform: Motion
+    carriers: list[Motion]
+    tensions: ca.SX  # (m, 1) [N]
+
+    @cached_property
+    def carrier_poses(self) -> ca.SX:
+        """(c, 6)."""
+        return ca.vertcat(*(carrier[0].T for carrier in self.carriers))
+
+    @cached_property
+    def anchors(self) -> ca.SX:
+        """(3, m) [m]."""
+        return kinematics.anchors(self.robot.anchors, self.robot.carrier_of_cable, self.carrier_poses)
+
+    @cached_property
+    def attachments(self) -> ca.SX:
+        """(3, m) [m]."""
+        return kinematics.transform(self.platform[0], self.robot.attachments)
+
+    @cached_property
+    def run(self) -> Exit:
+        """How the cables run: directions, leaving points and lengths."""
+        axes = kinematics.axes(self.robot.pulley_axes, self.robot.carrier_of_cable, self.carrier_poses)
+        return kinematics.cables(self.robot.attachments, self.platform[0], self.anchors, axes, self.robot.pulley_radii)
+
+    def rate(self, values: ca.SX) -> ca.SX:
+        """Time derivative of an expression of the poses, which are symbols."""
+        bodies = (self.platform, *self.carriers)
+        return sum((ca.jtimes(values, pose, velocity) for pose, velocity, _ in bodies), ca.SX.zeros(*values.shape))
+
+
+class Limits(NamedTuple):
+    """All limits of a scenario, and the function that evaluates them.
+
+    Attributes
+    ----------
+    function
+        Of the platform's motion in {G} (18: pose, velocity, acceleration), those of all carriers (18 each) and the
+        tensions [N] to all values one after another.
+    """
+
+    all: list[Limit]
+    function: ca.Function
+
+
+def limits(scenario: Scenario) -> Limits:
+    """All limits of `scenario`, of symbols of their own."""
+    robot = scenario.robot
+    bodies = [ca.SX.sym(f"body{i}", 18) for i in range(1 + len(robot.carriers))]
+    # Pieces of one symbol are no symbols: derivatives are taken with respect to these.
+    motions: list[Motion] = [(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6)) for _ in bodies]
+    tensions = ca.SX.sym("tensions", robot.m)
+    found = _all(scenario, State(robot, motions[0], motions[1:], tensions))
+    inner = ca.Function(
+        "limits_of_parts",
+        [*(part for motion in motions for part in motion), tensions],
+        [ca.vertcat(*(limit.values for limit in found))],
+    )
+    parts = [part for body in bodies for part in ca.vertsplit(body, 6)]
+    return Limits(found, ca.Function("limits", [*bodies, tensions], [inner(*parts, tensions)]))
+
+
+def _all(scenario: Scenario, state: State) -> list[Limit]:
+    found = [*_of_cables(scenario, state), *_of_platform(scenario, state)]
+    found += [*_of_carriers(scenario, state), *_soft_of_carriers(scenario, state)]
+    found += [limit for place in scenario.task.limits.keep_out for limit in _of_place(state, place)]
+    for index, carrier in enumerate(scenario.robot.carriers):
+        if isinstance(carrier, QuadrotorCarrier):
+            found += _of_quadrotor(state, index, carrier)
+    return [_softened(limit, scenario.task.limits.soft) for limit in found]
+
+
+def _softened(limit: Limit, soft: dict[str, float]) -> Limit:
+    amount = soft.get(limit.name)
+    if amount is not None and limit.cosine:
+        amount *= float(np.sqrt(1 - limit.low**2))  # what the cosine changes by as the angle does
+    return limit._replace(soft=amount)
+
+
+def _cables(m: int) -> list[str]:
+    return [f"cable {i + 1}" for i in range(m)]
+
+
+def _of_cables(scenario: Scenario, state: State) -> list[Limit]:
+    asked, robot = scenario.task.limits, scenario.robot
+    found = []
+    if asked.cable_speed is not None:
+        speed = asked.cable_speed
+        found.append(Limit("cable_speed", "m/s", state.rate(state.run.lengths), -speed, speed, _cables(robot.m), speed))
+    if asked.cable_length is not None:
+        low, high = asked.cable_length.min, asked.cable_length.max
+        size = max(abs(low), abs(high), 1e-3)
+        found.append(Limit("cable_length", "m", state.run.lengths, low, high, _cables(robot.m), size))
+    if "margin" in asked.soft:
+        # Hard it bounds the tensions themselves.
+        low, high = ca.DM(robot.t_min), ca.DM(robot.t_max)
+        for inside in (state.tensions - low, high - state.tensions):
+            least = scenario.task.margin
+            found.append(Limit("margin", "N", inside, least, np.inf, _cables(robot.m), robot.force_scale))
+    if asked.cable_clearance is not None:
+        values, labels = [], []
+        for i, j in combinations(range(robot.m), 2):
+            if _share_an_end(robot, i, j):
+                continue
+            ends = (state.attachments[:, i], state.anchors[:, i], state.attachments[:, j], state.anchors[:, j])
+            values.append(between_cables(*ends))
+            labels.append(f"cables {i + 1} and {j + 1}")
+        if values:
+            clear = asked.cable_clearance
+            found.append(Limit("cable_clearance", "m", ca.vertcat(*values), clear, np.inf, labels, clear))
+    return found
+
+
+def _share_an_end(robot: Robot, i: int, j: int) -> bool:
+    same_anchor = robot.carrier_of_cable[i] == robot.carrier_of_cable[j] and np.array_equal(
+        robot.anchors[i], robot.anchors[j]
+    )
+    return same_anchor or np.array_equal(robot.attachments[i], robot.attachments[j])
+
+
+def _of_platform(scenario: Scenario, state: State) -> list[Limit]:
+    asked = scenario.task.limits
+    pose, velocity, acceleration = state.platform
+    found = []
+    for name, value, bound, unit in (
+        ("platform_speed", velocity[:3], asked.platform_speed, "m/s"),
+        ("platform_acceleration", acceleration[:3], asked.platform_acceleration, "m/s^2"),
+        ("platform_turn", body_rate(pose[3:6], velocity[3:6]), asked.platform_turn, "rad/s"),
+    ):
+        if bound is not None:
+            found.append(Limit(name, unit, _size(value, bound), 0.0, bound, ["platform"], bound))
+    if asked.platform_tilt is not None:
+        found.append(_tilt("platform_tilt", pose, asked.platform_tilt, "platform"))
+    if asked.platform_box is not None:
+        for axis, low, high in zip(range(3), asked.platform_box.min, asked.platform_box.max, strict=True):
+            found.append(Limit("platform_box", "m", pose[axis], low, high, [f"platform {'xyz'[axis]}"], 1.0))
+    return found
+
+
+def _size(value: ca.SX, bound: float) -> ca.SX:
+    """|value|, larger by 5e-7 of the bound there: round at zero, where a motion rests and a norm has a corner."""
+    return ca.sqrt(ca.sumsqr(value) + (1e-3 * bound) ** 2)
+
+
+def _tilt(name: str, pose: ca.SX, most: float, about: str) -> Limit:
+    """As the cosine, whose derivative exists when level too; on the scale of what it changes by up to the bound."""
+    upright, low = ca.cos(pose[3]) * ca.cos(pose[4]), float(np.cos(most))
+    return Limit(name, "rad", upright, low, np.inf, [about], max(1.0 - low, LEAST_COSINE), cosine=True)
+
+
+def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:
+    """Carriers' own limits that the task makes soft; the hard ones hold between the nodes too (`interval`)."""
+    found, soft = [], scenario.task.limits.soft
+    for index, limit in scenario.limits.items():
+        name = scenario.robot.carriers[index].name
+        pose, velocity, acceleration = state.carriers[index]
+        for quantity, value, bound, unit in (
+            ("carrier_speed", velocity, limit.speed, "m/s"),
+            ("carrier_acceleration", acceleration, limit.acceleration, "m/s^2"),
+        ):
+            if quantity in soft and bound is not None:
+                found.append(Limit(quantity, unit, _size(value[:3], bound), 0.0, bound, [name], bound))
+        if "carrier_turn_acceleration" in soft and (turn := limit.turn_acceleration) is not None:
+            labels = [f"{name} roll", f"{name} pitch"]
+            found.append(Limit("carrier_turn_acceleration", "rad/s^2", acceleration[3:5], -turn, turn, labels, turn))
+        if "carrier_tilt" in soft and limit.tilt is not None:
+            found.append(_tilt("carrier_tilt", pose, limit.tilt, name))
+        if "carrier_reach" in soft and np.isfinite(limit.low).all():
+            for axis in range(3):
+                bounds = float(limit.low[axis]), float(limit.high[axis])
+                found.append(Limit("carrier_reach", "m", pose[axis], *bounds, [f"{name} {'xyz'[axis]}"], 1.0))
+    return found
+
+
+def _of_carriers(scenario: Scenario, state: State) -> list[Limit]:
+    apart = scenario.task.limits.carrier_separation
+    pairs = list(combinations(range(len(state.carriers)), 2))
+    if apart is None or not pairs:
+        return []
+    values = [between_points(state.carriers[i][0][:3], state.carriers[j][0][:3]) for i, j in pairs]
+    names = [carrier.name for carrier in scenario.robot.carriers]
+    labels = [f"{names[i]} and {names[j]}" for i, j in pairs]
+    return [Limit("carrier_separation", "m", ca.vertcat(*values), apart, np.inf, labels, apart)]
+
+
+def _of_place(state: State, place: KeepOut) -> list[Limit]:
+    robot, riding = state.robot, place.frame == "platform"
+    anchors, attachments = state.anchors, state.attachments
+    carriers = ca.horzcat(*(carrier[0][:3] for carrier in state.carriers))
+    if riding:
+        R, origin = rotation(state.platform[0][3:6]), state.platform[0][:3]
+        anchors, carriers = (R.T @ (points - ca.repmat(origin, 1, points.shape[1])) for points in (anchors, carriers))
+        attachments = ca.SX(ca.DM(robot.attachments.T))
+    com = kinematics.transform(state.platform[0], np.array([robot.platform.com]))
+    of_platform = ca.horzsplit(ca.horzcat(com, attachments))
+    bodies = [
+        ("keep_out", place.platform, [] if riding else [(point_outside(place, p), "platform") for p in of_platform]),
+        (
+            "carrier_platform_clearance" if riding else "keep_out",
+            place.carriers,
+            [
+                (point_outside(place, carriers[:, i]), carrier.name)
+                for i, carrier in enumerate(robot.carriers)
+                if carrier.kind != "ground"
+            ],
+        ),
+        (
+            "cable_platform_clearance" if riding else "keep_out",
+            place.cables,
+            [(cable_outside(place, attachments[:, i], anchors[:, i]), f"cable {i + 1}") for i in range(robot.m)],
+        ),
+    ]
+    found = []
+    for name, distance, outside in bodies:
+        if distance is not None and outside:
+            values, labels = zip(*outside, strict=True)
+            about = [f"{label} outside {place.name}" for label in labels]
+            found.append(Limit(name, "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
+    return found
+
+
+def _of_quadrotor(state: State, index: int, carrier: QuadrotorCarrier) -> list[Limit]:
+    """Thrust and torque that its motion and its cables ask for; its thrust has no part across its axis."""
+    pose, velocity, acceleration = state.carriers[index]
+    pull = pull_on_carrier(state.robot, index, state.run, pose, state.tensions)
+    R = rotation(pose[3:6])
+    thrust = R.T @ (carrier.mass * (acceleration[:3] - ca.DM(state.robot.gravity)) - pull[:3])
+    inertia = ca.DM(inertia_matrix(carrier.inertia))
+    Omega = body_rate(pose[3:6], velocity[3:6])
+    alpha = body_acceleration(pose[3:6], velocity[3:6], acceleration[3:6])
+    torque = inertia @ alpha + ca.cross(Omega, inertia @ Omega) - pull[3:6]
+    name, weight = carrier.name, state.robot.force_scale
+    found = [
+        Limit("thrust", "N", thrust[2], carrier.thrust_min, carrier.thrust_max, [name], carrier.thrust_max),
+        Limit("force across the thrust", "N", thrust[:2], 0.0, 0.0, [f"{name} x", f"{name} y"], weight),
+    ]
+    for axis, most in zip(range(3), carrier.torque_max, strict=True):
+        found.append(Limit("torque", "N m", torque[axis], -most, most, [f"{name} {'xyz'[axis]}"], most))
+    return found

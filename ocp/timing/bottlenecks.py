@@ -1,0 +1,89 @@
+"""What keeps a time law from being faster, stretch by stretch: `bottlenecks`.
+
+Along the fastest law some limit is always reached: a speed, a carrier's acceleration, or tensions, where the needed
+wrench lies on a facet of the available wrench set and the cables across that facet are at their limits.
+"""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...solvers import TensionProblem, capacity_margin
+from ...workspace.pose import masked_problem
+from ..tasks.path import TimedPath
+from .course import Course, PathLimits
+
+__all__ = ["Bottleneck", "bottlenecks"]
+
+LOOKS = 120  # instants, at equal times
+REACHED = 0.995  # of a limit of speed or acceleration
+PULLS = 1e-6  # of the largest pull along a facet's normal: less lies in the facet
+
+
+class Bottleneck(NamedTuple):
+    """A stretch of the path and the limit that is reached all along it.
+
+    Attributes
+    ----------
+    start, end
+        Fractions s of the path.
+    seconds
+        How long the motion takes there.
+    limit
+        What is at its limit: "t_max in cables 2, 5", "platform speed".
+    """
+
+    start: float
+    end: float
+    seconds: float
+    limit: str
+
+    def in_words(self) -> str:
+        """One line for a person."""
+        return f"s = {self.start:.3f} to {self.end:.3f}, {self.seconds:.3f} s: {self.limit}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """{"from", "to", "seconds" [s], "limit"} for JSON."""
+        return {"from": self.start, "to": self.end, "seconds": self.seconds, "limit": self.limit}
+
+
+def bottlenecks(course: Course, limits: PathLimits, margin: float, path: TimedPath) -> list[Bottleneck]:
+    """The stretches of a time law along a course, tensions `margin` [N] inside their limits."""
+    edges = np.linspace(0.0, path.times[-1], LOOKS + 1)
+    s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
+    platform, carriers = (motion.timed(sd, sdd) for motion in course.at(s))
+    paces = course.paces(platform, carriers, limits)
+    names, values = [*paces.names], [*paces.values.T]
+    for index, most in limits.carrier_acceleration.items():
+        names.append(f"acceleration of {course.robot.carriers[index].name}")
+        values.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most)
+    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)
+    w = course.dynamics.required_wrench(*platform, wind=course.wind)
+    low, high = course.robot.t_min + margin, course.robot.t_max - margin
+    told = []
+    for k in range(LOOKS):
+        fastest = int(np.argmax([value[k] for value in values]))
+        reached = values[fastest][k] >= REACHED
+        told.append(names[fastest] if reached else _tensions(masked_problem(course.dynamics, A[k], w[k], low, high)))
+    at, found, first = path.law(edges)[0], [], 0
+    for limit, run in groupby(told):
+        after = first + len(list(run))
+        found.append(Bottleneck(float(at[first]), float(at[after]), float(edges[after] - edges[first]), limit))
+        first = after
+    return found
+
+
+def _tensions(problem: TensionProblem) -> str:
+    """Which cables are at which limit on the facet nearest to the needed wrench."""
+    pull = capacity_margin(problem).direction @ problem.A
+    size = np.abs(pull).max(initial=0.0)
+    at = {"t_min": np.flatnonzero(pull < -PULLS * size), "t_max": np.flatnonzero(pull > PULLS * size)}
+    said = [
+        f"{name} in cable{'s' * (cables.size > 1)} {', '.join(str(cable + 1) for cable in cables)}"
+        for name, cables in at.items()
+        if cables.size
+    ]
+    return "; ".join(said) or "tensions"

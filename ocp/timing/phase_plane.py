@@ -1,0 +1,174 @@
+"""Limits of a motion along a path as half-planes in its phase plane, and the proof where they leave nothing.
+
+With u = d2s/dt2 and x = (ds/dt)^2 the needed wrench is a u + b x + c (`course`), so each facet of the available wrench
+set (`solvers.available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError, SolverError
+from ...solvers import Certificate, TensionProblem, certify
+from ...solvers.available_wrench import Facets, facets
+from ...solvers.certificate import certificate_along
+from ...workspace.pose import masked_problem
+from .course import Course, PathLimits, Wrench
+
+FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables lies in it
+
+
+@dataclass(frozen=True)
+class PhasePlane:
+    """All that a motion along the course has to keep, at N places of it.
+
+    Wrenches are those of the coordinates that can move, moments over `Robot.length`, all in newtons.
+
+    Attributes
+    ----------
+    wrench, available
+        What the motion needs, (N, n) each, and the facets of what the cables can give.
+    x_max
+        What the limits of speed leave, (N,) [1/s^2].
+    carrier_rows
+        Limits of the carriers' accelerations, a u + b x + c <= 0 with (N, k) each.
+    """
+
+    wrench: Wrench
+    available: Facets
+    x_max: np.ndarray
+    carrier_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+    def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """All limits but x_max as a u + b x + c <= 0, (N, K) each: tensions in parts of the weight, others of theirs.
+
+        The last row is 1 <= 0 where even rest needs a wrench beside the span of the cables.
+        """
+        a, b, c = self.tension_rows(weight)
+        beside = np.einsum("nij,nj->ni", self.available.outside, self.wrench.c - self.available.offset)
+        out = np.linalg.norm(beside, axis=1) > FLAT * (weight + np.linalg.norm(self.wrench.c, axis=1))
+        never = np.where(out, 1.0, -1.0)[:, None]
+        rows = [(a, b, c), *self.carrier_rows, (np.zeros_like(never), np.zeros_like(never), never)]
+        a, b, c = (np.hstack(parts) for parts in zip(*rows, strict=True))
+        return a, b, c
+
+    def rests_at_ends(self, weight: float) -> bool:
+        """Whether the platform can rest at the first and the last place."""
+        return bool((self.rows(weight)[2][[0, -1]] <= 0).all())
+
+    def tension_rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The facets' half-planes alone: first those of `available.high`, then those of `available.low`."""
+        normals, low, high = self.available.normals, self.available.low, self.available.high
+        a, b, c = ((normals @ part[:, :, None])[..., 0] / weight for part in self.wrench)
+        return np.hstack([a, -a]), np.hstack([b, -b]), np.hstack([c - high / weight, low / weight - c])
+
+
+@dataclass(frozen=True)
+class Proof:
+    """That at one place no allowed speed and acceleration along the path has tensions inside their limits.
+
+    Attributes
+    ----------
+    s
+        Where.
+    problem
+        That of the speed and acceleration which come nearest.
+    certificate
+        Of the problem. Along its direction every other allowed speed and acceleration misses at least as much.
+    """
+
+    s: float
+    problem: TensionProblem
+    certificate: Certificate
+
+
+def phase_plane(course: Course, limits: PathLimits, s: np.ndarray, margin: float, shrink: float = 0.0) -> PhasePlane:
+    """The limits at the places s, (N,), tensions `margin` [N] inside theirs, the others lowered by a share `shrink`.
+
+    Raises
+    ------
+    InputError
+        If motion along the path needs wrenches outside the span of the cables.
+    """
+    robot = course.robot
+    platform, carriers = course.at(s)
+    rows = np.flatnonzero(robot.dof_mask)
+    scale = np.array([1.0, 1, 1, *[1 / robot.length] * 3])[rows]
+    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
+    wrench = Wrench(*(part[:, rows] * scale for part in course.wrench(platform)))
+    middle = (robot.t_min + robot.t_max) / 2
+    # The distance that the audit asks for must not turn a cable's only tension into none.
+    available = facets(A, np.minimum(robot.t_min + margin, middle), np.maximum(robot.t_max - margin, middle))
+    _check_span(s, wrench, available)
+    x_max = (course.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
+    lowered = [(a, b, c * (1 - shrink)) for a, b, c in course.carrier_rows(carriers, limits)]
+    return PhasePlane(wrench, available, x_max, lowered)
+
+
+def proofs(course: Course, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:
+    """Proofs for the places among s, (N,), at which nothing is allowed.
+
+    At the first and the last that is rest, which lasts, so that the platform does not accelerate there either.
+    """
+    robot, weight = course.robot, course.robot.force_scale
+    plane = phase_plane(course, limits, s, margin)
+    low, high = robot.t_min + margin, robot.t_max - margin
+    platform, carriers = course.at(s)
+    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)
+    whole = course.wrench(platform)
+    at_rest = plane.rows(weight)[2][:, -1] > 0  # beside the span of the cables whatever the speed
+    at_rest[[0, -1]] = True
+    rows = plane.tension_rows(weight)
+    in_rows = robot.dof_mask / np.array([1.0, 1, 1, *[robot.length] * 3])
+    found = []
+    for k in np.flatnonzero(at_rest | (rows[2] > 0).any(axis=1)):  # at the others the platform can rest
+        if at_rest[k]:
+            problem = masked_problem(course.dynamics, A[k], whole.c[k], low, high)
+            certificate = certify(problem)
+        else:
+            (u, x), weights = _nearest(rows[0][k], rows[1][k], rows[2][k], plane.x_max[k])
+            w = whole.a[k] * u + whole.b[k] * x + whole.c[k]
+            problem = masked_problem(course.dynamics, A[k], w, low, high)
+            direction = np.zeros(6)
+            normals = plane.available.normals[k]
+            direction[robot.dof_mask > 0] = weights @ np.concatenate([normals, -normals])
+            certificate = certificate_along(problem, direction * in_rows)
+        if certificate is not None:
+            found.append(Proof(float(s[k]), problem, certificate))
+    return found
+
+
+def _nearest(a: np.ndarray, b: np.ndarray, c: np.ndarray, x_max: float) -> tuple[tuple[float, float], np.ndarray]:
+    """The u and x in [0, x_max] that break a u + b x + c <= 0 least, and the multipliers of the rows, (K,).
+
+    The multipliers add up to one. Weighed by them the rows become one that no allowed u and x breaks less (duality).
+    """
+    from scipy.optimize import linprog
+
+    unit = max(np.abs(a).max(), np.abs(b).max(), 1e-12)
+    rows = np.stack([a / unit, b / unit, -np.ones_like(a)], axis=1)
+    bounds = [(None, None), (0, x_max * unit if np.isfinite(x_max) else None), (None, None)]
+    nearest = linprog([0, 0, 1], rows, -c, bounds=bounds, method="highs")
+    if not nearest.success:
+        raise SolverError(f"time_along: HiGHS could not solve a linear program: {nearest.message}")
+    u, x = nearest.x[:2] / unit
+    return (float(u), float(x)), -nearest.ineqlin.marginals
+
+
+def _check_span(s: np.ndarray, wrench: Wrench, available: Facets) -> None:
+    """Refuse paths along which motion itself needs wrenches outside the span of the cables."""
+    if not available.outside.any():
+        return
+    for part in (wrench.a, wrench.b):
+        off = np.linalg.norm(np.einsum("nij,nj->ni", available.outside, part), axis=1)
+        bad = off > FLAT * np.linalg.norm(part, axis=1).max()
+        if bad.any():
+            at = int(np.argmax(bad))
+            n = part.shape[1]
+            rank = n - round(float(np.trace(available.outside[at])))
+            raise InputError(
+                f"time_along: path: at s = {s[at]:.4g} the wrench matrix has rank {rank} of {n} and the motion needs "
+                "a wrench outside its span; accepted: paths along which it never does"
+            )

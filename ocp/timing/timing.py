@@ -1,0 +1,451 @@
+"""`time_along`: the fastest time law along a given path that keeps every tension inside its limits.
+
+Along a path only s(t) is left to choose. The available wrench set at each s (`solvers.available_wrench`) and the wrench
+that the motion needs (`course`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds the fastest
+law inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the exact
+tension solver; what it misses between the grid points a finer grid and a little distance from the limits make good.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from ...errors import InputError, SolverError
+from ...models import Robot
+from ...models.parsing import to_yaml, validate
+from ...models.robot import MobileCarrier, Name, NonNegative, Part, Positive, Vector3
+from ...solvers import Certificate, TensionProblem, certify, solve_batch
+from ...workspace.pose import masked_problem
+from ...writing import whole_file
+from ..tasks.path import AnyPath, Curve, LinePath, Motion, SamplePath, TimedPath, WaypointPath
+from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
+from ..tasks.task import GivenBase, HoldBase, Task
+from .bottlenecks import Bottleneck, bottlenecks
+from .course import Course, PathLimits
+from .phase_plane import phase_plane, proofs
+
+TOLERANCE = 1e-6  # [N], as the audit of plans has it
+LIMIT_TOLERANCE = 1e-6  # relative, of the other limits, likewise
+ATTEMPTS = 8
+MOST_INTERVALS = 6400
+FINER_TRIES = 2  # after a grid on which no law was found
+RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
+COARSE = 1e-4  # of the weight or of a limit: what misses more needs a finer grid, what misses less some distance
+
+
+class TimingStatus(StrEnum):
+    """What a timing is; its values are plain strings."""
+
+    FEASIBLE = "feasible"
+    """The audit saw no violation anywhere."""
+
+    INFEASIBLE = "infeasible"
+    """At `Timing.at` no tensions inside their limits give the wrench that the path needs, proven by the certificate:
+    whatever the speed inside its limits and the acceleration, or, at the ends, for the platform to rest there."""
+
+    NOT_FOUND = "not-found"
+    """Every place of the grid allows some speed, but no law was found that joins them, or none that the audit passes;
+    `Timing.at` is where the search ended or the audit saw most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """The fastest time law along a path, or where along the path there is none.
+
+    Attributes
+    ----------
+    status
+        See `TimingStatus`.
+    course
+        The robot and the geometry that was timed.
+    limits
+        What beside the tensions was limited.
+    margin
+        How far every tension stays inside its limits [N].
+    s
+        Grid, (n,), the fraction of the path's own time, from 0 to 1.
+    sd
+        ds/dt on the grid, (n,) [1/s]; nan if not feasible.
+    sdd
+        d2s/dt2, constant on each interval of the grid, (n - 1,) [1/s^2]; nan if not feasible.
+    violation
+        The largest missing wrench that the audit saw [N], moments over `Robot.length`; nan without a law.
+    at
+        If not feasible: s of the certificate, or where the search ended.
+    certificate
+        If infeasible: proof along a wrench direction on which no allowed speed and acceleration helps. It is that of
+        `problem`, and the one with the largest shortfall along the grid.
+    problem
+        The tension problem at `at` for the speed and acceleration that come nearest; at the ends, for rest.
+    blocked
+        All grid points s at which there is such a proof.
+    """
+
+    status: TimingStatus
+    course: Course = field(repr=False)
+    limits: PathLimits = field(repr=False)
+    margin: float
+    s: np.ndarray = field(repr=False)
+    sd: np.ndarray = field(repr=False)
+    sdd: np.ndarray = field(repr=False)
+    violation: float = float("nan")
+    at: float | None = None
+    certificate: Certificate | None = field(default=None, repr=False)
+    problem: TensionProblem | None = field(default=None, repr=False)
+    blocked: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether there is a law and its audit saw no violation."""
+        return self.status is TimingStatus.FEASIBLE
+
+    @property
+    def duration(self) -> float | None:
+        """How long the motion takes [s]; None if there is none."""
+        return self.path.natural_duration if self.feasible else None
+
+    @property
+    def path(self) -> TimedPath:
+        """The platform's path with its time law, for a task.
+
+        Raises
+        ------
+        InputError
+            If there is no law.
+        """
+        return self.timed(self.course.path)
+
+    def task(self, name: str = "timed") -> Task:
+        """A task that fixes this motion of platform and carriers: `plan` audits it.
+
+        Raises
+        ------
+        InputError
+            If there is no law.
+        """
+        course, carriers = self.course, self.course.robot.carriers
+        base: HoldBase | GivenBase = HoldBase(kind="hold")
+        if course.carriers:
+            paths: dict[str, AnyPath] = {
+                carriers[index].name: self.timed(path) if index in course.moving else path
+                for index, path in course.carriers.items()
+            }
+            base = GivenBase(kind="given", paths=paths)
+        wind = None if course.wind is None else (0.0, 0.0, 0.0)
+        return Task(name=name, path=self.path, base=base, margin=self.margin, wind=wind)
+
+    def motion(self, times: np.ndarray) -> tuple[Motion, Motion]:
+        """Platform, (n, 6) each, and carriers, (n, c, 6) each, in {G} at `times` [s] (n,).
+
+        Raises
+        ------
+        InputError
+            If there is no law.
+        """
+        s, sd, sdd = self.path.law(np.asarray(times, dtype=float))
+        platform, carriers = self.course.at(s)
+        return platform.timed(sd, sdd), carriers.timed(sd, sdd)
+
+    @cached_property
+    def bottlenecks(self) -> list[Bottleneck]:
+        """The stretches of the path on which one limit is what keeps the motion from being faster, in order.
+
+        Empty without a law.
+        """
+        return bottlenecks(self.course, self.limits, self.margin, self.path) if self.feasible else []
+
+    def summary(self) -> dict[str, Any]:
+        """What `towline time --json` prints, ready for JSON; what does not exist is None."""
+        return {
+            "feasible": self.feasible,
+            "status": self.status.value,
+            "duration": self.duration,
+            "margin": self.margin,
+            "violation": self.violation,
+            "bottlenecks": [each.as_dict() for each in self.bottlenecks],
+            "at": self.at,
+            "blocked": self.blocked.tolist(),
+            "certificate": None if self.certificate is None else self.certificate.as_dict(),
+        }
+
+    def save_task(self, file: str | os.PathLike[str], name: str = "timed") -> Path:
+        """Save `task` as a task file (YAML), whole or not at all: `towline plan` and `plan` read it.
+
+        Raises
+        ------
+        InputError
+            If there is no law, or the place cannot be written to.
+        """
+        path, text = Path(file), to_yaml(self.task(name))
+        with whole_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        return path
+
+    def report(self) -> str:
+        """What a person wants to know first, as text."""
+        head = f"{self.course.robot.name}: timing {self.status.value.upper()}"
+        if self.feasible:
+            lines = [head, f"  {self.duration:.6g} s, audit: worst violation {self.violation:.3g} N"]
+            lines += ["  What is at its limit, and for how long"]
+            return "\n".join(lines + [f"    {each.in_words()}" for each in self.bottlenecks])
+        told = [head, f"  at s = {self.at:.4g}"]
+        if self.certificate is not None:
+            told += [f"  {line}" for line in self.certificate.in_words().splitlines()]
+        return "\n".join(told)
+
+    def timed(self, path: Curve) -> TimedPath:
+        """A path of the course, the platform's or a carrier's, with the time law.
+
+        Raises
+        ------
+        InputError
+            If there is no law.
+        """
+        if np.isnan(self.sd).any():
+            raise InputError(f"timing: is {self.status.value} and has no motion; accepted: a feasible one")
+        law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
+        return TimedPath(kind="timed", frame=path.frame, along=path, until=self.course.until(path), **law)
+
+
+def time_along(
+    robot: Robot,
+    path: AnyPath | dict[str, Any],
+    *,
+    margin: float = 0.0,
+    carriers: Mapping[str, AnyPath | dict[str, Any]] | None = None,
+    grid: int = 200,
+    until: float | None = None,
+    speed_max: float | None = None,
+    cable_speed_max: float | Sequence[float] | np.ndarray | None = None,
+    carrier_speed_max: float | None = None,
+    carrier_acceleration_max: float | None = None,
+    wind: tuple[float, float, float] | None = None,
+) -> Timing:
+    """Find the fastest motion along a given path, from rest to lasting rest, with every tension inside its limits.
+
+    Of the path only the geometry counts: lines and waypoints are taken as uniform, so that they rest nowhere; samples
+    are waypoints unless carriers move with them. The tension limits are the facets of the available wrench set, the
+    law is that of TOPP-RA (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on
+    reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there.
+    The extra `timing` installs it.
+
+    Where A has fewer independent columns than the platform has degrees of freedom the needed wrench must lie in their
+    span whatever the speed, as when two cables move a point mass in their plane; another path is refused.
+
+    Parameters
+    ----------
+    robot
+        From `towline.models.load`, with carriers of kind ground, prescribed or mobile.
+    path
+        Of the platform, in {G} or in the frame of the only carrier: a path or a mapping with its keys.
+    margin
+        Every tension stays this far inside its limits [N].
+    carriers
+        Paths in {G} by carrier, walked with the same s as the platform's; the others stay at home. The speed and
+        acceleration limits of mobile carriers hold. Motions that are functions of time are not supported: the limits
+        would depend on when the platform comes by.
+    grid
+        Intervals to start with; the audit may double them.
+    until
+        When circles end by their own time [s]; None: after one turn.
+    speed_max
+        Of the platform frame [m/s].
+    cable_speed_max
+        Of the lengths, as winches have it, one for all or (m,) [m/s].
+    carrier_speed_max, carrier_acceleration_max
+        Of each carrier that moves, beside those of the robot's file [m/s, m/s^2].
+    wind
+        None: no air; zeros: still air, with the drag of the motion.
+
+    Returns
+    -------
+    Timing
+        Feasible only if the audit at 1 kHz sees no tension beyond its limits by more than 1e-6 N, and no other limit.
+
+    Raises
+    ------
+    InputError
+        If an argument is not valid or does not fit the robot, or nothing limits the speed; in one line.
+    SolverError
+        If toppra is not installed; the message says how to install it.
+    """
+    request = validate(
+        {
+            "path": path,
+            "margin": margin,
+            "carriers": {} if carriers is None else carriers,
+            "grid": grid,
+            "until": until,
+            "speed_max": speed_max,
+            "cable_speed_max": cable_speed_max.tolist() if isinstance(cable_speed_max, np.ndarray) else cable_speed_max,
+            "carrier_speed_max": carrier_speed_max,
+            "carrier_acceleration_max": carrier_acceleration_max,
+            "wind": wind,
+        },
+        _Request,
+        "time_along",
+    )
+    _check(robot, request)
+    moving = {name: _curve(its, alone=False) for name, its in request.carriers.items()}
+    still_air = None if request.wind is None else np.zeros(3)
+    course = Course(robot, _curve(request.path, alone=not moving), moving, request.until, still_air)
+    return _search(course, _limits(course, request), request.margin, request.grid)
+
+
+class _Request(Part):
+    """The arguments of `time_along`, checked as those of a task are."""
+
+    path: AnyPath
+    margin: NonNegative
+    carriers: dict[Name, AnyPath]
+    grid: int = Field(ge=10, le=MOST_INTERVALS)
+    until: Positive | None
+    speed_max: Positive | None
+    cable_speed_max: Positive | tuple[Positive, ...] | None
+    carrier_speed_max: Positive | None
+    carrier_acceleration_max: Positive | None
+    wind: Vector3 | None
+
+
+def _check(robot: Robot, request: _Request) -> None:
+    """Refuse what is a number but does not fit the robot."""
+    for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
+        if low + request.margin > high - request.margin:
+            raise InputError(
+                f"time_along: margin: {request.margin:g} N leaves nothing of the limits of cable {index + 1}, {low:g} "
+                f"N to {high:g} N; accepted: at most {(high - low) / 2:g} N"
+            )
+    if request.wind is not None and any(request.wind):
+        raise InputError(
+            "time_along: wind: in moving air the drag is no multiple of the speed's square; accepted: None, or zeros "
+            "for still air"
+        )
+    if request.wind is not None and robot.platform.aero is None:
+        raise InputError(f"time_along: wind: robot {robot.name!r} has no platform.aero; accepted: None")
+    speeds = request.cable_speed_max
+    if isinstance(speeds, tuple) and len(speeds) != robot.m:
+        raise InputError(f"time_along: cable_speed_max: has {len(speeds)} items; accepted: one number, or {robot.m}")
+
+
+def _curve(path: AnyPath, *, alone: bool) -> Curve:
+    """The geometry of a path: it rests nowhere, unless the path itself does."""
+    if isinstance(path, TimedPath):
+        return path.along
+    if isinstance(path, LinePath | WaypointPath):
+        return path.model_copy(update={"timing": "uniform"})
+    if isinstance(path, SamplePath) and alone:
+        return WaypointPath(kind="waypoints", frame=path.frame, points=path.poses, timing="uniform")
+    return path
+
+
+def _limits(course: Course, request: _Request) -> PathLimits:
+    """The limits of the request and those of the mobile carriers that move."""
+    speed = {index: request.carrier_speed_max or np.inf for index in course.moving}
+    acceleration = {index: request.carrier_acceleration_max or np.inf for index in course.moving}
+    for index in course.moving:
+        carrier = course.robot.carriers[index]
+        if isinstance(carrier, MobileCarrier):
+            speed[index] = min(speed[index], carrier.speed_max)
+            acceleration[index] = min(acceleration[index], carrier.acceleration_max)
+    of_cables = np.full(course.robot.m, np.inf if request.cable_speed_max is None else request.cable_speed_max)
+    return PathLimits(request.speed_max or np.inf, of_cables, speed, acceleration)
+
+
+def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -> Timing:
+    """Solve, audit, and where the audit objects do so again on a finer grid or with more distance from the limits."""
+    fastest, Rows = _toppra()
+    weight = course.robot.force_scale
+    reserve, shrink, failures = RESERVE * weight, 0.0, 0
+    found = _without_law(TimingStatus.NOT_FOUND, course, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
+    for _ in range(ATTEMPTS):
+        s = np.linspace(0, 1, intervals + 1)
+        plane = phase_plane(course, limits, s, margin + reserve, shrink)
+        law = fastest(s, Rows(*plane.rows(weight), plane.x_max))
+        if failures == 0 and (law.x is None or not plane.rests_at_ends(weight)):
+            proven = proofs(course, limits, s, margin)
+            if proven:
+                worst = max(proven, key=lambda proof: proof.certificate.shortfall)
+                told = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
+                blocked = np.array([proof.s for proof in proven])
+                return _without_law(TimingStatus.INFEASIBLE, course, limits, margin, s, blocked=blocked, **told)
+        if law.unlimited:
+            raise InputError(
+                "time_along: nothing limits the speed along this path; accepted: a path on which the platform's "
+                "motion takes tension, or limits of speed"
+            )
+        if law.x is None:
+            found = _without_law(TimingStatus.NOT_FOUND, course, limits, margin, s, at=float(s[law.stuck or 0]))
+            failures += 1
+            if failures > FINER_TRIES:
+                return found
+            intervals = min(2 * intervals, MOST_INTERVALS)
+            continue
+        sd, sdd = np.sqrt(law.x), np.diff(law.x) / (2 * np.diff(s))
+        found = Timing(TimingStatus.FEASIBLE, course, limits, margin, s, sd, sdd)
+        missing, excess, at = _audit(found, limits)
+        if missing <= TOLERANCE and excess <= LIMIT_TOLERANCE:
+            return replace(found, violation=missing)
+        found = replace(found, status=TimingStatus.NOT_FOUND, violation=missing, at=at)
+        if missing > COARSE * weight or excess > COARSE:
+            intervals = min(2 * intervals, MOST_INTERVALS)
+        reserve += 2 * missing if missing > TOLERANCE else 0.0
+        shrink += 2 * excess if excess > LIMIT_TOLERANCE else 0.0
+    return found
+
+
+def _without_law(
+    status: TimingStatus, course: Course, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
+) -> Timing:
+    return Timing(status, course, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
+
+
+def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
+    """The largest missing wrench [N], the largest relative excess of another limit, and s of the worse of the two."""
+    course, robot, path = timing.course, timing.course.robot, timing.path
+    duration = float(path.times[-1])
+    if duration * AUDIT_RATE > MOST_SAMPLES:
+        raise InputError(
+            f"time_along: the motion takes {duration:g} s; accepted: limits that allow {MOST_SAMPLES / AUDIT_RATE:g} "
+            f"s, since the audit looks {AUDIT_RATE:g} times a second"
+        )
+    times = np.linspace(0, duration, max(int(np.ceil(duration * AUDIT_RATE)), LEAST_INTERVALS) + 1)
+    s, sd, sdd = path.law(times)
+    by_s = course.at(s)
+    platform, carriers = (motion.timed(sd, sdd) for motion in by_s)
+    mask = robot.dof_mask
+    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
+    w = course.dynamics.required_wrench(*platform, wind=course.wind) * mask
+    low, high = robot.t_min + timing.margin, robot.t_max - timing.margin
+    batch = solve_batch(A, w, low, high, length=robot.length)
+    missing = np.where(batch.feasible, batch.residual, np.inf)
+    for k in np.flatnonzero(~batch.feasible):
+        proof = certify(masked_problem(course.dynamics, A[k], w[k], low, high))
+        # Neither available nor proven not to be: so near to the boundary that rounding decides.
+        missing[k] = 0.0 if proof is None else proof.shortfall
+    paces = [np.abs(sd) / course.speed_limit(*by_s, limits) - 1.0]
+    for index, most in limits.carrier_acceleration.items():
+        paces.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most - 1.0)
+    excess = np.max(paces, axis=0)
+    worst = int(missing.argmax() if missing.max() > TOLERANCE else excess.argmax())
+    return float(missing.max()), float(excess.max()), float(s[worst])
+
+
+def _toppra() -> tuple[Any, Any]:
+    try:
+        from .toppra_law import Rows, fastest
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "toppra":
+            raise
+        raise SolverError(
+            "time_along: toppra is not installed; install the extra timing: pip install 'towline[timing]'"
+        ) from None
+    return fastest, Rows
