@@ -1,0 +1,132 @@
+"""Which places have tensions for given wrenches: wrench matrices and tension problems of many places at once.
+
+The wrench rows are those of the coordinates that can move, moments divided by `Robot.length`, so that all are in
+newtons. A few thousand places are taken at a time: their matrices stay in the processor's cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+import numpy as np
+
+from ..models import Dynamics, Robot
+from ..models.batch import compiled
+from ..solvers import solve_batch
+from .places import Places
+
+__all__ = [
+    "anchors",
+    "attachments",
+    "can_give",
+    "dynamics_of",
+    "in_platform",
+    "make_ready",
+    "matrices",
+    "rest_wrench",
+    "rows_of",
+]
+
+PLACES_AT_ONCE = 4096
+
+
+@lru_cache(maxsize=16)
+def dynamics_of(robot: Robot) -> Dynamics:
+    """The `Dynamics` of a robot, kept for the next call."""
+    return Dynamics(robot)
+
+
+def make_ready(robot: Robot) -> None:
+    """Compile or load now what asking about many places of a robot needs, instead of on the way."""
+    compiled(dynamics_of(robot).functions["wrench_matrix"])
+    can_give(robot, Places.at_home(robot, robot.home), rest_wrench(robot)[None])
+
+
+def rest_wrench(robot: Robot) -> np.ndarray:
+    """Wrench that holds the platform at rest, anywhere: against its weight, about the CoM, (6,) [N, N m]."""
+    return dynamics_of(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
+
+
+def rows_of(robot: Robot, forces_only: bool = False) -> np.ndarray:
+    """Indices of the wrench rows that count."""
+    rows = np.flatnonzero(robot.dof_mask)
+    return rows[rows < 3] if forces_only else rows
+
+
+def matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Wrench matrices (k, rows, m) [N per N] of some thousand places at a time, and which places these are."""
+    dynamics = dynamics_of(robot)
+    scale = np.where(rows < 3, 1.0, 1.0 / robot.length)
+    for start in range(0, len(places), PLACES_AT_ONCE):
+        part = slice(start, start + PLACES_AT_ONCE)
+        A = dynamics.wrench_matrix(places.pose[part], places.carriers[part])
+        if rows.size < 6:
+            A = A[:, rows]
+        if (scale != 1.0).any():
+            A *= scale[:, None]
+        yield part, A
+
+
+def can_give(
+    robot: Robot,
+    places: Places,
+    wrenches: np.ndarray,
+    rows: np.ndarray | None = None,
+    t_min: np.ndarray | float | None = None,
+    t_max: np.ndarray | float | None = None,
+) -> np.ndarray:
+    """Whether tensions inside their limits give each of the wrenches, (n,) of bool.
+
+    Parameters
+    ----------
+    wrenches
+        (k, 6) for all places or (k, n, 6), about the CoM in {G} [N, N m].
+    rows
+        Wrench rows that count; None: those of the coordinates that can move.
+    t_min, t_max
+        Limits [N] instead of the robot's.
+    """
+    rows = rows_of(robot) if rows is None else rows
+    low = robot.t_min if t_min is None else t_min
+    high = robot.t_max if t_max is None else t_max
+    given = np.zeros(len(places), dtype=bool)
+    wanted = wrenches[..., rows] * np.where(rows < 3, 1.0, 1.0 / robot.length)
+    shared = wanted.ndim == 2
+    for part, A in matrices(robot, places, rows):
+        left = np.arange(len(A))
+        for w in wanted if shared else wanted[:, part]:
+            some = A if left.size == len(A) else A[left]
+            left = left[solve_batch(some, w if shared else w[left], low, high, threads=1).feasible]
+            if not left.size:
+                break
+        given[part.start + left] = True
+    return given
+
+
+def anchors(robot: Robot, places: Places) -> np.ndarray:
+    """Anchors in {G}, (n, m, 3) [m]."""
+    frames = places.carriers[:, robot.carrier_of_cable]
+    turned = np.einsum("nmij,mj->nmi", _rotations(frames[..., 3:]), robot.anchors)
+    return frames[..., :3] + turned
+
+
+def attachments(robot: Robot, places: Places) -> np.ndarray:
+    """Attachments in {G}, (n, m, 3) [m]."""
+    turned = np.einsum("nij,mj->nmi", _rotations(places.pose[:, 3:]), robot.attachments)
+    return places.pose[:, None, :3] + turned
+
+
+def in_platform(places: Places, points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of {G} in the platform frame, (n, 3) [m]."""
+    return np.einsum("nij,ni->nj", _rotations(places.pose[:, 3:]), points - places.pose[:, :3])
+
+
+def _rotations(angles: np.ndarray) -> np.ndarray:
+    """R = Rz(yaw) Ry(pitch) Rx(roll) of angles (..., 3), (..., 3, 3)."""
+    (sr, sp, sy), (cr, cp, cy) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
+    R = np.empty((*angles.shape[:-1], 3, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -sp, cp * sr, cp * cr
+    return R
