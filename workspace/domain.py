@@ -94,12 +94,12 @@ class Domain:
         """Lowest and highest corner of the box of positions, (3,) [m]."""
         return self.low[:3], self.high[:3]
 
-    @property
+    @cached_property
     def turns(self) -> bool:
         """Whether the attitude varies."""
         return bool((self.high - self.low)[3:6].max() > THINNEST)
 
-    @property
+    @cached_property
     def drives(self) -> bool:
         """Whether carriers move."""
         return bool((self.high - self.low)[6 : 6 + 3 * len(self.robot.carriers)].max() > THINNEST)
@@ -128,11 +128,14 @@ class Domain:
         Places, and (n,) of bool, false where three cables of those lengths do not meet; the pose is that of home there.
         """
         count, carriers = len(units), len(self.robot.carriers)
-        values = np.tile(self.low, (count, 1))
+        values = np.empty((count, len(self.low)))
+        values[:] = self.low
         values[:, self.varying] += units * self.extent
-        pose = np.ascontiguousarray(values[:, :6])
-        where = np.tile(self.robot.carrier_home, (count, 1, 1))
-        where[:, :, :3] = values[:, 6 : 6 + 3 * carriers].reshape(count, carriers, 3)
+        pose = values[:, :6].copy()
+        where = np.broadcast_to(self.robot.carrier_home, (count, carriers, 6))
+        if self.drives:
+            where = where.copy()
+            where[:, :, :3] = values[:, 6 : 6 + 3 * carriers].reshape(count, carriers, 3)
         if not self.hangs:
             return Places(pose, where), np.ones(count, dtype=bool)
         pose[:, :3], exists = self._hang(pose, where, values[:, -3:])

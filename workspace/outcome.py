@@ -8,7 +8,7 @@ import numpy as np
 
 from .domain import Domain
 from .refinement import Refinement
-from .tally import Tally, cells_of_counts
+from .tally import Tally, cells_of_counts, width_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,14 +91,13 @@ class Outcome:
         return xr.Dataset(variables, coordinates)
 
     def _kept(self, keep: str) -> dict[str, Any]:
-        domain, carriers = self._domain, len(self._domain.robot.carriers)
-        width = 6 + 3 * carriers
-        rows = np.vstack(self._samples) if self._samples else np.empty((0, width))
+        domain = self._domain
+        rows = np.vstack(self._samples) if self._samples else np.empty((0, width_of(domain)))
         kept: dict[str, Any] = {"position": (("point", "axis"), rows[:, :3], {"units": "m"})}
         if domain.turns:
             kept["attitude"] = (("point", "angle"), rows[:, 3:6], {"units": "rad"})
         if domain.drives:
-            where = rows[:, 6:].reshape(-1, carriers, 3)
+            where = rows[:, 6 if domain.turns else 3 :].reshape(len(rows), len(domain.robot.carriers), 3)
             kept["carrier_position"] = (("point", "carrier", "axis"), where, {"units": "m"})
         if keep == "all":
             flags = np.concatenate(self._flags) if self._flags else np.empty(0, dtype=bool)
@@ -135,4 +134,5 @@ def wilson(accepted: int, samples: int) -> tuple[float, float]:
     middle = share + z**2 / (2 * samples)
     half = z * np.sqrt(share * (1 - share) / samples + z**2 / (4 * samples**2))
     low, high = (middle - half) / (1 + z**2 / samples), (middle + half) / (1 + z**2 / samples)
-    return max(float(low), 0.0), min(float(high), 1.0)
+    # Both ends are exact where all samples agree; rounding is not.
+    return float(low) if accepted else 0.0, float(high) if accepted < samples else 1.0

@@ -74,7 +74,7 @@ class Tally:
     counts
         Samples tried and accepted in each cell of the box of positions, (2, *cells).
     samples
-        What is kept: (n, k) position, attitude, carriers' positions of each sample; and whether it was accepted, (n,).
+        What is kept of each sample, (n, k), see `width_of`; and whether it was accepted, (n,).
     """
 
     sizes: tuple[int, ...]
@@ -118,23 +118,38 @@ def tally(packed: bytes, job: Job) -> Tally:
                 high = np.maximum(high, position[held].max(axis=0))
             if job.keep and question.keep != "none":
                 rows = slice(None) if question.keep == "all" else held
-                carriers = places.carriers[rows, :, :3].reshape(-1, 3 * places.carriers.shape[1])
-                samples.append(np.hstack([places.pose[rows], carriers]))
+                samples.append(_row(places.pose[rows], places.carriers[rows], domain))
                 flags.append(held[rows])
             sizes.append(len(units))
             answers.append(np.packbits(held).tobytes())
-    width = 6 + 3 * len(question.robot.carriers)
-    kept = np.vstack(samples) if samples else np.empty((0, width))
+    kept = np.vstack(samples) if samples else np.empty((0, width_of(domain)))
     marks = np.concatenate(flags) if flags else np.empty(0, dtype=bool)
     return Tally(tuple(sizes), tuple(answers), low, high, counts.reshape(2, *cells), kept, marks)
+
+
+def width_of(domain: Domain) -> int:
+    """How many numbers are kept of a sample: position, attitude if it varies, carriers' positions if they vary."""
+    return 3 + 3 * domain.turns + 3 * len(domain.robot.carriers) * domain.drives
+
+
+def _row(pose: np.ndarray, carriers: np.ndarray, domain: Domain) -> np.ndarray:
+    """What is kept of each sample, (n, k)."""
+    parts = [pose if domain.turns else pose[:, :3]]
+    if domain.drives:
+        parts.append(carriers[:, :, :3].reshape(len(pose), 3 * carriers.shape[1]))
+    return np.hstack(parts) if len(parts) > 1 else parts[0]
 
 
 def _cell(position: np.ndarray, domain: Domain, cells: tuple[int, int, int]) -> np.ndarray:
     """Index of the cell that each position is in, (n,); what the lengths leave outside of the box is in its border."""
     low, high = domain.box
-    thick = np.where(high - low > THINNEST, high - low, 1.0)
-    index = ((position - low) * (np.array(cells) / thick)).astype(np.int64)
-    return np.ravel_multi_index(tuple(np.clip(index, 0, np.array(cells) - 1).T), cells)
+    index = np.zeros(len(position), dtype=np.int32)
+    for axis, count in enumerate(cells):
+        along = np.zeros_like(index)
+        if count > 1:
+            along = ((position[:, axis] - low[axis]) * (count / (high[axis] - low[axis]))).astype(np.int32)
+        index = index * count + np.clip(along, 0, count - 1)
+    return index
 
 
 def _sampler(question: Question) -> Sampler:
