@@ -33,5 +33,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,dev,mujoco,timing]"
+	$(INSTALL) ".[bench,cluster,dev,mujoco,timing]"
 	touch $@

@@ -23,10 +23,10 @@ def workspace(
     robot: RobotArgument,
     condition: Annotated[
         list[str] | None,
-        typer.Option(help="A kind, or JSON with kind and its keys; several: all have to hold. None: static-equilibrium."),
+        typer.Option(help="A kind, or JSON with its keys; several: all hold. None: static-equilibrium."),
     ] = None,
     box: Annotated[
-        str | None, typer.Option(help="Positions: 'x y z; x y z', lowest and highest [m]; none: about home and anchors.")
+        str | None, typer.Option(help="Positions: 'x y z; x y z', lowest; highest [m]; none: about the robot.")
     ] = None,
     attitude: Annotated[
         str | None, typer.Option(help="'roll pitch yaw', or lowest; highest [rad]; none: that of home.")
@@ -47,7 +47,9 @@ def workspace(
     resume: Annotated[
         Path | None, typer.Option("--resume", metavar="FILE", help="Checkpoint to go on with, or to begin.")
     ] = None,
-    keep: Annotated[str, typer.Option(help="Samples in the file: accepted, all or none; the first million.")] = "accepted",
+    keep: Annotated[
+        str, typer.Option(help="Samples in the file, a million at most: accepted, all, none.")
+    ] = "accepted",
     out: Annotated[
         Path | None, typer.Option("--out", help="NetCDF file to write; none: ROBOT-workspace.nc in this folder.")
     ] = None,

@@ -32,10 +32,10 @@ def projections(found: xr.Dataset) -> Figure:
         behind = next(name for name in ("x", "y", "z") if name not in (across, up))
         ax = style.axes(canvas, f"{across} [m]", f"{up} [m]", (1, len(pairs), index + 1))
         share = _share(found, (behind,)).transpose(up, across)
-        shown = ax.pcolormesh(found[across], found[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
+        ax.pcolormesh(found[across], found[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
         ax.set_aspect("equal")
         panels.append(ax)
-    canvas.colorbar(shown, ax=panels, label="share accepted along the line of sight [-]")
+    canvas.colorbar(panels[0].collections[0], ax=panels, label="share accepted along the line of sight [-]")
     return canvas
 
 

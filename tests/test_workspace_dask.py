@@ -1,4 +1,4 @@
-"""Sampling on a Dask cluster: the same result, also when a worker is killed in the middle, and what is told without one."""
+"""Sampling on a Dask cluster: the same result, also when a worker is killed, and what is told without a cluster."""
 
 import os
 import signal

@@ -121,13 +121,14 @@ def test_the_prism_below_three_anchors(method):
     found = sample(hanging_mass(), REST, {"position": BOX}, 40_000, method)
     low, high = found["volume_interval"].values
     assert low < AREA < high
-    assert float(found["volume"]) == pytest.approx(AREA, rel={"random": 0.04, "grid": 0.02, "adaptive": 0.02}.get(method, 0.006))
+    within = {"random": 0.04, "grid": 0.02, "adaptive": 0.02, "sobol": 0.006, "halton": 0.006}[method]
+    assert float(found["volume"]) == pytest.approx(AREA, rel=within)
     assert found["volume"].units == "m^3"
     x, y = found["position"].values[:, :2].T
     # Inside of the three edges, each at half the radius from the middle.
     for angle in np.array([1, 3, 5]) * np.pi / 3:
         assert (x * np.cos(angle) + y * np.sin(angle)).max() <= RADIUS / 2 + 1e-9
-    assert found["bounds"].values[0, 0] == pytest.approx(-RADIUS / 2, abs=0.05)
+    assert found["bounds"].values[0, 0] == pytest.approx(-RADIUS / 2, abs=0.08)
     assert found["tried"].sum() == found.attrs["samples"]
     assert found["reached"].sum() == found.attrs["accepted"] == found.sizes["point"]
 
@@ -263,7 +264,7 @@ def test_fewer_processors_inside_of_a_block():
     ],
 )
 def test_wrong_input_is_one_line(arguments, message):
-    with pytest.raises(InputError, match=".") as caught:
+    with pytest.raises(InputError) as caught:
         sample(hanging_mass(), REST, **arguments)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Which poses are reachable: a condition on the places of platform and carriers, and samplers from 10^4 to 10^9 of them.
+"""Which poses are reachable: conditions on the places of platform and carriers, asked of 10^4 to 10^9 of them.
 
 `sample` is the whole of it. `pose_problem` is one pose as a tension problem, `hints` a first look.
 """

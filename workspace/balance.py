@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -28,12 +29,17 @@ __all__ = [
     "rows_of",
 ]
 
-PLACES_AT_ONCE = 4096
+PLACES_AT_ONCE = 8192
+
+
+def dynamics_of(robot: Robot) -> Dynamics:
+    """The `Dynamics` of a robot, kept for the next call."""
+    key: Any = robot  # frozen, so it has a hash, which a type checker does not see
+    return _dynamics(key)
 
 
 @lru_cache(maxsize=16)
-def dynamics_of(robot: Robot) -> Dynamics:
-    """The `Dynamics` of a robot, kept for the next call."""
+def _dynamics(robot: Any) -> Dynamics:
     return Dynamics(robot)
 
 
@@ -107,6 +113,8 @@ def can_give(
 def anchors(robot: Robot, places: Places) -> np.ndarray:
     """Anchors in {G}, (n, m, 3) [m]."""
     frames = places.carriers[:, robot.carrier_of_cable]
+    if not robot.anchors.any():
+        return frames[..., :3]
     turned = np.einsum("nmij,mj->nmi", _rotations(frames[..., 3:]), robot.anchors)
     return frames[..., :3] + turned
 

@@ -46,7 +46,7 @@ class Condition(Part, ABC):
         InputError
             If the robot is none that the condition can be asked about.
         """
-        finite = np.isfinite(places.pose).all(axis=1) & np.isfinite(places.carriers).all(axis=(1, 2))
+        finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
         if finite.all():
             return self._holds(robot, places)
         held = np.zeros(len(places), dtype=bool)

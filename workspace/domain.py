@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
 from ..errors import InputError
-from ..models import Robot, kinematics
-from ..models.batch import call
+from ..models import Robot
 from ..models.robot import COORDINATES, Box
+from .balance import anchors, attachments
 from .places import Places
 from .region import AngleBox, Region, reach_boxes, surrounding_box
 
@@ -148,8 +147,8 @@ class Domain:
         """
         centred = pose.copy()
         centred[:, :3] = 0.0
-        ends = call(_ends(self.robot), {"pose": centred, "carrier_pose": carriers})
-        first, second, third = np.moveaxis(ends["anchors"] - ends["attachments"], -1, 0)  # (n, 3) each
+        at = Places(centred, carriers)
+        first, second, third = np.moveaxis(anchors(self.robot, at) - attachments(self.robot, at), 1, 0)  # (n, 3) each
         with np.errstate(divide="ignore", invalid="ignore"):
             ex, span = _unit(second - first)
             i = np.sum(ex * (third - first), axis=1)
@@ -169,16 +168,6 @@ def _unit(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Directions (n, 3) and lengths (n,)."""
     length = np.sqrt(np.sum(vectors**2, axis=1))
     return vectors / length[:, None], length
-
-
-@lru_cache(maxsize=4)
-def _ends(robot: Robot) -> ca.Function:
-    """Anchors and attachments in {G}, (3, m) each."""
-    pose, carriers = ca.SX.sym("pose", 6), ca.SX.sym("carrier_pose", len(robot.carriers), 6)
-    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
-    attachments = kinematics.transform(pose, robot.attachments)
-    names = ["anchors", "attachments"]
-    return ca.Function("ends", [pose, carriers], [anchors, attachments], ["pose", "carrier_pose"], names)
 
 
 def _carrier_boxes(robot: Robot, region: Region) -> dict[str, Box]:

@@ -76,7 +76,7 @@ class Refinement:
     def _keys(self, cells: np.ndarray) -> np.ndarray:
         """Numbers on the lattice of the corners of cells (n, d), (n, 2^d)."""
         corners = cells[:, None, :] + self._corners
-        return np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1))
+        return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1)))
 
     def _halve(self, cells: np.ndarray) -> np.ndarray:
         """The halves of cells (n, d) on the next, finer lattice, to which all that is known goes."""

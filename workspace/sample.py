@@ -119,7 +119,8 @@ def sample(
         If workers end before their work, or the extra `cluster` is not there.
     """
     start = time.perf_counter()
-    condition, region = condition_from(dict(condition) if isinstance(condition, Mapping) else condition), _region(region)
+    condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
+    region = _region(region)
     check_sampling(method, samples, seed)
     whole("workers", workers, 1, 1024)
     whole("points_max", points_max, 0, MOST_POINTS)

@@ -1,8 +1,8 @@
-"""Samplers: points of the unit cube in chunks, each chunk by itself, so that it matters to none who computes which when.
+"""Samplers: points of the unit cube in chunks, each chunk by itself, so that it matters not who computes which.
 
-Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Low-discrepancy sequences, Sobol's
-(scipy's) and Halton's, are scrambled by the seed and wound on to where the chunk begins. A grid has the midpoints of
-equal cells.
+Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Low-discrepancy sequences,
+Sobol's (scipy's) and Halton's, are scrambled by the seed and wound on to where the chunk begins. A grid has the
+midpoints of equal cells.
 """
 
 from __future__ import annotations
