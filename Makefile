@@ -33,5 +33,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,dev,mujoco,timing,mesh]"
+	$(INSTALL) ".[bench,cluster,dev,mesh,mujoco,timing]"
 	touch $@

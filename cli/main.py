@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TowlineError
-from . import bench, demo, export, import_, plan, robots, tension, time
+from . import bench, demo, export, import_, plan, robots, tension, time, workspace
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -25,6 +25,7 @@ app.command("robots")(robots.robots)
 app.command("tension")(tension.tension)
 app.command("plan")(plan.plan)
 app.command("time")(time.time)
+app.command("workspace")(workspace.workspace)
 app.add_typer(import_.app, name="import")
 app.command("export")(export.export)
 app.add_typer(bench.app, name="bench")

@@ -8,7 +8,6 @@ from the disk a third of that, so a Function gets its kernel once its calls have
 from __future__ import annotations
 
 import math
-import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -17,12 +16,14 @@ from weakref import WeakKeyDictionary
 import casadi as ca
 import numpy as np
 
+from .. import processors
 from ..errors import InputError, SolverError
 from .kernel import Kernel, compile_kernel
 from .tape import dense, translate
 
 ROWS_WORTH_A_KERNEL = 200_000
 ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
+ELEMENTS_OF_ONE_THREAD = 4096  # BLAS begins to share at 10 000
 ROWS_OF_MAP = 64  # to make a map of n costs as much as to evaluate it, so one of this size is kept
 
 
@@ -221,7 +222,7 @@ def _evaluator(function: ca.Function) -> _Evaluator:
 
 def _run(kernel: Kernel, count: int, arrays: list[np.ndarray], threads: int | None) -> None:
     if threads is None:
-        threads = min(_processors(), count // ROWS_WORTH_A_THREAD)
+        threads = min(processors.available(), count // ROWS_WORTH_A_THREAD)
     threads = max(1, min(threads, count))
     if threads == 1:
         kernel(0, count, *arrays)
@@ -229,10 +230,6 @@ def _run(kernel: Kernel, count: int, arrays: list[np.ndarray], threads: int | No
     edges = [count * i // threads for i in range(threads + 1)]
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda start, stop: kernel(start, stop, *arrays), edges[:-1], edges[1:]))
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _core(size: tuple[int, int]) -> tuple[int, ...]:
@@ -273,8 +270,10 @@ def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
         ) from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
         raise InputError(f"{name}: has shape {array.shape}; accepted: (..., {_told(core)})")
-    # The sum of squares is quick and finite, unless an element is not finite or near the largest float.
-    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+    # A sum is finite, unless an element is not finite or near the largest float. That of squares is the quickest of few
+    # elements; of many, BLAS would share it among threads.
+    total = np.vdot(array, array) if array.size < ELEMENTS_OF_ONE_THREAD else array.sum()
+    if not math.isfinite(total) and not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name}: is {array[index]} at index {index}; accepted: finite numbers")
     return array

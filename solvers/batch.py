@@ -1,6 +1,5 @@
 """Many problems in one call: `solve_batch`."""
 
-import os
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import processors
 from ..errors import InputError
 from . import compiled
 from .inputs import number, shown, whole_number
@@ -184,7 +184,7 @@ def solve_batch(
     tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
     code = np.full(rows, _UNSURE, np.int8)
     kernels = compiled.load()
-    share = threads or min(_processors(), max(1, rows // ROWS_WORTH_A_THREAD))
+    share = threads or min(processors.available(), max(1, rows // ROWS_WORTH_A_THREAD))
     # Whole vectors for each thread, so that a row meets the same company whoever solves it.
     block = max(kernels.WIDTH, -(-rows // (kernels.WIDTH * share)) * kernels.WIDTH)
 
@@ -234,11 +234,6 @@ def solve_batch(
 def _alone(problem: TensionProblem, rho: float | None) -> TensionSolution:
     """Solve one row by the method of the batch."""
     return solve(problem) if rho is None else solve(problem, method="soft-wrench", rho=rho)
-
-
-def _processors() -> int:
-    """How many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _row(problem: dict[str, Array], index: int | tuple[int, ...]) -> TensionProblem:

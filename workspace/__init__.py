@@ -1,6 +1,7 @@
-"""Which poses are reachable: conditions on the places of platform and carriers, alone or joined by & and |.
+"""Which poses are reachable: conditions on places of platform and carriers, asked of 10^4 to 10^9 of them.
 
-`pose_problem` is one pose as a tension problem, `hints` a first look.
+Conditions stand alone or are joined by & and |; `sample` asks them. `pose_problem` is one pose as a tension problem,
+`hints` a first look.
 """
 
 from .balance import make_ready
@@ -20,6 +21,8 @@ from .conditions import (
 )
 from .places import Places
 from .pose import hints, pose_problem
+from .region import Region
+from .sample import sample, save
 
 __all__ = [
     "AllOf",
@@ -33,6 +36,7 @@ __all__ = [
     "Lengths",
     "Margin",
     "Places",
+    "Region",
     "StaticEquilibrium",
     "WrenchClosure",
     "WrenchFeasible",
@@ -41,4 +45,6 @@ __all__ = [
     "hints",
     "make_ready",
     "pose_problem",
+    "sample",
+    "save",
 ]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..models import Dynamics
 from ..solvers import TensionProblem, solve
+from .region import surrounding_box
 
 
 def pose_problem(
@@ -75,12 +76,8 @@ def hints(dynamics: Dynamics, count: int = 400, seed: int = 0) -> tuple[np.ndarr
     Positions (count, 3) [m] and flags (count,).
     """
     robot = dynamics.robot
-    corners = np.vstack([robot.home_anchors, robot.home[:3]])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    spread = np.maximum(high - low, 0.5 * (high - low).max())
-    low = np.minimum(low, (low + high - spread) / 2)
+    low, high = surrounding_box(robot, {})
     poses = np.tile(robot.home, (count, 1))
-    moving = robot.dof_mask[:3]
-    poses[:, :3] += moving * (low + np.random.default_rng(seed).uniform(size=(count, 3)) * spread - robot.home[:3])
+    poses[:, :3] = low + np.random.default_rng(seed).uniform(size=(count, 3)) * (high - low)
     feasible = np.array([solve(pose_problem(dynamics, pose)).feasible for pose in poses])
     return poses[:, :3], feasible

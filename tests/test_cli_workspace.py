@@ -1,0 +1,115 @@
+"""`towline workspace` through the real entry point."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+TOWLINE = Path(sys.executable).with_name("towline")
+ROBOT = """\
+name: hanging-mass
+source: a test, a point mass on three cables from a triangle of 2 m x 3 m
+platform: {mass: 1, dof: [x, y, z], home: [0, 1, 1, 0, 0, 0]}
+carriers: [{name: frame, kind: ground}]
+cables:
+  - {carrier: frame, anchor: [-1, 0, 4], attachment: [0, 0, 0], t_min: 0, t_max: 1000}
+  - {carrier: frame, anchor: [1, 0, 4], attachment: [0, 0, 0], t_min: 0, t_max: 1000}
+  - {carrier: frame, anchor: [0, 3, 4], attachment: [0, 0, 0], t_min: 0, t_max: 1000}
+"""
+BOX = "-1 0 0; 1 3 2"
+
+
+def run(*arguments, cwd):
+    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
+    command = [str(TOWLINE), "workspace", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=120, check=False)
+    assert "Traceback" not in done.stderr + done.stdout
+    return done
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "mass.yaml").write_text(ROBOT)
+    return tmp_path
+
+
+def test_json_tells_the_prism(folder):
+    done = run("mass.yaml", "--box", BOX, "--method", "sobol", "--samples", "2e4", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["samples"] == 20_000
+    assert told["volume"] == pytest.approx(3 * 2, rel=0.01)  # half of 2 m x 3 m, 2 m high
+    low, high = told["volume_interval"]
+    assert low < 6 < high
+    assert told["volume_unit"] == "m^3"
+    for name, ends in {"x": (-1, 1), "y": (0, 3), "z": (0, 2)}.items():
+        np.testing.assert_allclose(told["bounds"][name], ends, atol=0.1)
+    assert told["poses_per_s"] > 0
+    found = xr.load_dataset(folder / told["file"])
+    assert told["file"] == "hanging-mass-workspace.nc"
+    assert found.sizes["point"] == told["accepted"] == found.attrs["accepted"]
+    assert found["position"].units == "m"
+
+
+def test_text_figure_and_conditions_that_all_have_to_hold(folder):
+    both = ("--condition", "static-equilibrium", "--condition", '{"kind": "static-equilibrium"}')
+    done = run("mass.yaml", "--box", BOX, *both, "--figure", "f.png", "--out", "w.nc", "--keep", "none", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "hanging-mass: " in done.stdout
+    assert "of 60,000 samples accepted" in done.stdout
+    assert "Wilson's interval at 95%" in done.stdout
+    assert (folder / "f.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads(xr.load_dataset(folder / "w.nc").attrs["condition"])["kind"] == "all"
+
+
+def test_nowhere_is_exit_code_1(folder):
+    done = run("mass.yaml", "--box", "5 5 0; 6 6 1", "--samples", "1000", "--json", cwd=folder)
+    assert done.returncode == 1
+    told = json.loads(done.stdout)
+    assert (told["accepted"], told["volume"]) == (0, 0)
+    assert told["bounds"]["x"] == [None, None]
+
+
+def test_checkpoint_then_resume(folder):
+    arguments = ("mass.yaml", "--box", BOX, "--json", "--samples", "40000")
+    first = run(*arguments, "--checkpoint", "c", cwd=folder)
+    assert first.returncode == 0, first.stderr
+    before = (folder / "hanging-mass-workspace.nc").read_bytes()
+    again = run(*arguments, "--checkpoint", "c", cwd=folder)
+    assert (again.returncode, again.stdout) == (2, "")
+    assert "c: is there already; accepted: a new path, or resume" in again.stderr
+    resumed = run(*arguments, "--resume", "c", "--out", "again.nc", cwd=folder)
+    assert resumed.returncode == 0, resumed.stderr
+    assert (folder / "again.nc").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--samples", "0"), "samples: is 0"),
+        (("--samples", "1.5"), "--samples: is 1.5"),
+        (("--box", "0 0 0"), "--box: '0 0 0'; accepted: the lowest and the highest"),
+        (("--box", "0 0 0; 0 0 0"), "is empty"),
+        (("--box", "0 0 x; 0 0 0"), "--box: '0 0 x' is not a list of numbers"),
+        (("--condition", "levitation"), "condition.kind: 'levitation' is unknown"),
+        (("--condition", "{kind"), "is not JSON"),
+        (("--scheduler", "tcp://127.0.0.1:9"), "scheduler: "),
+        (("--checkpoint", "mass.yaml"), "mass.yaml: is there already"),
+        (("--resume", "mass.yaml"), "mass.yaml: is no checkpoint of towline"),
+        (("--resume", "a", "--checkpoint", "b"), "--checkpoint: b beside --resume a"),
+        (("--resume", "a", "--out", "a"), "a: is the checkpoint"),
+        (("--resume", "/proc/a"), "/proc/a: cannot be written"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(folder, arguments, message):
+    done = run("mass.yaml", *arguments, cwd=folder)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert os.listdir(folder) == ["mass.yaml"]
+    assert (folder / "mass.yaml").read_text() == ROBOT

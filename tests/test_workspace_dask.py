@@ -1,0 +1,76 @@
+"""Sampling on a Dask cluster: the same result, also when a worker is killed, and what is told without a cluster."""
+
+import os
+import signal
+import threading
+import time
+
+import pytest
+
+from towline.errors import InputError
+from towline.models import load
+from towline.workspace import StaticEquilibrium, execution, sample, save
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
+    ) as started:
+        yield started
+
+
+def test_a_killed_worker_leaves_the_file_identical(cluster, tmp_path):
+    robot, samples = load("wang-flying"), 800_000
+    begun = threading.Event()
+
+    def progress(done, total, accepted):
+        if done > samples // 10:
+            begun.set()
+
+    def kill():
+        assert begun.wait(100)
+        with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+            process = next(iter(client.run(os.getpid).values()))
+        os.kill(process, signal.SIGKILL)
+        killed.append(time.monotonic())
+
+    killed: list[float] = []
+    killer = threading.Thread(target=kill)
+    killer.start()
+    address = cluster.scheduler_address
+    files = {"checkpoint": tmp_path / "cluster.checkpoint", "scheduler": address, "progress": progress}
+    shared = sample(robot, StaticEquilibrium(), samples=samples, **files)
+    ended = time.monotonic()
+    killer.join()
+    assert killed[0] < ended, "the worker was killed after the work"
+    alone = sample(robot, StaticEquilibrium(), samples=samples, checkpoint=tmp_path / "alone.checkpoint")
+    assert save(shared, tmp_path / "shared.nc").read_bytes() == save(alone, tmp_path / "alone.nc").read_bytes()
+    assert (tmp_path / "cluster.checkpoint").read_bytes() == (tmp_path / "alone.checkpoint").read_bytes()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "no such host:1", "tcp://"])
+def test_a_scheduler_that_is_not_there_is_told_in_time(address, tmp_path, monkeypatch):
+    monkeypatch.setattr(execution, "CONNECT_WITHIN", 1.0)
+    start = time.monotonic()
+    with pytest.raises(InputError, match="accepted: the address of a Dask scheduler") as caught:
+        sample(load("wang-flying"), StaticEquilibrium(), scheduler=address, checkpoint=tmp_path / "file")
+    assert time.monotonic() - start < 15
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "file").exists()
+
+
+def test_a_cluster_without_workers_is_told(monkeypatch):
+    monkeypatch.setattr(execution, "WORKERS_WITHIN", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None, host="127.0.0.1") as empty,
+        pytest.raises(InputError, match="has no workers; accepted: one at least"),
+    ):
+        sample(load("wang-flying"), StaticEquilibrium(), scheduler=empty.scheduler_address)
+
+
+def test_wrong_input_is_told_before_any_worker(cluster):
+    with pytest.raises(InputError, match="samples: is 0"):
+        sample(load("wang-flying"), StaticEquilibrium(), samples=0, scheduler=cluster.scheduler_address)

@@ -1,0 +1,138 @@
+"""`Outcome`: the tallies of a run put together, and the dataset that tells it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .domain import Domain
+from .refinement import Refinement
+from .tally import Tally, cells_of_counts, width_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CONFIDENCE = 0.95
+_NORMAL_QUANTILE = 1.959963984540054  # of (1 + CONFIDENCE) / 2
+AXES, ANGLES = ["x", "y", "z"], ["roll", "pitch", "yaw"]
+
+
+class Outcome:
+    """Takes tallies in the order of their samples, so that what it keeps does not depend on who was faster.
+
+    Attributes
+    ----------
+    tried, accepted
+        How many samples so far.
+    """
+
+    def __init__(self, domain: Domain, points_max: int):
+        self.tried = self.accepted = 0
+        self._domain, self._room = domain, points_max
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
+        self._counts = np.zeros((2, *cells_of_counts(domain)), dtype=np.int64)
+        self._samples: list[np.ndarray] = []
+        self._flags: list[np.ndarray] = []
+
+    @property
+    def has_room(self) -> bool:
+        """Whether more samples are kept."""
+        return self._room > 0
+
+    def add(self, tally: Tally) -> None:
+        """Take the tally of the next samples."""
+        self.tried += sum(tally.sizes)
+        self.accepted += int(tally.counts[1].sum())
+        self._low, self._high = np.minimum(self._low, tally.low), np.maximum(self._high, tally.high)
+        self._counts += tally.counts
+        if self._room > 0 and len(tally.samples):
+            self._samples.append(tally.samples[: self._room])
+            self._flags.append(tally.accepted[: self._room])
+            self._room -= len(self._samples[-1])
+
+    def dataset(self, keep: str, refinement: Refinement | None) -> xr.Dataset:
+        """All of it; what it has is told by `sample`."""
+        import xarray as xr
+
+        domain = self._domain
+        low, high = domain.box
+        middles = [
+            lowest + (np.arange(count) + 0.5) * (highest - lowest) / count
+            for lowest, highest, count in zip(low, high, self._counts.shape[1:], strict=True)
+        ]
+        metres = {"units": "m"}
+        found = self.accepted > 0
+        bounds = np.stack([self._low, self._high]) if found else np.full((2, 3), np.nan)
+        variables: dict[str, Any] = {
+            "bounds": (("end", "axis"), bounds, metres),
+            "tried": (("x", "y", "z"), self._counts[0], {"units": "1", "long_name": "samples tried in the cell"}),
+            "reached": (("x", "y", "z"), self._counts[1], {"units": "1", "long_name": "of them accepted"}),
+            **_measures(self._counts, domain, self.tried, self.accepted, refinement),
+        }
+        coordinates: dict[str, Any] = {
+            "axis": AXES,
+            "end": ["min", "max"],
+            **{name: ((name,), at, metres) for name, at in zip(AXES, middles, strict=True)},
+        }
+        if keep != "none":
+            variables |= self._kept(keep)
+            coordinates |= {"angle": ANGLES} if domain.turns else {}
+            coordinates |= {"carrier": [carrier.name for carrier in domain.robot.carriers]} if domain.drives else {}
+        if refinement is not None:
+            corners, _ = domain.places(refinement.cells)
+            upper, _ = domain.places(refinement.cells + refinement.edges)
+            centres = (corners.pose[:, :3] + upper.pose[:, :3]) / 2
+            edges = np.zeros(6 + 3 * len(domain.robot.carriers))
+            edges[domain.varying] = domain.extent * refinement.edges
+            told = {"units": "m", "long_name": "centres of the smallest cells, which the boundary passes through"}
+            variables["boundary"] = (("cell", "axis"), centres, told)
+            variables["cell_edges"] = (("axis",), edges[:3], {"units": "m", "long_name": "of the smallest cells"})
+        return xr.Dataset(variables, coordinates)
+
+    def _kept(self, keep: str) -> dict[str, Any]:
+        domain = self._domain
+        rows = np.vstack(self._samples) if self._samples else np.empty((0, width_of(domain)))
+        kept: dict[str, Any] = {"position": (("point", "axis"), rows[:, :3], {"units": "m"})}
+        if domain.turns:
+            kept["attitude"] = (("point", "angle"), rows[:, 3:6], {"units": "rad"})
+        if domain.drives:
+            where = rows[:, 6 if domain.turns else 3 :].reshape(len(rows), len(domain.robot.carriers), 3)
+            kept["carrier_position"] = (("point", "carrier", "axis"), where, {"units": "m"})
+        if keep == "all":
+            flags = np.concatenate(self._flags) if self._flags else np.empty(0, dtype=bool)
+            kept["accepted"] = (("point",), flags, {"long_name": "whether the condition holds"})
+        return kept
+
+
+def _measures(
+    counts: np.ndarray, domain: Domain, tried: int, accepted: int, refinement: Refinement | None
+) -> dict[str, Any]:
+    """The volume and its ends."""
+    whole = domain.measure
+    if refinement is not None:
+        ends = refinement.inside, refinement.inside + refinement.mixed
+        value = refinement.estimate
+        told = "lowest and highest, if the first cells miss nothing"
+    elif domain.hangs:
+        value = np.count_nonzero(counts[1]) / counts[1].size
+        ends, told = (np.nan, np.nan), "none: positions are not uniform; the volume is that of the cells reached"
+    else:
+        value, ends = accepted / tried, wilson(accepted, tried)
+        told = f"Wilson's interval at {CONFIDENCE:.0%}, of independent samples"
+    unit = {"units": domain.measure_unit}
+    return {
+        "volume": ((), whole * value, unit),
+        "volume_interval": (("end",), [whole * end for end in ends], {**unit, "long_name": told}),
+    }
+
+
+def wilson(accepted: int, samples: int) -> tuple[float, float]:
+    """Wilson's interval of a share, of which `accepted` of `samples` independent samples were seen."""
+    z = _NORMAL_QUANTILE
+    share = accepted / samples
+    middle = share + z**2 / (2 * samples)
+    half = z * np.sqrt(share * (1 - share) / samples + z**2 / (4 * samples**2))
+    low, high = (middle - half) / (1 + z**2 / samples), (middle + half) / (1 + z**2 / samples)
+    # Both ends are exact where all samples agree; rounding is not.
+    return float(low) if accepted else 0.0, float(high) if accepted < samples else 1.0

@@ -1,0 +1,99 @@
+"""Adaptive refinement of the boundary: cells whose corners differ are halved along each axis, level by level.
+
+The corners of all cells lie on a lattice, twice as fine on each level; those that are known are not asked again. A cell
+whose corners agree is taken to be all inside or all outside: what is thinner than the first cells can be missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from itertools import product
+
+import numpy as np
+
+from ..errors import InputError
+from .domain import Domain
+from .sampling import cells_of
+
+FIRST_CELLS = 16  # along each axis, where the axes are equally long and the samples suffice
+
+
+class Refinement:
+    """The levels of one run.
+
+    Attributes
+    ----------
+    inside, mixed
+        Share of the box in cells whose corners are all accepted, and in those whose corners differ.
+    estimate
+        Share of the box that is accepted: of each mixed cell the share of its corners.
+    cells
+        Lower corners of the mixed cells as points of the unit cube, (n, d).
+    edges
+        Edges of the smallest cells, in the unit cube, (d,).
+    """
+
+    def __init__(self, domain: Domain, samples: int, size: float | None):
+        if domain.hangs or (domain.varying >= 3).any():
+            raise InputError("method: adaptive refines positions; accepted: a region in which nothing else varies")
+        if size is not None and not 0 < size < np.inf:
+            raise InputError(f"size: is {size!r}; accepted: a number > 0 [m], or None for as fine as the samples allow")
+        self.inside = self.mixed = self.estimate = 0.0
+        self._extent, self._samples, self._size = domain.extent, samples, size
+        d = len(self._extent)
+        self._corners = np.array(list(product((0, 1), repeat=d)), dtype=np.int64)  # (2^d, d)
+        self._count = np.array(_first_cells(self._extent, samples), dtype=np.int64)
+        self.cells, self.edges = np.empty((0, d)), 1.0 / self._count
+        self._known, self._flags = np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
+
+    def levels(self) -> Generator[np.ndarray, np.ndarray, None]:
+        """Points to ask for, (n, d) of the unit cube; takes whether each was accepted, (n,)."""
+        cells = np.stack(np.unravel_index(np.arange(self._count.prod()), self._count), axis=1)
+        used = 0
+        while True:
+            keys = self._keys(cells)  # (n, 2^d)
+            new = np.setdiff1d(keys, self._known)
+            if used and used + len(new) > self._samples:
+                # As fine as the samples allow; the mixed cells of the level before stay.
+                return
+            used += len(new)
+            flags = yield np.stack(np.unravel_index(new, self._count + 1), axis=1) / self._count
+            order = np.argsort(merged := np.concatenate([self._known, new]))
+            self._known, self._flags = merged[order], np.concatenate([self._flags, flags])[order]
+            hits = self._flags[np.searchsorted(self._known, keys)].sum(axis=1)
+            share = float(1.0 / self._count.prod())
+            differ = (hits > 0) & (hits < len(self._corners))
+            self.inside += share * int((hits == len(self._corners)).sum())
+            self.mixed = share * int(differ.sum())
+            self.estimate = self.inside + share * float(hits[differ].sum()) / len(self._corners)
+            self.cells, self.edges = cells[differ] / self._count, 1.0 / self._count
+            if not differ.any() or (self._size is not None and (self._extent * self.edges <= self._size).all()):
+                return
+            if self._count.max() > 2**19:  # three such indices fill a key
+                return
+            cells = self._halve(cells[differ])
+
+    def _keys(self, cells: np.ndarray) -> np.ndarray:
+        """Numbers on the lattice of the corners of cells (n, d), (n, 2^d)."""
+        corners = cells[:, None, :] + self._corners
+        return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1)))
+
+    def _halve(self, cells: np.ndarray) -> np.ndarray:
+        """The halves of cells (n, d) on the next, finer lattice, to which all that is known goes."""
+        known = np.stack(np.unravel_index(self._known, self._count + 1), axis=1) * 2
+        self._count = self._count * 2
+        # Twice the indices in the same order: the keys stay sorted.
+        self._known = np.ravel_multi_index(tuple(known.T), tuple(self._count + 1))
+        return (2 * cells[:, None, :] + self._corners).reshape(-1, cells.shape[1])
+
+
+def _first_cells(extent: np.ndarray, samples: int) -> tuple[int, ...]:
+    """Cells of the first level, with no more corners than samples."""
+    most = FIRST_CELLS ** len(extent)
+    while True:
+        cells = cells_of(extent, most)
+        if np.prod(np.array(cells) + 1) <= samples:
+            return cells
+        if most == 1:
+            raise InputError(f"samples: is {samples}; accepted: {2 ** len(extent)} and more, the corners of a cell")
+        most = most // 2

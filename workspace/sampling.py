@@ -1,0 +1,134 @@
+"""Samplers: points of the unit cube in chunks, each chunk by itself, so that it matters not who computes which.
+
+Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Low-discrepancy sequences,
+Sobol's (scipy's) and Halton's, are scrambled by the seed and wound on to where the chunk begins. A grid has the
+midpoints of equal cells.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .halton import halton
+
+CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
+METHODS = ("random", "sobol", "halton", "grid", "adaptive")
+MOST = 10**12  # samples
+MOST_SOBOL = 2**32
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """Points of the unit cube of as many dimensions as `extent` has.
+
+    Attributes
+    ----------
+    method
+        random, sobol, halton or grid.
+    wanted
+        How many samples were asked for; a grid has at most as many, `samples`.
+    extent
+        How far the quantities vary, (d,) [m, rad]; the cells of a grid are about equally long in all of them.
+    """
+
+    method: str
+    wanted: int
+    seed: int
+    extent: tuple[float, ...]
+
+    @cached_property
+    def cells(self) -> tuple[int, ...]:
+        """Cells of the grid along each quantity, none otherwise."""
+        return cells_of(np.array(self.extent), self.wanted) if self.method == "grid" else ()
+
+    @property
+    def samples(self) -> int:
+        """How many samples there are."""
+        return int(np.prod(self.cells)) if self.cells else self.wanted
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks there are."""
+        return -(-self.samples // CHUNK)
+
+    def size(self, chunk: int) -> int:
+        """Samples in a chunk; only the last one has fewer than `CHUNK`."""
+        return min(CHUNK, self.samples - chunk * CHUNK)
+
+    def units(self, chunk: int) -> np.ndarray:
+        """The points of a chunk, (n, d), between 0 and 1."""
+        count, dimension = self.size(chunk), len(self.extent)
+        if self.method == "random":
+            key = np.array([self.seed, chunk], dtype=np.uint64)
+            return np.random.Generator(np.random.Philox(key=key)).random((count, dimension))
+        if self.method == "grid":
+            index = np.unravel_index(np.arange(chunk * CHUNK, chunk * CHUNK + count), self.cells)
+            return (np.stack(index, axis=1) + 0.5) / np.array(self.cells)
+        if self.method == "halton":
+            return halton(chunk * CHUNK, count, dimension, self.seed)
+        return _sobol(dimension, self.seed).points(chunk * CHUNK)[:count]
+
+
+def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:
+    """Cells along each axis, about equally long, at least one each and at most so many in all."""
+    counts = np.ones(len(extent), dtype=np.int64)
+    # From the shortest axis on: where it takes less than one cell, the others share what is left.
+    order = np.argsort(extent, kind="stable")
+    left = float(most)
+    for position, axis in enumerate(order):
+        rest = order[position:]
+        # Of d remaining axes: the edge of a cube of which `left` fill their box; the root may be off by an ulp.
+        edge = float(np.exp((np.log(extent[rest]).sum() - np.log(left)) / len(rest)))
+        counts[axis] = max(1, int(extent[axis] / edge * (1 + 1e-12)))
+        left /= counts[axis]
+    return tuple(int(count) for count in counts)
+
+
+class _Sobol:
+    """Chunks of Sobol's sequence, scrambled; winding on from chunk to chunk is cheap, back it starts anew."""
+
+    def __init__(self, dimension: int, seed: int):
+        from scipy.stats import qmc
+
+        self._engine: Any = qmc.Sobol(dimension, bits=32, rng=seed)  # above 32 bits scipy cannot wind on
+        self._at = 0
+
+    def points(self, start: int) -> np.ndarray:
+        """The `CHUNK` points from index `start` on."""
+        if start < self._at:
+            self._engine.reset()
+            self._at = 0
+        if start > self._at:
+            self._engine.fast_forward(start - self._at)
+        self._at = start + CHUNK
+        return self._engine.random(CHUNK)
+
+
+_own = threading.local()  # a sequence serves one thread at a time
+
+
+def _sobol(dimension: int, seed: int) -> _Sobol:
+    key = dimension, seed
+    if getattr(_own, "key", None) != key:
+        _own.key, _own.sequence = key, _Sobol(dimension, seed)
+    return _own.sequence
+
+
+def check_sampling(method: str, samples: int, seed: int) -> None:
+    """Raise `InputError` if there is no such way to sample."""
+    if method not in METHODS:
+        raise InputError(f"method: {method!r} is unknown; accepted: {', '.join(METHODS)}")
+    whole("samples", samples, 1, MOST_SOBOL if method == "sobol" else MOST)
+    whole("seed", seed, 0, 2**63 - 1)
+
+
+def whole(field: str, value: object, least: int, most: int) -> None:
+    """Raise `InputError` if a value is no whole number from `least` to `most`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise InputError(f"{field}: is {value!r}; accepted: a whole number from {least} to {most}")
