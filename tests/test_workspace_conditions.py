@@ -311,6 +311,13 @@ def test_conditions_join():
     assert len((one & other & third).conditions) == 3
 
 
+def test_a_subclass_without_a_kind_of_its_own_leaves_its_parents_place():
+    class Quieter(StaticEquilibrium):
+        """Rest, asked by somebody else's class."""
+
+    assert type(condition_from({"kind": "static-equilibrium"})) is StaticEquilibrium
+
+
 def test_a_condition_is_data():
     condition = (StaticEquilibrium() & Margin(above=2.0)) | ExistsPlacement(
         condition=ForceBalance() & Lengths(max=(1.0, 2.0, 3.0)) & WrenchFeasible(box=CUBE), tries=4

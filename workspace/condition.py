@@ -35,7 +35,7 @@ class Condition(Part, ABC):
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
         super().__pydantic_init_subclass__(**options)
-        if "kind" in cls.model_fields:
+        if "kind" in cls.__annotations__:  # its own: a subclass that only inherits one does not take its parent's place
             Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
