@@ -1,6 +1,7 @@
-"""Files that are written whole or not at all."""
+"""Files and folders that are written whole or not at all."""
 
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
@@ -34,6 +35,33 @@ def whole_file(path: Path) -> Iterator[Path]:
         os.replace(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A temporary folder beside `path` to fill; it takes the name `path` when the block ends without an exception.
+
+    Raises
+    ------
+    InputError
+        If something is there already, which is left as it is, or the place cannot be written to.
+    """
+    if path.exists() or path.is_symlink():
+        raise InputError(f"{path}: is there already; accepted: a new path")
+    target = check_writable(path)
+    try:
+        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix="."))
+    except (OSError, ValueError) as error:
+        raise _refusal(path, error) from None
+    try:
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o777 & ~mask)
+        temporary.rename(target)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
         raise
 
 

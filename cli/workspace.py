@@ -15,7 +15,9 @@ from .options import JsonOption, RobotArgument, numbers, print_json
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..models import Robot
     from ..workspace import Condition
+    from ..workspace.boundary import Mesh
     from ..workspace.sample import Progress
 
 
@@ -51,14 +53,19 @@ def workspace(
         str, typer.Option(help="Samples in the file, a million at most: accepted, all, none.")
     ] = "accepted",
     out: Annotated[
-        Path | None, typer.Option("--out", help="NetCDF file to write; none: ROBOT-workspace.nc in this folder.")
+        Path | None,
+        typer.Option("--out", help="NetCDF file, or .zarr folder, to write; none: ROBOT-workspace.nc in this folder."),
     ] = None,
     figure: Annotated[Path | None, typer.Option("--figure", help="PNG file to draw what was reached in.")] = None,
+    mesh: Annotated[
+        Path | None,
+        typer.Option("--mesh", help="STL file for the boundary at one attitude, carriers at home (extra mesh)."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Sample where a robot's platform can be, or find that it can be nowhere (exit code 1)."""
     from ..figures import style
-    from ..figures.reached import projections
+    from ..figures.workspace import reached
     from ..models import load
     from ..workspace import sample, save
     from ..writing import check_writable
@@ -69,9 +76,13 @@ def workspace(
     target = out if out is not None else Path(f"{loaded.name}-workspace.nc")
     if checkpoint is not None and resume is not None:
         raise InputError(f"--checkpoint: {checkpoint} beside --resume {resume}; accepted: one of them")
-    for file in (target, figure):
+    if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
+        raise InputError(f"--mesh: {mesh} of a region whose attitude or carriers vary; accepted: positions that vary")
+    for file in (target, figure, mesh):
         if file is not None and check_writable(file) in [kept.resolve() for kept in (checkpoint, resume) if kept]:
             raise InputError(f"{file}: is the checkpoint; accepted: another file for what is found")
+    # Before the samples, so that what is wrong with it is told before hours of work.
+    surface = None if mesh is None else _boundary(loaded, asked, region)
     with _progress(f"sampling {loaded.name}", quiet=as_json) as progress:
         found = sample(
             loaded,
@@ -90,10 +101,12 @@ def workspace(
         )
     written = [save(found, target)]
     if figure is not None:
-        written.append(style.save(projections(found), figure))
+        written.append(style.save(reached(found), figure))
+    if mesh is not None and surface is not None:
+        written.append(surface.save(mesh))
     summary = _summary(found)
     if as_json:
-        print_json({**summary, "file": str(target), "figure": None if figure is None else str(figure)})
+        print_json({**summary, "file": str(target), "figure": _name(figure), "mesh": _name(mesh)})
     else:
         _show(found, summary)
         typer.echo("  Written")
@@ -101,6 +114,18 @@ def workspace(
             typer.echo(f"    {path}")
     if not summary["accepted"]:
         raise typer.Exit(1)
+
+
+def _boundary(robot: Robot, condition: Condition, data: dict[str, Any]) -> Mesh:
+    from ..workspace import Region, boundary
+    from ..workspace.domain import Domain
+
+    domain = Domain.of(robot, Region.model_validate(data))
+    return boundary(robot, condition, *domain.box, attitude=domain.low[3:6])
+
+
+def _name(file: Path | None) -> str | None:
+    return None if file is None else str(file)
 
 
 def _condition(texts: list[str] | None) -> Condition:

@@ -1,4 +1,4 @@
-"""Workspaces as pictures: points seen along the axes of {G}, and cross sections at heights."""
+"""Workspaces as pictures: points seen along the axes of {G}, cross sections at heights, shares of samples accepted."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from . import style
 from .plan import few_ticks
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -67,6 +68,34 @@ def cross_sections(
     return canvas
 
 
+def reached(found: xr.Dataset) -> Figure:
+    """Draw the share accepted of the samples along each line of sight: from above, from the front and the side.
+
+    Axes along which the region has no extent are left out.
+
+    Parameters
+    ----------
+    found
+        With `tried` and `reached` (x, y, z), counts in cells, as `workspace.sample` returns it.
+    """
+    thick = [name for name in ("x", "y", "z") if found.sizes[name] > 1]
+    pairs = [(a, b) for a, b in (("x", "y"), ("x", "z"), ("y", "z")) if a in thick and b in thick]
+    canvas = style.figure(width=1.0 + 3.6 * max(len(pairs), 1), height=3.4)
+    if not pairs:
+        _reached_along(canvas, found, thick[0] if thick else "x")
+        return canvas
+    panels = []
+    for index, (across, up) in enumerate(pairs):
+        behind = next(name for name in ("x", "y", "z") if name not in (across, up))
+        ax = style.axes(canvas, f"{across} [m]", f"{up} [m]", (1, len(pairs), index + 1))
+        share = _share(found, (behind,)).transpose(up, across)
+        ax.pcolormesh(found[across], found[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
+        ax.set_aspect("equal")
+        panels.append(ax)
+    canvas.colorbar(panels[0].collections[0], ax=panels, label="share accepted along the line of sight [-]")
+    return canvas
+
+
 def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) -> None:
     for index, (label, some) in enumerate(points.items()):
         shown = some[:: -(-len(some) // MOST_POINTS)] if len(some) else some
@@ -77,3 +106,16 @@ def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) ->
     ax.set_aspect("equal", adjustable="datalim")
     ax.xaxis.set_major_locator(few_ticks())
     ax.yaxis.set_major_locator(few_ticks())
+
+
+def _reached_along(canvas: Figure, found: xr.Dataset, along: str) -> None:
+    """Of a region of one dimension."""
+    share = _share(found, tuple(name for name in ("x", "y", "z") if name != along))
+    style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(found[along], share, color=style.colour(0))
+
+
+def _share(found: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:
+    """Accepted of those tried, nan where none were."""
+    tried, reached = found["tried"].sum(over), found["reached"].sum(over)
+    # What nothing was accepted of stays white.
+    return (reached / tried.where(tried > 0)).where(reached > 0, np.nan)

@@ -30,11 +30,11 @@ from ..figures import workspace as figures
 from ..models import Robot
 from ..models.robot import Box, MobileCarrier
 from ..workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
-from ..workspace.balance import anchors, attachments
+from ..workspace.hanging import hanging
 from ..workspace.volume import Volume, volume
 from .towing_plans import Drive, robot
 
-__all__ = ["PRINTED", "Loops", "draw", "hanging", "loops", "placed_as_both", "volume_of"]
+__all__ = ["PRINTED", "Loops", "draw", "loops", "placed_as_both", "volume_of"]
 
 LOOPS = 60_000
 POSTURE = 1.0  # [rad], the most of each angle
@@ -114,39 +114,6 @@ def placed_as_both(places: Places) -> np.ndarray:
     return within & ForceBalance().holds(system, places)
 
 
-def hanging(system: Robot, angles: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Poses (n, 6) of a platform on three cables of given lengths at given attitudes; nan where they do not reach.
-
-    The distance of anchor and attachment is |b_i - P - R p_i| = L_i: P lies on spheres about b_i - R p_i. Of the two
-    points that three spheres share it is the lower.
-
-    Parameters
-    ----------
-    angles
-        (roll, pitch, yaw), (n, 3) [rad].
-    carriers
-        (n, c, 6) in {G} [m, rad].
-    lengths
-        (3,) [m].
-    """
-    pose = np.concatenate([np.zeros_like(angles), angles], axis=1)
-    places = Places(pose, carriers)
-    centres = anchors(system, places) - attachments(system, places)  # (n, 3, 3)
-    a, b = centres[:, 1] - centres[:, 0], centres[:, 2] - centres[:, 0]
-    normal = np.cross(a, b)
-    square = np.einsum("ni,ni->n", normal, normal)[:, None]
-    aa, bb = (np.einsum("ni,ni->n", x, x)[:, None] for x in (a, b))
-    first, second = lengths[0] ** 2 - lengths[1:] ** 2
-    # In the plane of the centres: 2 a . p = first + |a|^2, 2 b . p = second + |b|^2.
-    foot = np.cross(normal, (second + bb) * a - (first + aa) * b) / (2.0 * square)
-    rest = lengths[0] ** 2 - np.einsum("ni,ni->n", foot, foot)[:, None]
-    with np.errstate(invalid="ignore"):
-        across = normal * np.sqrt(rest / square)
-    down = np.where(across[:, 2:] > 0, -across, across)
-    pose[:, :3] = centres[:, 0] + foot + down
-    return pose
-
-
 def draw(found: dict[str, Loops], folder: Path) -> list[Path]:
     """Save the projections of figures 3, 5 and 6 and the cross sections of figure 4 as PNG; `found` by drive."""
     names = {"fixed-length": "figure-3", "variable-length": "figure-5", "both": "figure-6"}
@@ -168,7 +135,8 @@ def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
         carriers[:, :, :3] = rng.uniform(*_reach(system), carriers[:, :, :3].shape)
     angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
     if system.fixed_lengths is not None:
-        return Places(hanging(system, angles, carriers, system.fixed_lengths), carriers)
+        places = hanging(system, angles, carriers, system.fixed_lengths)
+        return Places(np.concatenate([places, angles], axis=1), carriers)
     low, high = _box(system)
     return Places(np.concatenate([rng.uniform(low, high, (count, 3)), angles], axis=1), carriers)
 

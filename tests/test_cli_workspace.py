@@ -62,9 +62,22 @@ def test_text_figure_and_conditions_that_all_have_to_hold(folder):
     assert done.returncode == 0, done.stderr
     assert "hanging-mass: " in done.stdout
     assert "of 60,000 samples accepted" in done.stdout
-    assert "Wilson's interval at 95%" in done.stdout
+    assert "interval of Clopper and Pearson at 95%" in done.stdout
     assert (folder / "f.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads(xr.load_dataset(folder / "w.nc").attrs["condition"])["kind"] == "all"
+
+
+def test_the_boundary_and_a_zarr_folder(folder):
+    pytest.importorskip("skimage")
+    pytest.importorskip("zarr")
+    files = ("--mesh", "prism.stl", "--out", "w.zarr")
+    done = run("mass.yaml", "--box", "-1.2 -0.2 0.1; 1.2 3.2 2", "--samples", "5000", *files, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["mesh"] == "prism.stl"
+    corners = np.frombuffer((folder / "prism.stl").read_bytes()[84:], np.uint8).reshape(-1, 50)[:, 12:48]
+    a, b, c = np.moveaxis(corners.copy().view("<f4").reshape(-1, 3, 3).astype(float), 1, 0)
+    assert np.einsum("ni,ni->", a, np.cross(b, c)) / 6 == pytest.approx(3 * 1.9, rel=0.03)
+    assert xr.open_zarr(folder / "w.zarr").sizes["point"] == json.loads(done.stdout)["accepted"]
 
 
 def test_nowhere_is_exit_code_1(folder):
@@ -103,6 +116,11 @@ def test_checkpoint_then_resume(folder):
         (("--resume", "mass.yaml"), "mass.yaml: is no checkpoint of towline"),
         (("--resume", "a", "--checkpoint", "b"), "--checkpoint: b beside --resume a"),
         (("--resume", "a", "--out", "a"), "a: is the checkpoint"),
+        (("--mesh", "m.stl", "--box", "0 0 0; 1 1 0"), "box: from"),
+        (
+            ("--mesh", "m.stl", "--attitude", "0 0 0; 0 0 1"),
+            "--mesh: m.stl of a region whose attitude or carriers vary",
+        ),
         (("--resume", "/proc/a"), "/proc/a: cannot be written"),
     ],
 )

@@ -11,7 +11,6 @@ from towline.models import Dynamics, Robot, load
 from towline.workspace import Places, Region, StaticEquilibrium, sample, save
 from towline.workspace.domain import Domain
 from towline.workspace.halton import halton
-from towline.workspace.outcome import wilson
 from towline.workspace.sampling import CHUNK, Sampler, cells_of
 
 REST = StaticEquilibrium()
@@ -153,16 +152,6 @@ def test_a_slice_has_an_area():
     assert found.sizes["z"] == 1
 
 
-def test_interval_holds_as_often_as_it_says():
-    """Of many small experiments with a known share."""
-    share, samples = 0.03, 200
-    seen = np.random.default_rng(0).binomial(samples, share, size=4000)
-    inside = [low <= share <= high for low, high in (wilson(int(k), samples) for k in seen)]
-    assert 0.93 < np.mean(inside) < 0.985
-    assert wilson(0, 10)[0] == 0
-    assert wilson(10, 10)[1] == 1
-
-
 def test_positions_that_follow_from_lengths():
     """Each cable of a sampled place is as long as it was told, wherever the robots drove; the lower of the two."""
     robot = towed_body()
@@ -206,6 +195,16 @@ def test_two_workers_find_the_same_to_the_last_bit(tmp_path):
     pose = np.hstack([read["position"].values, read["attitude"].values])[:2000]
     carriers = np.tile(robot.carrier_home, (2000, 1, 1))
     np.testing.assert_array_equal(REST.holds(robot, Places(pose, carriers)), read["accepted"].values[:2000])
+
+
+def test_a_zarr_folder_has_the_same_as_the_file(tmp_path):
+    pytest.importorskip("zarr")
+    found = sample(hanging_mass(), REST, {"position": BOX}, 20_000, keep="all")
+    in_file = xr.load_dataset(save(found, tmp_path / "found.nc"))
+    folder = save(found, tmp_path / "found.zarr")
+    xr.testing.assert_identical(xr.open_zarr(folder).load(), in_file)
+    with pytest.raises(InputError, match="is there already"):
+        save(found, folder)
 
 
 def test_what_is_kept():

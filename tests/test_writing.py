@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from towline.errors import InputError
-from towline.writing import check_writable, whole_file
+from towline.writing import check_writable, whole_file, whole_folder
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -53,3 +53,15 @@ def test_links_are_followed_and_permissions_kept(tmp_path):
     assert link.is_symlink()
     assert real.read_text() == "after"
     assert stat.S_IMODE(real.stat().st_mode) == 0o640
+
+
+def test_a_folder_comes_whole_or_not_at_all(tmp_path):
+    with whole_folder(tmp_path / "new") as temporary:
+        (temporary / "part").write_text("a")
+        assert not (tmp_path / "new").exists()
+    assert (tmp_path / "new" / "part").read_text() == "a"
+    with pytest.raises(InputError, match="is there already; accepted: a new path"), whole_folder(tmp_path / "new"):
+        pass
+    with pytest.raises(RuntimeError), whole_folder(tmp_path / "other"):
+        raise RuntimeError("in the middle")
+    assert os.listdir(tmp_path) == ["new"]

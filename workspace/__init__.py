@@ -5,6 +5,7 @@ Conditions stand alone or are joined by & and |; `sample` asks them. `pose_probl
 """
 
 from .balance import make_ready
+from .boundary import boundary
 from .condition import AllOf, AnyOf, Condition, condition_from
 from .conditions import (
     Dynamic,
@@ -41,6 +42,7 @@ __all__ = [
     "WrenchClosure",
     "WrenchFeasible",
     "WrenchWithTolerance",
+    "boundary",
     "condition_from",
     "hints",
     "make_ready",

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..models import Robot
 from ..models.robot import COORDINATES, Box
-from .balance import anchors, attachments
+from .hanging import hanging
 from .places import Places
 from .region import AngleBox, Region, reach_boxes, surrounding_box
 
@@ -137,37 +137,10 @@ class Domain:
             where[:, :, :3] = values[:, 6 : 6 + 3 * carriers].reshape(count, carriers, 3)
         if not self.hangs:
             return Places(pose, where), np.ones(count, dtype=bool)
-        pose[:, :3], exists = self._hang(pose, where, values[:, -3:])
+        pose[:, :3] = hanging(self.robot, pose[:, 3:], where, values[:, -3:])
+        exists = np.isfinite(pose[:, 0])
+        pose[~exists, :3] = self.robot.home[:3]
         return Places(pose, where), exists
-
-    def _hang(self, pose: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where spheres about three points meet, the lower of two; home where they do not.
-
-        The sphere of cable i has its centre at A_i - R b_i and the radius l_i.
-        """
-        centred = pose.copy()
-        centred[:, :3] = 0.0
-        at = Places(centred, carriers)
-        first, second, third = np.moveaxis(anchors(self.robot, at) - attachments(self.robot, at), 1, 0)  # (n, 3) each
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ex, span = _unit(second - first)
-            i = np.sum(ex * (third - first), axis=1)
-            ey, j = _unit(third - first - i[:, None] * ex)
-            squares = lengths**2
-            x = (squares[:, 0] - squares[:, 1] + span**2) / (2 * span)
-            y = (squares[:, 0] - squares[:, 2] + i**2 + j**2 - 2 * i * x) / (2 * j)
-            height = squares[:, 0] - x**2 - y**2
-            ez = np.cross(ex, ey)
-            ez *= np.where(ez @ np.array(self.robot.gravity) < 0, -1.0, 1.0)[:, None]
-            found = first + x[:, None] * ex + y[:, None] * ey + np.sqrt(np.maximum(height, 0))[:, None] * ez
-        exists = (height >= 0) & np.isfinite(found).all(axis=1)
-        return np.where(exists[:, None], found, self.robot.home[:3]), exists
-
-
-def _unit(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (n, 3) and lengths (n,)."""
-    length = np.sqrt(np.sum(vectors**2, axis=1))
-    return vectors / length[:, None], length
 
 
 def _carrier_boxes(robot: Robot, region: Region) -> dict[str, Box]:

@@ -9,12 +9,11 @@ import numpy as np
 from .domain import Domain
 from .refinement import Refinement
 from .tally import Tally, cells_of_counts, width_of
+from .volume import LEVEL, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr
 
-CONFIDENCE = 0.95
-_NORMAL_QUANTILE = 1.959963984540054  # of (1 + CONFIDENCE) / 2
 AXES, ANGLES = ["x", "y", "z"], ["roll", "pitch", "yaw"]
 
 
@@ -118,21 +117,10 @@ def _measures(
         value = np.count_nonzero(counts[1]) / counts[1].size
         ends, told = (np.nan, np.nan), "none: positions are not uniform; the volume is that of the cells reached"
     else:
-        value, ends = accepted / tried, wilson(accepted, tried)
-        told = f"Wilson's interval at {CONFIDENCE:.0%}, of independent samples"
+        value, ends = accepted / tried, share_interval(accepted, tried)
+        told = f"interval of Clopper and Pearson at {LEVEL:.0%}, of independent samples"
     unit = {"units": domain.measure_unit}
     return {
         "volume": ((), whole * value, unit),
         "volume_interval": (("end",), [whole * end for end in ends], {**unit, "long_name": told}),
     }
-
-
-def wilson(accepted: int, samples: int) -> tuple[float, float]:
-    """Wilson's interval of a share, of which `accepted` of `samples` independent samples were seen."""
-    z = _NORMAL_QUANTILE
-    share = accepted / samples
-    middle = share + z**2 / (2 * samples)
-    half = z * np.sqrt(share * (1 - share) / samples + z**2 / (4 * samples**2))
-    low, high = (middle - half) / (1 + z**2 / samples), (middle + half) / (1 + z**2 / samples)
-    # Both ends are exact where all samples agree; rounding is not.
-    return float(low) if accepted else 0.0, float(high) if accepted < samples else 1.0

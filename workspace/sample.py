@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from ..models import Robot
-from ..writing import whole_file
+from ..writing import whole_file, whole_folder
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
 from .domain import Domain
@@ -102,9 +103,9 @@ def sample(
             Of the accepted positions; nan where there are none.
         volume, volume_interval (end) [m^3]
             Share of the samples that was accepted times the volume of the box, the mean over what varies beside the
-            position, with Wilson's interval at 95 %: an area or a length of a box without thickness along some axes.
-            With `lengths`: of the cells reached, no interval. Adaptive: between the cells that lie inside, and these
-            with those that the boundary passes through.
+            position, with the interval of Clopper and Pearson at 95 %: an area or a length of a box without thickness
+            along some axes. With `lengths`: of the cells reached, no interval. Adaptive: between the cells that lie
+            inside, and these with those that the boundary passes through.
         boundary (cell, axis) [m], cell_edges (axis) [m]
             Of adaptive: centres of the smallest cells with corners that differ, and their edges.
 
@@ -170,22 +171,33 @@ def sample(
 
 
 def save(found: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save what `sample` found as NetCDF, whole or not at all; `xarray.load_dataset` reads it.
+    """Save what `sample` found, whole or not at all: as NetCDF, or as a Zarr folder if the path ends in .zarr.
 
-    What is of the run and not of the result, as the seconds it took, is left out: equal results are equal files.
+    `xarray.load_dataset` reads the one, `xarray.open_zarr` the other (extra `cluster`). What is of the run and not of
+    the result, as the seconds it took, is left out: equal results are equal NetCDF files.
 
     Raises
     ------
     InputError
-        If the place cannot be written to.
+        If the place cannot be written to, or is a Zarr folder that is there already.
     """
     path = Path(file)
     lasting = found.copy(deep=False)
     lasting.attrs = {name: value for name, value in found.attrs.items() if name not in OF_THIS_RUN}
+    if path.suffix == ".zarr":
+        return _save_zarr(lasting, path)
     packed = {"zlib": True, "complevel": 1}
     encoding = {str(name): packed for name, variable in lasting.data_vars.items() if variable.size > CHUNK}
     with whole_file(path) as temporary:
         lasting.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    return path
+
+
+def _save_zarr(found: xr.Dataset, path: Path) -> Path:
+    if find_spec("zarr") is None:
+        raise InputError(f"{path}: zarr is not installed; accepted: pip install 'towline[cluster]', or a path to .nc")
+    with whole_folder(path) as temporary:
+        found.to_zarr(temporary, mode="w", zarr_format=2, consolidated=True)
     return path
 
 

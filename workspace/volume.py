@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 
-__all__ = ["Volume", "volume"]
+__all__ = ["LEVEL", "Volume", "share_interval", "volume"]
+
+LEVEL = 0.95
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Volume:
         return f"{self.value:.4g} ({self.low:.4g} to {self.high:.4g} at {100 * self.level:g} %)"
 
 
-def volume(accepted: int, samples: int, box: float, level: float = 0.95) -> Volume:
+def volume(accepted: int, samples: int, box: float, level: float = LEVEL) -> Volume:
     """Estimate a volume from independent samples that were uniform in a box.
 
     Samples of a low-discrepancy sequence or a grid are more even than chance: for them the interval is wider than need
@@ -68,9 +70,15 @@ def volume(accepted: int, samples: int, box: float, level: float = 0.95) -> Volu
         raise InputError(f"box: is {box}; accepted: a volume > 0")
     if not 0 < level < 1:
         raise InputError(f"level: is {level}; accepted: a number between 0 and 1")
-    from scipy.stats import beta
+    low, high = share_interval(accepted, samples, level)
+    return Volume(accepted / samples * box, low * box, high * box, level, int(accepted), int(samples))
+
+
+def share_interval(accepted: int, samples: int, level: float = LEVEL) -> tuple[float, float]:
+    """Interval of Clopper and Pearson of a share, of which `accepted` of `samples` independent samples were seen."""
+    from scipy.special import betaincinv
 
     tail = (1.0 - level) / 2.0
-    low = float(beta.ppf(tail, accepted, samples - accepted + 1)) if accepted else 0.0
-    high = float(beta.ppf(1.0 - tail, accepted + 1, samples - accepted)) if accepted < samples else 1.0
-    return Volume(accepted / samples * box, low * box, high * box, level, int(accepted), int(samples))
+    low = float(betaincinv(accepted, samples - accepted + 1, tail)) if accepted else 0.0
+    high = float(betaincinv(accepted + 1, samples - accepted, 1.0 - tail)) if accepted < samples else 1.0
+    return low, high

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...models.robot import Box, Finite, NonNegative, Part, Positive, Vector3
+from ...models import shapes
+from ...models.robot import Box, Finite, NonNegative, Part, Positive
 
 Distance = Annotated[NonNegative | None, Field(description="[m]; null: may be anywhere")]
 
@@ -47,35 +48,16 @@ class KeepOut(Part):
     cables: Distance = 0.0
 
 
-class Sphere(KeepOut):
-    """A ball."""
-
-    kind: Literal["sphere"]
-    centre: Vector3 = Field(description="in its frame [m]")
-    radius: Positive = Field(description="[m]")
+class Sphere(KeepOut, shapes.Sphere):
+    """A ball to keep out of."""
 
 
-class Capsule(KeepOut):
-    """All points within `radius` of the line from `start` to `end`."""
-
-    kind: Literal["capsule"]
-    start: Vector3 = Field(description="in its frame [m]")
-    end: Vector3 = Field(description="in its frame [m]")
-    radius: Positive = Field(description="[m]")
+class Capsule(KeepOut, shapes.Capsule):
+    """A capsule to keep out of."""
 
 
-class Block(KeepOut):
-    """A box along the axes of its frame."""
-
-    kind: Literal["box"]
-    min: Vector3 = Field(description="corner in its frame [m]")
-    max: Vector3 = Field(description="corner in its frame [m]")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if any(low >= high for low, high in zip(self.min, self.max, strict=True)):
-            raise ValueError(f"min: {self.min} is not below max: {self.max}; accepted: smaller in each coordinate")
-        return self
+class Block(KeepOut, shapes.Block):
+    """A box to keep out of."""
 
 
 AnyKeepOut = Annotated[Sphere | Capsule | Block, Field(discriminator="kind")]

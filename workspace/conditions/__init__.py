@@ -4,7 +4,7 @@ from .dynamic import Dynamic
 from .equilibrium_posture import EquilibriumPosture
 from .exists_placement import ExistsPlacement
 from .force_balance import ForceBalance
-from .interference import BoxObstacle, CapsuleObstacle, Interference, SphereObstacle
+from .interference import Interference
 from .lengths import Lengths
 from .margin import Margin
 from .static_equilibrium import StaticEquilibrium
@@ -13,8 +13,6 @@ from .wrench_feasible import WrenchFeasible
 from .wrench_with_tolerance import WrenchWithTolerance
 
 __all__ = [
-    "BoxObstacle",
-    "CapsuleObstacle",
     "Dynamic",
     "EquilibriumPosture",
     "ExistsPlacement",
@@ -22,7 +20,6 @@ __all__ = [
     "Interference",
     "Lengths",
     "Margin",
-    "SphereObstacle",
     "StaticEquilibrium",
     "WrenchClosure",
     "WrenchFeasible",

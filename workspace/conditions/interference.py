@@ -7,55 +7,24 @@ Detection, 5.1.9; whether a segment enters a box: its 5.3.3.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...models import Robot
-from ...models.robot import Box, NonNegative, Part, Positive, Vector3
+from ...models.robot import Box, NonNegative
+from ...models.shapes import Block, Capsule, Sphere
 from ..balance import anchors, attachments, in_platform
 from ..condition import Condition
 from ..places import Places
 
-__all__ = ["BoxObstacle", "CapsuleObstacle", "Interference", "SphereObstacle"]
+__all__ = ["Interference"]
 
 _BISECTIONS = 40  # of a cable: its point nearest to a box, to 1e-12 of its length
 
 
-class SphereObstacle(Part):
-    """A ball."""
-
-    kind: Literal["sphere"]
-    centre: Vector3 = Field(description="in {G} [m]")
-    radius: Positive = Field(description="[m]")
-
-
-class CapsuleObstacle(Part):
-    """All within a radius of a segment."""
-
-    kind: Literal["capsule"]
-    start: Vector3 = Field(description="in {G} [m]")
-    end: Vector3 = Field(description="in {G} [m]")
-    radius: Positive = Field(description="[m]")
-
-
-class BoxObstacle(Part):
-    """A box along the axes of {G}."""
-
-    kind: Literal["box"]
-    min: Vector3 = Field(description="lowest corner in {G} [m]")
-    max: Vector3 = Field(description="highest corner in {G} [m]")
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
-            if low > high:
-                raise ValueError(f"min must not exceed max, but along {axis} min is {low:g} and max is {high:g}")
-        return self
-
-
-Obstacle = Annotated[SphereObstacle | CapsuleObstacle | BoxObstacle, Field(discriminator="kind")]
+Obstacle = Annotated[Sphere | Capsule | Block, Field(discriminator="kind")]
 
 
 class Interference(Condition):
@@ -69,7 +38,7 @@ class Interference(Condition):
     platform: Box | None = Field(
         default=None, description="the platform's body in its own frame, which no cable may enter [m]; none: no body"
     )
-    obstacles: tuple[Obstacle, ...] = Field(default=(), description="what cables keep away from")
+    obstacles: tuple[Obstacle, ...] = Field(default=(), description="in {G}, what cables keep away from")
     clearance: NonNegative = Field(default=0.0, description="least distance of cables and attachments from these [m]")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
@@ -120,9 +89,9 @@ def _apart(robot: Robot) -> list[tuple[int, int]]:
 
 def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
     """Distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; zero or less where they meet."""
-    if isinstance(obstacle, BoxObstacle):
+    if isinstance(obstacle, Block):
         return _from_box(np.array(obstacle.min), np.array(obstacle.max), p, p_end)
-    if isinstance(obstacle, SphereObstacle):
+    if isinstance(obstacle, Sphere):
         start = end = np.array(obstacle.centre)
     else:
         start, end = np.array(obstacle.start), np.array(obstacle.end)
