@@ -6,11 +6,11 @@ import pickle
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
+from scipy.optimize import linprog, lsq_linear
 from scipy.spatial.transform import Rotation
 
 from towline.errors import InputError
-from towline.models import Dynamics, load
+from towline.models import Dynamics, Robot, load
 from towline.models.statics import equilibria
 from towline.solvers import capacity_margin, solve
 from towline.workspace import (
@@ -221,6 +221,48 @@ def test_a_placement_that_is_found_is_one():
     np.testing.assert_array_equal(found, [True, True, False])
 
 
+def test_what_is_lacking_is_nothing_where_a_condition_holds():
+    """And for a point mass it is the distance from the weight to the cables' cone, along some direction."""
+    for name, kinds in {
+        "wang-flying": (StaticEquilibrium(), Margin(above=1.0), WrenchFeasible(box=CUBE), Lengths(max=1.2)),
+        "point-mass-3": (ForceBalance(), StaticEquilibrium() & Lengths(max=4.0), ForceBalance() | Lengths(max=3.0)),
+    }.items():
+        robot, places = some_places(name, 500)
+        for condition in kinds:
+            lacks, held = condition.lacks(robot, places), condition.holds(robot, places)
+            assert (lacks >= 0).all()
+            np.testing.assert_array_equal(lacks == 0, held)
+            assert held.any() or name == "wang-flying"
+            assert not held.all()
+
+
+def test_a_search_that_goes_downhill_finds_more_than_points_alone():
+    """Of the same number of tries; and a second derivation of where three free robot-ends can hold a point.
+
+    With attachments in the middle and no turn: the weight is in the cone of three boxes if and only if a linear program
+    over the boxes' corners has a solution.
+    """
+    data = load("wang-ctmrts").model_dump(mode="json")
+    data["cables"] = [cable | {"attachment": [0.0, 0.0, 0.0], "t_max": 1e6} for cable in data["cables"]]
+    robot = Robot.model_validate(data)
+    poses = np.zeros((300, 6))
+    poses[:, :3] = np.random.default_rng(3).uniform([0.1, 0.2, 0.2], [2.4, 2.2, 0.9], (300, 3))
+    places = Places.at_home(robot, poses)
+    truth = np.array([held_by_corners(robot, pose[:3]) for pose in poses])
+    found = ExistsPlacement(condition=ForceBalance(), tries=256).holds(robot, places)
+    assert not (found & ~truth).any()
+    assert (found & truth).sum() > 0.97 * truth.sum()
+    assert 0.1 < truth.mean() < 0.9
+
+
+def held_by_corners(robot, position):
+    corners = [
+        np.array(list(itertools.product(*zip(one.reach.min, one.reach.max, strict=True)))) for one in robot.carriers
+    ]
+    directions = np.vstack(corners) - position
+    return linprog(np.zeros(len(directions)), A_eq=directions.T, b_eq=[0, 0, 1.0]).status == 0
+
+
 def test_places_of_fixed_length_have_it():
     """What is found has carriers in their boxes at 1.2 m: a condition that asks for the length says so."""
     data = load("wang-ctmrts").model_dump() | {"drive": "fixed-length"}
@@ -267,13 +309,17 @@ def test_cables_keep_away_from_obstacles():
     ends = places.pose[:, None, :3] + np.einsum("nij,mj->nmi", turned, robot.attachments)
     points = robot.home_anchors[None, :, None] * (1 - shares) + ends[:, :, None] * shares  # (n, m, 801, 3)
     low, high, centre = np.array([0.5, 0.5, 1.5]), np.array([1.0, 1.5, 2.5]), np.array([-1.0, 0.5, 2.0])
+    tip = np.array([0.0, 0.0, -1.5])  # of the capsule, from the centre
+    within = np.clip((points - centre) @ tip / (tip @ tip), 0, 1)[..., None]
     away = {
         "box": np.linalg.norm(points - np.clip(points, low, high), axis=-1),
         "sphere": np.linalg.norm(points - centre, axis=-1) - 0.3,
+        "capsule": np.linalg.norm(points - centre - tip * within, axis=-1) - 0.2,
     }
     obstacles = {
         "box": {"kind": "box", "min": low.tolist(), "max": high.tolist()},
         "sphere": {"kind": "sphere", "centre": centre.tolist(), "radius": 0.3},
+        "capsule": {"kind": "capsule", "start": centre.tolist(), "end": (centre + tip).tolist(), "radius": 0.2},
     }
     for kind, distance in away.items():
         least = distance.min(axis=(1, 2))
@@ -281,6 +327,24 @@ def test_cables_keep_away_from_obstacles():
         held = Interference(obstacles=[obstacles[kind]], clearance=0.1).holds(robot, places)
         np.testing.assert_array_equal(held[sure], least[sure] > 0.1)
         assert 0 < held.sum() < 80
+
+
+def test_cables_keep_apart():
+    """Least distance of two cables that share no end: bounded least squares over where on each."""
+    robot, places = some_places("ipanema-2", 40, turn=0.6)
+    least = np.full(len(places), np.inf)
+    for place, pose in enumerate(places.pose):
+        ends = pose[:3] + robot.attachments @ Rotation.from_euler("ZYX", pose[5:2:-1]).as_matrix().T
+        along = ends - robot.home_anchors
+        for i, j in itertools.combinations(range(robot.m), 2):
+            between = robot.home_anchors[j] - robot.home_anchors[i]
+            if np.linalg.norm(between) > 0 and np.linalg.norm(robot.attachments[i] - robot.attachments[j]) > 0:
+                nearest = lsq_linear(np.stack([along[i], -along[j]], axis=1), between, bounds=(0, 1), method="bvls")
+                least[place] = min(least[place], np.sqrt(2 * nearest.cost))
+    distance = float(np.median(least))
+    held = Interference(between_cables=distance).holds(robot, places)
+    np.testing.assert_array_equal(held, least >= distance)
+    assert 10 < held.sum() < 30
 
 
 def test_no_cable_runs_through_the_platform():

@@ -23,6 +23,7 @@ __all__ = [
     "can_give",
     "dynamics_of",
     "in_platform",
+    "lacking",
     "make_ready",
     "matrices",
     "rest_wrench",
@@ -108,6 +109,22 @@ def can_give(
                 break
         given[part.start + left] = True
     return given
+
+
+def lacking(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+    """How far at least the wrenches (k, 6) are from what tensions inside their limits give: the farthest, (n,) [N].
+
+    That is the shortfall of the proofs that the batch solver finds: zero exactly where `can_give` says yes.
+    """
+    rows = rows_of(robot) if rows is None else rows
+    wanted = wrenches[:, rows] * np.where(rows < 3, 1.0, 1.0 / robot.length)
+    missing = np.zeros(len(places))
+    for part, A in matrices(robot, places, rows):
+        for w in wanted:
+            solved = solve_batch(A, w, robot.t_min, robot.t_max, threads=1)
+            short = np.where(solved.feasible, 0.0, np.nan_to_num(solved.shortfall, nan=np.inf))
+            missing[part] = np.maximum(missing[part], short)
+    return missing
 
 
 def anchors(robot: Robot, places: Places) -> np.ndarray:

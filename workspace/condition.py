@@ -57,6 +57,13 @@ class Condition(Part, ABC):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         """Answer for places of finite numbers, (n,) of bool."""
 
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """How much is missing, (n,): zero exactly where the condition holds, a slope towards it for those who search.
+
+        In a unit of the condition's own; here 1 where it does not hold. Numbers of the places have to be finite.
+        """
+        return np.where(self.holds(robot, places), 0.0, 1.0)
+
     def __and__(self, other: Condition) -> AllOf:
         """Both hold."""
         return AllOf(kind="all", conditions=(*_parts(self, AllOf), *_parts(other, AllOf)))
@@ -96,6 +103,10 @@ class AllOf(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return _one_by_one(self.conditions, robot, places, undecided=True)
 
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """The sum of what each lacks, each as a share of 1: x / (1 + x)."""
+        return np.sum([_share(one.lacks(robot, places)) for one in self.conditions], axis=0)
+
 
 class AnyOf(Condition):
     """At least one of some conditions holds. They are asked in their order, each only where none before it holds."""
@@ -105,6 +116,14 @@ class AnyOf(Condition):
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return _one_by_one(self.conditions, robot, places, undecided=False)
+
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """What that one lacks which lacks least, as a share of 1: x / (1 + x)."""
+        return np.min([_share(one.lacks(robot, places)) for one in self.conditions], axis=0)
+
+
+def _share(amount: np.ndarray) -> np.ndarray:
+    return 1.0 - 1.0 / (1.0 + amount)
 
 
 def _parts(condition: Condition, joined: type[AllOf] | type[AnyOf]) -> tuple[Condition, ...]:

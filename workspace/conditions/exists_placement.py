@@ -1,7 +1,9 @@
 """For robots whose carriers can be placed: somewhere in their reach boxes a condition holds.
 
-The placements tried are the same for every place, points of a scrambled Sobol sequence in the product of the boxes, so
-that the answer for a place depends on nothing else. It is one-sided: yes is proved by a placement, no is "not found".
+Half of the placements tried are points of a scrambled Sobol sequence in the product of the boxes. From the best of
+them, by what the condition says it lacks there, the others are ever smaller steps, each taken if less is lacking after
+it. Both are the same for every place, so that the answer for a place depends on nothing else. It is one-sided: yes is
+proved by a placement, no is "not found".
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ from ..places import Places
 __all__ = ["ExistsPlacement"]
 
 ROUNDS = 6  # from a box to a sphere and back
+UNFIT = 1e12  # more than any condition lacks where the carriers fit
+LARGEST_STEP, SMALLEST_STEP = 0.5, 0.02  # of a box, or of all turns
 
 
 class ExistsPlacement(Condition):
@@ -56,33 +60,54 @@ class ExistsPlacement(Condition):
         held = np.zeros(len(places), dtype=bool)
         if robot.drive != "fixed-length":
             held = self.condition.holds(robot, places)
-        for shares in _shares(3 * len(mobile) + 3, self.tries, self.seed):
-            left = np.flatnonzero(~held)
-            if not left.size:
-                break
-            placed, fits = self._place(robot, mobile, places.only(left), shares)
-            left, placed = left[fits], placed.only(fits)
-            held[left] = self.condition.holds(robot, placed)
+        searched = np.flatnonzero(~held)
+        if searched.size:
+            held[searched] = self._found(robot, mobile, places.only(searched))
         return held
 
+    def _found(self, robot: Robot, mobile: list[int], places: Places) -> np.ndarray:
+        """Whether a placement is found, (n,) of bool."""
+        points, steps = _search(3 * len(mobile) + 3, self.tries, self.seed)
+        least = np.full(len(places), np.inf)
+        best = np.zeros((len(places), points.shape[1]))
+        for try_, move in enumerate([*points, *steps]):
+            left = np.flatnonzero(least > 0)
+            if not left.size:
+                break
+            shares = np.clip(move if try_ < len(points) else best[left] + move, 0.0, 1.0)
+            shares = np.broadcast_to(shares, best[left].shape)
+            lacks = self._lacks(robot, mobile, places.only(left), shares)
+            better = lacks < least[left]
+            least[left[better]], best[left[better]] = lacks[better], shares[better]
+        return least == 0
+
+    def _lacks(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> np.ndarray:
+        """What the condition lacks there, (n,); more than that where the carriers do not fit."""
+        placed, beyond = self._place(robot, mobile, places, shares)
+        lacks = UNFIT * (1.0 + beyond)
+        fits = np.flatnonzero(beyond == 0)
+        if fits.size:
+            lacks[fits] = np.minimum(self.condition.lacks(robot, placed.only(fits)), UNFIT)
+        return lacks
+
     def _place(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> tuple[Places, np.ndarray]:
-        """Places with the carriers at `shares` of their boxes, and whether all of them fit there."""
+        """Places with the carriers at `shares` (n, d) of their boxes, and how far from fitting there, (n,) [m]."""
         pose, carriers = places.pose.copy(), places.carriers.copy()
         if self.turn:
-            pose[:, 3:] += self.turn * (2.0 * shares[-3:] - 1.0) * robot.dof_mask[3:]
+            pose[:, 3:] += self.turn * (2.0 * shares[:, -3:] - 1.0) * robot.dof_mask[3:]
         boxes = {i: carrier.reach for i, carrier in enumerate(robot.carriers) if isinstance(carrier, MobileCarrier)}
         for k, i in enumerate(mobile):
             low, high = np.array(boxes[i].min), np.array(boxes[i].max)
-            carriers[:, i, :3] = low + shares[3 * k : 3 * k + 3] * (high - low)
+            carriers[:, i, :3] = low + shares[:, 3 * k : 3 * k + 3] * (high - low)
         placed = Places(pose, carriers)
-        fits = np.ones(len(places), dtype=bool)
+        beyond = np.zeros(len(places))
         if robot.fixed_lengths is not None:
             ends, starts = attachments(robot, placed), anchors(robot, placed)
             for cable, i in enumerate(robot.carrier_of_cable):
                 away, length = starts[:, cable] - ends[:, cable], robot.fixed_lengths[cable]
                 shift = _onto_sphere(away, length) - away
                 if i not in mobile:
-                    fits &= np.abs(shift).max(axis=-1) <= 1e-9
+                    beyond += _more_than_rounding(np.abs(shift).max(axis=-1))
                     continue
                 low = np.array(boxes[i].min) - carriers[:, i, :3] + away
                 high = np.array(boxes[i].max) - carriers[:, i, :3] + away
@@ -91,24 +116,31 @@ class ExistsPlacement(Condition):
                 for _ in range(ROUNDS):
                     at = np.clip(_onto_sphere(at, length), low, high)
                 at = _onto_sphere(at, length)
-                fits &= np.all((at >= low - 1e-9) & (at <= high + 1e-9), axis=-1)
+                beyond += _more_than_rounding(np.maximum(low - at, at - high).max(axis=-1))
                 carriers[:, i, :3] += at - away
-        return placed, fits
+        return placed, beyond
 
 
 def _onto_sphere(away: np.ndarray, length: float) -> np.ndarray:
     return away * (length / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12))
 
 
-@lru_cache(maxsize=4)
-def _shares(dimensions: int, count: int, seed: int) -> np.ndarray:
-    """Numbers of (0, 1) that fill the cube evenly, (count, dimensions); every other row is at a corner of the boxes.
+def _more_than_rounding(distance: np.ndarray) -> np.ndarray:
+    return np.where(distance > 1e-9, distance, 0.0)
 
-    Where a condition only just holds, carriers are at the ends of their reach. The last three numbers, which turn the
-    platform, stay inside.
+
+@lru_cache(maxsize=4)
+def _search(dimensions: int, tries: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points of [0, 1] that fill the cube evenly, and steps from the best of them, (k, dimensions) each.
+
+    Every other point is at a corner of the boxes: where a condition only just holds, carriers are at the ends of their
+    reach. The last three numbers, which turn the platform, stay inside.
     """
     from scipy.stats import qmc
 
-    shares = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(int(count - 1).bit_length())[:count]
-    shares[::2, :-3] = np.round(shares[::2, :-3])
-    return shares
+    count = (tries + 1) // 2
+    rng = np.random.default_rng(seed)
+    points = qmc.Sobol(dimensions, rng=rng).random_base2(int(count - 1).bit_length())[:count]
+    points[::2, :-3] = np.round(points[::2, :-3])
+    sizes = np.geomspace(LARGEST_STEP, SMALLEST_STEP, max(tries - count, 1))[: tries - count]
+    return points, rng.normal(size=(tries - count, dimensions)) * sizes[:, None]

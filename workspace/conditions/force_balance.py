@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
-from ..balance import can_give, rest_wrench, rows_of
+from ..balance import can_give, lacking, rest_wrench, rows_of
 from ..condition import Condition
 from ..places import Places
 
@@ -26,3 +26,7 @@ class ForceBalance(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         rows = rows_of(robot, forces_only=True)
         return can_give(robot, places, rest_wrench(robot)[None], rows)
+
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """How far the weight is from what the cables can give, (n,) [N]."""
+        return lacking(robot, places, rest_wrench(robot)[None], rows_of(robot, forces_only=True))

@@ -26,6 +26,10 @@ class Margin(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return self.margins(robot, places) >= self.above
 
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """How much the margin is below the value, (n,) [N]."""
+        return np.maximum(self.above - self.margins(robot, places), 0.0)
+
     def margins(self, robot: Robot, places: Places) -> np.ndarray:
         """Signed distances of the wrench of rest from the boundary of the available wrench set, (n,) [N].
 

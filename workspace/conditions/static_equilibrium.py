@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
-from ..balance import can_give, rest_wrench
+from ..balance import can_give, lacking, rest_wrench
 from ..condition import Condition
 from ..places import Places
 
@@ -21,3 +21,7 @@ class StaticEquilibrium(Condition):
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return can_give(robot, places, rest_wrench(robot)[None])
+
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """How far the weight is from what the cables can give, moments divided by `Robot.length`, (n,) [N]."""
+        return lacking(robot, places, rest_wrench(robot)[None])

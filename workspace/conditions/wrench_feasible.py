@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from ...models import Robot
 from ...models.robot import Finite
-from ..balance import can_give, rest_wrench
+from ..balance import can_give, lacking, rest_wrench
 from ..condition import Condition
 from ..places import Places
 
@@ -52,6 +52,13 @@ class WrenchFeasible(Condition):
         return np.array(list(product(*[sorted({low, high}) for low, high in zip(*self.box, strict=True)])))
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+        return can_give(robot, places, self._wrenches(robot))
+
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """How far the farthest is from what the cables can give, moments divided by `Robot.length`, (n,) [N]."""
+        return lacking(robot, places, self._wrenches(robot))
+
+    def _wrenches(self, robot: Robot) -> np.ndarray:
         # What a coordinate that cannot move is pushed by, its guide takes.
         corners = np.unique(self.corners() * robot.dof_mask, axis=0)
-        return can_give(robot, places, rest_wrench(robot) - corners)
+        return rest_wrench(robot) - corners

@@ -31,6 +31,10 @@ class WrenchWithTolerance(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return self.error(robot, places) <= self.tolerance
 
+    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
+        """How much more than the tolerance the error is, (n,) [N]."""
+        return np.maximum(self.error(robot, places) - self.tolerance, 0.0)
+
     def error(self, robot: Robot, places: Places) -> np.ndarray:
         """Smallest wrench error that tensions inside the limits leave, (n,) [N]; infinite where a cable has none."""
         rows = rows_of(robot)
