@@ -65,6 +65,8 @@ def boundary(
 
     Parameters
     ----------
+    robot, condition
+        Whose positions, and what is to hold there.
     low, high
         Corners of the box to look in, (3,) in {G} [m].
     cells

@@ -39,7 +39,7 @@ class Condition(Part, ABC):
             Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Whether the condition holds, (n,) of bool; False where a number of the place is not finite.
+        """Whether the condition holds at each of n places, (n,) of bool; False where a number of one is not finite.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Condition(Part, ABC):
 
 
 def condition_from(data: Any) -> Condition:
-    """A condition from its mapping, as `model_dump` makes it or as a file has it.
+    """A condition from its data: a mapping, as `model_dump` makes it or as a file has it.
 
     Raises
     ------
