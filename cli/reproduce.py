@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="flying: the paper of the flying cable robot.")],
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="flying: the flying cable robot; ctmrts: the towing robots.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report, errata and figures; none: towline-PAPER.")
     ] = None,

@@ -63,6 +63,7 @@ def cross_sections(
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             middle, half = (low + high) / 2, 0.55 * max(float((high - low).max()), 1e-6)
+            ax.set_adjustable("box")  # the limits are what is to be equal
             ax.set_xlim(middle[0] - half, middle[0] + half)
             ax.set_ylim(middle[1] - half, middle[1] + half)
     return canvas
