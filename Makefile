@@ -4,12 +4,12 @@ BIN := .venv/bin
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
-.PHONY: demo test setup lint types unit clean
+.PHONY: demo test setup lint types unit docs errata clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
 
-test: lint types unit
+test: lint types docs unit
 
 setup: .venv/dev.stamp
 	$(INSTALL) ".[viewer,cluster,mujoco,timing,mesh,bench,notebooks,docs,dev]"
@@ -24,8 +24,19 @@ types: .venv/dev.stamp
 unit: .venv/dev.stamp
 	$(BIN)/python -m pytest -n 2
 
+# The documentation site, in site/; a warning is an error.
+docs: .venv/dev.stamp
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
+# The site's two pages of errata, from the papers computed again.
+errata: .venv/core.stamp
+	for paper in flying ctmrts; do \
+	  $(BIN)/towline reproduce $$paper --out build/$$paper && \
+	  cp build/$$paper/$$paper-errata.md docs/errata/$$paper.md || exit 1; \
+	done
+
 clean:
-	rm -rf .venv towline-demo build *.egg-info
+	rm -rf .venv towline-demo build site *.egg-info
 
 .venv/core.stamp: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'
@@ -34,5 +45,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,cluster,dev,mesh,mujoco,timing]"
+	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,timing]"
 	touch $@

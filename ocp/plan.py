@@ -91,7 +91,9 @@ class Planner:
 
     Parameters
     ----------
-    robot, task
+    robot
+        As for `plan`.
+    task
         As for `plan`.
 
     Raises

@@ -1,9 +1,9 @@
 r"""Newton's method for a point inside the limits: least of a square and logarithms of the distances to the limits.
 
-.. math::
-
-    \min_s \; \frac{c}{2} |s|^2 - \mu \sum_i \big( \log (s_i - lower_i) + \log (upper_i - s_i) \big)
-    \quad \text{s.t.} \quad Q s = b
+$$
+\min_s \; \frac{c}{2} |s|^2 - \mu \sum_i \big( \log (s_i - lower_i) + \log (upper_i - s_i) \big)
+\quad \text{s.t.} \quad Q s = b
+$$
 
 Far from the answer the plain Newton method crawls along the limits: with w not met yet, or with weights that differ by
 thousands, hundreds of short steps. So primal-dual steps (Wright 1997, chapter 5), in which each distance to a limit has

@@ -1,8 +1,8 @@
 r"""Method "closed-form": the pseudo-inverse about the middle of the limits.
 
-.. math::
-
-    t = t_m + A^+ (w - A t_m), \qquad t_m = (t_{min} + t_{max}) / 2
+$$
+t = t_m + A^+ (w - A t_m), \qquad t_m = (t_{min} + t_{max}) / 2
+$$
 
 With weights the pseudo-inverse is the weighted one. Of all tensions that give w, limits or not, these are the nearest
 to the middle; if they leave the limits although others would not, that is the method's known gap.

@@ -1,8 +1,8 @@
 r"""Method "dykstra": alternating projections on the equations and on the limits.
 
-.. math::
-
-    y = x + Q^T (b - Q x), \qquad x^+ = P_{box}(y + p), \qquad p^+ = y + p - x^+
+$$
+y = x + Q^T (b - Q x), \qquad x^+ = P_{box}(y + p), \qquad p^+ = y + p - x^+
+$$
 
 Without the correction p the iterates reach some feasible point; with it, the one nearest to where they start. Where p
 is not 0 a limit holds the cable: as soon as those cables are the right ones, the rest is one least-squares problem, and

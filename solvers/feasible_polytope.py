@@ -1,8 +1,8 @@
 r"""The feasible tensions as a polytope in the null space of the wrench matrix: its corners.
 
-.. math::
-
-    s = Q^T b + N^T \lambda, \qquad lower \le s \le upper, \qquad \lambda \in R^{m - rank}
+$$
+s = Q^T b + N^T \lambda, \qquad lower \le s \le upper, \qquad \lambda \in R^{m - rank}
+$$
 
 An interval for m - rank = 1, a polygon for 2 (Mikelsons et al. 2008; Lamaury and Gouttefarde 2013, who walk along the
 lines from corner to corner; with at most some tens of lines NumPy meets all of them pairwise in less time than Python

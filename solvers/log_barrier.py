@@ -1,10 +1,10 @@
 r"""Method "log-barrier": least squares to t_ref plus logarithms that keep the tensions off their limits.
 
-.. math::
-
-    \min_t \; \frac12 \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2
-    - \mu \sum_i \big( \log (t_i - t_{min,i}) + \log (t_{max,i} - t_i) \big)
-    \quad \text{s.t.} \quad A t = w
+$$
+\min_t \; \frac12 \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2
+- \mu \sum_i \big( \log (t_i - t_{min,i}) + \log (t_{max,i} - t_i) \big)
+\quad \text{s.t.} \quad A t = w
+$$
 """
 
 from typing import Any, ClassVar

@@ -1,8 +1,8 @@
 r"""Method "min-norm": pseudo-inverse plus null space, Eq. 16 and 17 of Wang, Zhao, Li, Ji (m robots towing one object).
 
-The paper prints :math:`T = J^T (J J^T)^{-1} w + N \lambda` with a scalar :math:`\lambda \in (0, 1)`. That inverse does
+The paper prints $T = J^T (J J^T)^{-1} w + N \lambda$ with a scalar $\lambda \in (0, 1)$. That inverse does
 not exist for fewer than six cables and one scalar cannot move along a null space of several dimensions, so here the
-pseudo-inverse comes from the singular value decomposition and :math:`\lambda \in R^{m - rank}` is the shortest one that
+pseudo-inverse comes from the singular value decomposition and $\lambda \in R^{m - rank}$ is the shortest one that
 brings the tensions inside their limits. T' and N lambda are orthogonal: the result is the least norm of all.
 """
 

@@ -1,9 +1,9 @@
 r"""Method "p-norm": least p-norm of the weighted distances to t_ref.
 
-.. math::
-
-    \min_t \; \sum_i \big| \sqrt{\omega_i} (t_i - t_{ref,i}) \big|^p
-    \quad \text{s.t.} \quad A t = w, \; t_{min} \le t \le t_{max}
+$$
+\min_t \; \sum_i \big| \sqrt{\omega_i} (t_i - t_{ref,i}) \big|^p
+\quad \text{s.t.} \quad A t = w, \; t_{min} \le t \le t_{max}
+$$
 """
 
 from typing import Any, ClassVar

@@ -22,10 +22,10 @@ _HEAVIEST, _LIGHTEST = 1e20, 1e-20
 class TensionProblem:
     r"""Tensions nearest to a wish that give a wrench inside the tension limits.
 
-    .. math::
-
-        \min_t \; \sum_i \omega_i (t_i - t_{ref,i})^2
-        \quad \text{s.t.} \quad A t = w, \; t_{min} \le t \le t_{max}
+    $$
+    \min_t \; \sum_i \omega_i (t_i - t_{ref,i})^2
+    \quad \text{s.t.} \quad A t = w, \; t_{min} \le t \le t_{max}
+    $$
 
     The arrays are copied, converted to float64 and set read-only. Entries smaller than 1e-50 count as 0, limits beyond
     1e50 as infinite.
@@ -157,12 +157,12 @@ class TensionProblem:
     def tolerance(self, tensions: Array) -> float:
         r"""Largest wrench error [N] at which `tensions` still count as giving w.
 
-        .. math::
+        $$
+        10^{-9} \Big( |S w| + \sum_i |S a_i| \, |\hat t_i| \Big)
+        + 10^{-13} \sum_i |S a_i| \, (|t_i| + |t_{ref,i}|)
+        $$
 
-            10^{-9} \Big( |S w| + \sum_i |S a_i| \, |\hat t_i| \Big)
-            + 10^{-13} \sum_i |S a_i| \, (|t_i| + |t_{ref,i}|)
-
-        with :math:`\hat t_i` the tension inside the limits that is nearest to 0: the first part is relative to what the
+        with $\hat t_i$ the tension inside the limits that is nearest to 0: the first part is relative to what the
         problem asks, never to a limit that happens to be huge; the second is the rounding of A t itself.
 
         Parameters

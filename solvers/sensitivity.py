@@ -2,11 +2,11 @@ r"""How the optimal tensions change with the problem: `sensitivity`, and `deriva
 
 With the cables H held at their limits and the others, F, free, the optimum is weighted least squares,
 
-.. math::
-
-    t_F = t_{ref,F} + W_F^{-1} A_F^T y, \qquad A_F t_F = w - A_H t_H
-    \quad \Rightarrow \quad
-    \frac{dt_F}{dw} = W_F^{-1/2} (S A_F W_F^{-1/2})^+ S, \qquad \frac{dt_H}{dw} = 0
+$$
+t_F = t_{ref,F} + W_F^{-1} A_F^T y, \qquad A_F t_F = w - A_H t_H
+\quad \Rightarrow \quad
+\frac{dt_F}{dw} = W_F^{-1/2} (S A_F W_F^{-1/2})^+ S, \qquad \frac{dt_H}{dw} = 0
+$$
 
 and the derivative with respect to A follows from that of the pseudo-inverse (Golub and Pereyra 1973).
 """

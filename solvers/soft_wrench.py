@@ -1,11 +1,11 @@
 r"""Method "soft-wrench": tensions for any wrench whatever, the required one if it is available.
 
-.. math::
+$$
+\min_t \; \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2 + \rho |S (A t - w)|^2
+\quad \text{s.t.} \quad t_{min} \le t \le t_{max}
+$$
 
-    \min_t \; \sum_i \frac{\omega_i}{\omega_{max}} (t_i - t_{ref,i})^2 + \rho |S (A t - w)|^2
-    \quad \text{s.t.} \quad t_{min} \le t \le t_{max}
-
-For :math:`\rho \to \infty` this is: project w on the available wrench set, then take the least squares to t_ref that
+For $\rho \to \infty$ this is: project w on the available wrench set, then take the least squares to t_ref that
 give the projection.
 """
 

@@ -1,8 +1,8 @@
 r"""The form in which every method sees the problem, whatever its units, scales and rank.
 
-.. math::
-
-    \min_s |s|^2 \quad \text{s.t.} \quad Q s = b, \; lower \le s \le upper
+$$
+\min_s |s|^2 \quad \text{s.t.} \quad Q s = b, \; lower \le s \le upper
+$$
 
 The rows of Q are orthonormal and s is of order one, so that a tolerance means the same for a toy and for a harbour
 crane. Cables with equal limits are gone: they are constants, and interior-point methods need room between limits. The

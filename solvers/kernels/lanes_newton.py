@@ -1,12 +1,12 @@
 r"""Sixteen problems at once with any number of cables: Newton's method on the dual.
 
 The dual of the bounded least norm has one unknown for each equation: with multipliers y the best s is
-:math:`s(y) = clip(B^T y)`, and y is right where
+$s(y) = clip(B^T y)$, and y is right where
 
-.. math::  r(y) = b - B s(y) - y / \rho = 0,
+$$ r(y) = b - B s(y) - y / \rho = 0, $$
 
 the gradient of a concave, piecewise quadratic function (1/rho is 0 where the wrench must be met). Newton's steps with
-:math:`H = B_F B_F^T + 1/\rho`, F the cables between their limits, end after as many as it takes to find F: three, most
+$H = B_F B_F^T + 1/\rho$, F the cables between their limits, end after as many as it takes to find F: three, most
 often. A step that goes too far is shortened to the best place on its way, by Newton again, in one dimension. Where the
 wrench is out of reach the dual has no maximum, and y, the step or r are soon directions that prove it. Whatever is not
 decided in a few steps, or rests on a pivot that is nearly zero, goes to `single`.

@@ -1,8 +1,8 @@
 r"""Bounded least norm in the null space of the wrench matrix, one problem at a time: behind "active-set".
 
-.. math::
-
-    \min_s |s|^2 \quad \text{s.t.} \quad B s = b, \; lower \le s \le upper, \qquad s = s_0 + N z
+$$
+\min_s |s|^2 \quad \text{s.t.} \quad B s = b, \; lower \le s \le upper, \qquad s = s_0 + N z
+$$
 
 B is reduced by Householder reflections from the right with row pivoting (B = P^T L Q_1^T; Golub and Van Loan, 5.4).
 That gives the least-norm s_0, orthogonal to the orthonormal null-space basis N; what remains is the z of least norm
