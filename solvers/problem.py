@@ -23,8 +23,8 @@ class TensionProblem:
     r"""Tensions nearest to a wish that give a wrench inside the tension limits.
 
     $$
-    \min_t \; \sum_i \omega_i (t_i - t_{ref,i})^2
-    \quad \text{s.t.} \quad A t = w, \; t_{min} \le t \le t_{max}
+    \min\limits_t \; \sum_i \omega_i (t_i - t_{\text{ref},i})^2
+    \quad \text{s.t.} \quad A t = w, \; t_{\min} \le t \le t_{\max}
     $$
 
     The arrays are copied, converted to float64 and set read-only. Entries smaller than 1e-50 count as 0, limits beyond
@@ -159,7 +159,7 @@ class TensionProblem:
 
         $$
         10^{-9} \Big( |S w| + \sum_i |S a_i| \, |\hat t_i| \Big)
-        + 10^{-13} \sum_i |S a_i| \, (|t_i| + |t_{ref,i}|)
+        + 10^{-13} \sum_i |S a_i| \, (|t_i| + |t_{\text{ref},i}|)
         $$
 
         with $\hat t_i$ the tension inside the limits that is nearest to 0: the first part is relative to what the
