@@ -249,6 +249,7 @@ def test_fewer_processors_inside_of_a_block():
         ({"resume": True}, "resume: needs a checkpoint"),
         ({"size": 0.1}, "size: method 'random' has no cells"),
         ({"method": "adaptive", "size": -1.0}, "size: is -1.0; accepted: a number > 0"),
+        ({"method": "adaptive", "size": "fine"}, "size: is 'fine'; accepted: a number > 0"),
         ({"method": "adaptive", "samples": 4}, "samples: is 4; accepted: 8 and more"),
         ({"region": {"position": {"min": [0, 0, 0], "max": [0, 0, 0]}}}, "is empty"),
         ({"region": {"position": {"min": [1, 0, 0], "max": [0, 1, 1]}}}, "along x min is 1 and max is 0"),
@@ -267,6 +268,11 @@ def test_wrong_input_is_one_line(arguments, message):
         sample(hanging_mass(), REST, **arguments)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_name_of_a_robot_is_no_robot():
+    with pytest.raises(InputError, match="robot: is 'wang-flying'; accepted: a Robot"):
+        sample("wang-flying", REST)
 
 
 def test_many_cables_have_no_place_by_lengths():

@@ -120,6 +120,8 @@ def sample(
         If workers end before their work, or the extra `cluster` is not there.
     """
     start = time.perf_counter()
+    if not isinstance(robot, Robot):
+        raise InputError(f"robot: is {robot!r}; accepted: a Robot, as load('wang-flying') returns it")
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
     region = _region(region)
     check_sampling(method, samples, seed)
@@ -188,8 +190,13 @@ def save(found: xr.Dataset, file: str | os.PathLike[str]) -> Path:
         return _save_zarr(lasting, path)
     packed = {"zlib": True, "complevel": 1}
     encoding = {str(name): packed for name, variable in lasting.data_vars.items() if variable.size > CHUNK}
-    with whole_file(path) as temporary:
-        lasting.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    # In memory first: HDF5 brings the process down, file left behind, where a disk is full.
+    content = lasting.to_netcdf(engine="h5netcdf", encoding=encoding)
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); accepted: a place with room") from None
     return path
 
 
