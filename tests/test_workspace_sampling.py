@@ -139,10 +139,7 @@ def test_refinement_reaches_the_size_and_covers_the_boundary():
     found = sample(hanging_mass(), REST, {"position": BOX}, 10**6, "adaptive", size=0.04)
     assert found["cell_edges"].max() <= 0.04
     low, high = found["volume_interval"].values
-    if method == "grid":
-        assert np.isnan([low, high]).all()  # no chance, no interval
-    else:
-        assert low < AREA < high
+    assert low < AREA < high
     # Its cells are where an edge of the triangle is, and all along it.
     x, y = found["boundary"].values[:, :2].T
     away = [x * np.cos(a) + y * np.sin(a) - RADIUS / 2 for a in np.array([1, 3, 5]) * np.pi / 3]
