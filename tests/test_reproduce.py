@@ -15,37 +15,38 @@ from towline.errors import SolverError
 from towline.figures import style
 from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load
-from towline.studies import (
-    account_text,
-    flying,
-    flying_balance,
-    flying_cable,
-    flying_disturbance,
-    flying_helix,
-    flying_instants,
-    flying_motion,
-    flying_pairing,
-    flying_parameters,
-    flying_plans,
-    flying_procedure,
-    flying_radius,
-    flying_rotations,
-    flying_vibration,
-    flying_wind,
+from towline.studies.accounts import text
+from towline.studies.accounts.account import Chapter, Paper, gather
+from towline.studies.accounts.claim import Verdict, compared, stated, told, undetermined
+from towline.studies.accounts.files import write
+from towline.studies.flying import (
+    balance,
+    cable,
+    disturbance,
+    helix,
+    instants,
+    motion,
+    pairing,
+    parameters,
+    plans,
+    procedure,
+    radius,
+    rotations,
+    study,
+    vibration,
+    wind,
 )
-from towline.studies.account import Chapter, Paper, gather
-from towline.studies.claim import Verdict, compared, stated, told, undetermined
 
 CHEAP = [
-    flying_parameters,
-    flying_pairing,
-    flying_rotations,
-    flying_cable,
-    flying_balance,
-    flying_procedure,
-    flying_wind,
-    flying_helix,
-    flying_disturbance,
+    parameters,
+    pairing,
+    rotations,
+    cable,
+    balance,
+    procedure,
+    wind,
+    helix,
+    disturbance,
 ]
 
 
@@ -91,7 +92,7 @@ def example(name, **broken):
 def test_an_account_is_written_from_the_same_claims(tmp_path):
     account = example("small")
     assert account.complete
-    files = account.write(tmp_path)
+    files = write(account, tmp_path)
     assert [file.relative_to(tmp_path).as_posix() for file in files] == [
         "small.md",
         "small.html",
@@ -121,7 +122,7 @@ def test_a_chapter_that_breaks_is_told_and_stops_no_other():
     assert not whole.complete
     assert len(whole.claims) == 2
     assert whole.broken == {"Two": "the solver fell over"}
-    assert "the solver fell over" in account_text.report(whole)
+    assert "the solver fell over" in text.report(whole)
     gather(Paper("p", "P"), {"One": lambda: Chapter([])}, lambda *told_so: seen.append(told_so))
     assert seen == [("One", 0, 1), ("done", 1, 1)]
 
@@ -156,27 +157,27 @@ def test_known_errata_are_found(claims):
 
 
 def test_table_1_is_read_back_and_a_misprint_is_seen(monkeypatch):
-    assert verdict(flying_parameters, "table-1-mass") is Verdict.REPRODUCED
-    monkeypatch.setitem(flying_parameters.PRINTED, "m_B", 1.3)
-    assert verdict(flying_parameters, "table-1-mass") is Verdict.DIFFERS
-    monkeypatch.setitem(flying_parameters.PRINTED, "I_z", 0.07)
-    assert verdict(flying_parameters, "table-1-gyration") is Verdict.REPRODUCED
-    monkeypatch.setitem(flying_parameters.PRINTED, "I_z", 1.7)
-    assert verdict(flying_parameters, "table-1-rigid") is Verdict.DIFFERS
-    monkeypatch.setattr(flying_parameters, "CIRCLE", 101.0)
-    assert verdict(flying_parameters, "eq-2-height") is Verdict.REPRODUCED
+    assert verdict(parameters, "table-1-mass") is Verdict.REPRODUCED
+    monkeypatch.setitem(parameters.PRINTED, "m_B", 1.3)
+    assert verdict(parameters, "table-1-mass") is Verdict.DIFFERS
+    monkeypatch.setitem(parameters.PRINTED, "I_z", 0.07)
+    assert verdict(parameters, "table-1-gyration") is Verdict.REPRODUCED
+    monkeypatch.setitem(parameters.PRINTED, "I_z", 1.7)
+    assert verdict(parameters, "table-1-rigid") is Verdict.DIFFERS
+    monkeypatch.setattr(parameters, "CIRCLE", 101.0)
+    assert verdict(parameters, "eq-2-height") is Verdict.REPRODUCED
 
 
 def test_other_printed_values_change_the_verdict(monkeypatch):
-    monkeypatch.setattr(flying_pairing, "ROWS", 3)
-    assert verdict(flying_pairing, "pairing") is Verdict.REPRODUCED
-    monkeypatch.setattr(flying_helix, "RADIUS", 0.2)
-    assert verdict(flying_helix, "fig-7-positive") is Verdict.REPRODUCED
+    monkeypatch.setattr(pairing, "ROWS", 3)
+    assert verdict(pairing, "pairing") is Verdict.REPRODUCED
+    monkeypatch.setattr(helix, "RADIUS", 0.2)
+    assert verdict(helix, "fig-7-positive") is Verdict.REPRODUCED
 
 
 def test_rates_and_accelerations_by_differences():
     """The derivatives that the equations are held against, by scipy's rotations at three instants."""
-    seen = flying_instants.instants()
+    seen = instants.instants()
     step = 1e-4
     angles, rates, bends = (part[:, 3:] for part in seen.base)
     before, now, after = (
@@ -194,12 +195,12 @@ def test_the_missing_newtons_of_the_helix(claims):
     from scipy.optimize import nnls
 
     dynamics = Dynamics(load("wang-flying"))
-    motion = flying_motion.circle(1.0)
-    tensions = flying_motion.steady_tensions(dynamics, motion)
+    turn = motion.circle(1.0)
+    tensions = motion.steady_tensions(dynamics, turn)
     row = tensions.min(axis=1).argmin()
     scale = np.r_[np.ones(3), np.full(3, 1 / dynamics.robot.length)]
-    A = dynamics.relative.wrench_matrix(motion.pose[row]) * scale[:, None]
-    w = dynamics.relative.required_wrench(*(part[row] for part in motion)) * scale
+    A = dynamics.relative.wrench_matrix(turn.pose[row]) * scale[:, None]
+    w = dynamics.relative.required_wrench(*(part[row] for part in turn)) * scale
     _, missing = nnls(A, w)
     (told_so,) = re.findall(r"([\d.]+) N short", claims["fig-7-positive"].why)
     assert float(told_so) == pytest.approx(missing, abs=0.01)
@@ -209,19 +210,19 @@ def test_largest_radius_by_the_tensions_themselves():
     """Six cables have one solution each: its smallest tension is zero at the radius that bisection found."""
     dynamics = Dynamics(load("wang-flying"))
     for floor in (0.0, 0.5):
-        radius = flying_radius.largest_radius(dynamics, floor)
-        smallest = flying_motion.steady_tensions(dynamics, flying_motion.circle(radius)).min()
+        largest = radius.largest_radius(dynamics, floor)
+        smallest = motion.steady_tensions(dynamics, motion.circle(largest)).min()
         assert smallest == pytest.approx(floor, abs=2e-3)
-    assert flying_radius.largest_radius(dynamics) == pytest.approx(0.234, abs=0.001)
-    assert not flying_radius.feasible(dynamics, 1.0, 0.0)
+    assert radius.largest_radius(dynamics) == pytest.approx(0.234, abs=0.001)
+    assert not radius.feasible(dynamics, 1.0, 0.0)
 
 
 def test_the_printed_ratio_falls_where_it_is_said_to():
     robot = load("wang-flying")
-    amplitude = flying_vibration.amplitude_of(robot, flying_vibration.RATIO)
-    found = flying_vibration.forces(robot, amplitude)
+    amplitude = vibration.amplitude_of(robot, vibration.RATIO)
+    found = vibration.forces(robot, amplitude)
     # T is what the platform needs less what the vibration adds
-    steady = flying_motion.steady_tensions(Dynamics(robot), flying_motion.circle(flying_motion.FEASIBLE))
+    steady = motion.steady_tensions(Dynamics(robot), motion.circle(motion.FEASIBLE))
     np.testing.assert_allclose(found.T + found.dT, steady, atol=1e-9)
     assert np.abs(found.dT[:, 0] / (steady - found.dT)[:, 0]).max() == pytest.approx(0.1247, rel=1e-3)
     assert amplitude == pytest.approx(1.9e-6, rel=0.05)
@@ -230,11 +231,11 @@ def test_the_printed_ratio_falls_where_it_is_said_to():
 def test_a_pitching_quadrotor_by_newton_and_euler(claims):
     """Relative error of cable 1 again, from the form in {G}."""
     dynamics = Dynamics(load("wang-flying"))
-    body, base = flying_motion.circle(flying_motion.FEASIBLE), flying_disturbance.flown(flying_plans.PITCH)
+    body, base = motion.circle(motion.FEASIBLE), disturbance.flown(plans.PITCH)
     world = dynamics.relative.motion_in_world(*body, *base)
     A = dynamics.wrench_matrix(world[0], base.pose[:, None])
     felt = np.linalg.solve(A, dynamics.required_wrench(*world)[..., None])[:, 0, 0]
-    still = flying_motion.steady_tensions(dynamics, body)[:, 0]
+    still = motion.steady_tensions(dynamics, body)[:, 0]
     worst = 100 * np.abs((still - felt) / felt).max()
     assert claims["fig-15"].computed == pytest.approx(worst, rel=1e-6)
 
@@ -269,7 +270,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
     assert not re.search(r'(src|href)="(?!data:)', page)
     errata = (tmp_path / "out" / "flying-errata.md").read_text()
     assert all((f"| {name} |" in errata) == (by_name[name]["verdict"] != "reproduced") for name in names)
-    assert flying.PAPER.source in errata
+    assert study.PAPER.source in errata
 
 
 def test_an_unknown_paper_is_one_line(tmp_path):
@@ -278,6 +279,6 @@ def test_an_unknown_paper_is_one_line(tmp_path):
         [str(towline), "reproduce", "walking"], capture_output=True, text=True, cwd=tmp_path, check=False
     )
     assert done.returncode == 2
-    assert done.stderr.startswith("towline: PAPER: 'walking'; accepted: flying")
+    assert done.stderr.startswith("towline: PAPER: 'walking'; accepted: flying, ctmrts")
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())

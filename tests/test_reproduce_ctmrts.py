@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from towline.models import Dynamics, load
-from towline.studies import towing_equations, towing_ranges, towing_tensions
-from towline.studies.claim import Verdict
-from towline.studies.towing_workspace import in_prism
+from towline.studies.accounts.claim import Verdict
+from towline.studies.towing import equations as towing_equations
+from towline.studies.towing import ranges as towing_ranges
+from towline.studies.towing import tensions as towing_tensions
+from towline.studies.towing.workspace import in_prism
 
 
 @pytest.fixture(scope="module")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..figures.way import way
-from ..models import Dynamics, load
-from ..ocp.tasks.path import LinePath, Motion
-from ..solvers import TensionProblem, solve
-from .account import Chapter
-from .claim import Claim, Verdict, compared, stated
-from .flying_instants import instants
-from .flying_motion import RADIUS, TIMES, circle, steady_tensions
-from .flying_plans import END, RATE, SECONDS, START
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...figures.way import way
+from ...models import Dynamics, load
+from ...ocp.tasks.path import LinePath, Motion
+from ...solvers import TensionProblem, solve
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated
+from .instants import instants
+from .motion import RADIUS, TIMES, circle, steady_tensions
+from .plans import END, RATE, SECONDS, START
 
 LIKE_A_SINE = 0.05  # of the amplitude, assumed: what an eye would not see in figure 7
 

@@ -7,10 +7,10 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ..models import rotation
-from .account import Chapter
-from .claim import Claim, compared, stated
-from .flying_instants import Instants, Turning, instants
+from ...models import rotation
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated
+from .instants import Instants, Turning, instants
 
 ROUNDING = 1e-12
 SMALL = 1e-4  # [rad], a small turn as Eq. 9 has it

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..models import Dynamics, Robot, load
-from ..models.cables import ElementChain
-from .account import Chapter
-from .claim import Claim, compared, stated
-from .flying_motion import RADIUS, circle, steady_tensions
+from ...models import Dynamics, Robot, load
+from ...models.cables import ElementChain
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated
+from .motion import RADIUS, circle, steady_tensions
 
 ELEMENTS = (1, 2, 5, 16, 64)
 STRETCH = 1e-5  # of the attachment, away from the anchor [m]

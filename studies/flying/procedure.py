@@ -12,18 +12,18 @@ from itertools import accumulate
 import casadi as ca
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..models import Dynamics, Robot, load
-from ..models.cables import ElementChain
-from ..models.cables.driving_force import DrivingForce, driving_force
-from ..models.diagnosis import diagnose
-from ..models.rotation import rotation
-from ..ocp.tasks.path import Motion
-from .account import Chapter
-from .claim import Claim, Verdict, compared, stated, undetermined
-from .flying_motion import FEASIBLE, TIMES, circle
-from .flying_vibration import ELEMENTS, STEP, vibration
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, Robot, load
+from ...models.cables import ElementChain
+from ...models.cables.driving_force import DrivingForce, driving_force
+from ...models.diagnosis import diagnose
+from ...models.rotation import rotation
+from ...ocp.tasks.path import Motion
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .motion import FEASIBLE, TIMES, circle
+from .vibration import ELEMENTS, STEP, vibration
 
 AMPLITUDE = 1e-6  # of the vibration [m], assumed
 ROWS = slice(0, 101, 5)  # the instants of the run: the first second

@@ -12,14 +12,14 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import root_scalar
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..models import Dynamics, Robot, load
-from ..models.cables.driving_force import DrivingForce, driving_force
-from ..ocp.tasks.path import Motion
-from .account import Chapter
-from .claim import Claim, Verdict, compared, stated, undetermined
-from .flying_motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, Robot, load
+from ...models.cables.driving_force import DrivingForce, driving_force
+from ...ocp.tasks.path import Motion
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
 
 RATIO = 0.1247  # printed: the largest dT / T of cable 1
 STEP, STEPS = 0.01, (0.001, 0.01, 0.1)  # [s]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..models import Dynamics, load
-from .account import Chapter
-from .claim import Claim, compared
-from .flying_instants import Instants, instants
-from .flying_rotations import printed_acceleration
+from ...models import Dynamics, load
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared
+from .instants import Instants, instants
+from .rotations import printed_acceleration
 
 ROUNDING = 1e-11
 WIND = np.array([5.0, 6.0, 2.0])  # the paper's strongest [m/s]

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..ocp import Task
-from ..ocp.tasks.path import CirclePath, LinePath, SamplePath
-from ..ocp.tasks.task import FreeBase, GivenBase
-from . import flying_circle
+from ...ocp import Task
+from ...ocp.tasks.path import CirclePath, LinePath, SamplePath
+from ...ocp.tasks.task import FreeBase, GivenBase
+from .circle import tasks
 
 START, END, SECONDS = np.array([-20.0, -30.0, 40.0]), np.array([40.0, 20.0, 102.45]), 10.0  # VI.A [m], [s]
 RATE = 0.2 * np.pi  # [rad/s]
@@ -30,7 +30,7 @@ Vector = tuple[float, float, float]
 
 def circle() -> Task:
     """VI.B: the circle about a hovering point, the quadrotor free."""
-    return flying_circle.tasks()[1]
+    return tasks()[1]
 
 
 def helix() -> Task:

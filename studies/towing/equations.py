@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..models import Dynamics, load
-from .account import Chapter
-from .claim import Claim, Verdict, compared, stated
+from ...models import Dynamics, load
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated
 
 ANGLES = np.array([0.3, -0.4, 0.5])  # roll, pitch, yaw [rad], within the paper's (-1, 1)
 RATES = np.array([1.0, 1.0, 1.0])  # their time derivatives [rad/s]

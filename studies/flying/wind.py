@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..models import Dynamics, load
-from ..models.air import trapezoid
-from .account import Chapter
-from .claim import Claim, compared, stated, undetermined
-from .flying_motion import TIMES
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, load
+from ...models.air import trapezoid
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated, undetermined
+from .motion import TIMES
 
 PEAK = (5.0, 6.0, 2.0)  # printed in section VI [m/s]
 NOISE = 0.5  # printed, either way [m/s]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..models import Dynamics, Robot, load
-from ..solvers import TensionProblem, solve
-from ..workspace import EquilibriumPosture
-from .account import Chapter
-from .claim import Claim, Verdict, compared, stated, undetermined
-from .towing_equations import SIZES, turned_home
-from .towing_workspace import in_prism, loops
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, Robot, load
+from ...solvers import TensionProblem, solve
+from ...workspace import EquilibriumPosture
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .equations import SIZES, turned_home
+from .workspace import in_prism, loops
 
 SAFETY = (1.5, 2.0)  # n of Eq. 11
 SAMPLES = 6000

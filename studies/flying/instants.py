@@ -11,8 +11,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..models.rotation import rotation
-from ..ocp.tasks.path import Motion
+from ...models.rotation import rotation
+from ...ocp.tasks.path import Motion
 
 COUNT = 200
 ANGLES, RATES, ACCELERATIONS = 0.3, 0.6, 1.0  # largest of each [rad, rad/s, rad/s^2], and of positions in metres

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures import plan as figures
-from ..figures.drawing import Drawing
-from ..models import load
-from ..ocp import Plan, plan
-from . import flying_circle, flying_plans
-from .account import Chapter
-from .claim import Claim, Verdict, stated
-from .flying_motion import RADIUS
+from ...figures import plan as figures
+from ...figures.drawing import Drawing
+from ...models import load
+from ...ocp import Plan, plan
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, stated
+from . import plans
+from .circle import tasks
+from .motion import RADIUS
 
 ASTRAY = 0.01  # [m]: how far from its circle a plan may lead the platform
 
@@ -19,8 +20,8 @@ ASTRAY = 0.01  # [m]: how far from its circle a plan may lead the platform
 def chapter() -> Chapter:
     """The circle under a hovering quadrotor, and circle and helix with the quadrotor free."""
     robot = load("wang-flying")
-    hovering_task, free_task = flying_circle.tasks()
-    hovering, circle, helix = (plan(robot, task) for task in (hovering_task, free_task, flying_plans.helix()))
+    hovering_task, free_task = tasks()
+    hovering, circle, helix = (plan(robot, task) for task in (hovering_task, free_task, plans.helix()))
     claims = [
         _hovering(hovering),
         _repaired("circle-repair", "VI.B", "circle", circle, "repair"),

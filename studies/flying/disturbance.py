@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..figures.way import way
-from ..models import Dynamics, load
-from ..ocp.tasks.path import Motion
-from .account import Chapter
-from .claim import Claim, stated, undetermined
-from .flying_helix import flight
-from .flying_motion import FEASIBLE, TIMES, circle, steady_tensions
-from .flying_plans import PITCH, SECONDS, pitching_flight
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...figures.way import way
+from ...models import Dynamics, load
+from ...ocp.tasks.path import Motion
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, stated, undetermined
+from .helix import flight
+from .motion import FEASIBLE, TIMES, circle, steady_tensions
+from .plans import PITCH, SECONDS, pitching_flight
 
 PITCHES = np.linspace(0.0, 0.3, 7)  # largest pitch [rad]
 
