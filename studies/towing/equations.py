@@ -145,9 +145,7 @@ def _angular_acceleration() -> Claim:
 
 
 def _inverse() -> Claim:
-    ranks = {
-        m: int(np.linalg.matrix_rank(Dynamics(load(name)).wrench_matrix(turned_home()))) for m, name in SIZES.items()
-    }
+    ranks = {m: rank(Dynamics(load(name)).wrench_matrix(turned_home())) for m, name in SIZES.items()}
     return stated(
         "eq-13-inverse",
         "Eq. 13",
