@@ -13,7 +13,7 @@ from ..errors import InputError
 from .options import JsonOption, print_json
 
 if TYPE_CHECKING:
-    from ..studies.account import Account, Progress
+    from ..studies.accounts.account import Account, Progress
 
 
 def reproduce(
@@ -26,6 +26,7 @@ def reproduce(
     as_json: JsonOption = False,
 ) -> None:
     """Recompute every equation, table and figure of a paper: what holds, what differs, what cannot be."""
+    from ..studies.accounts.files import write
     from ..studies.papers import PAPERS
     from ..writing import check_writable
 
@@ -35,7 +36,7 @@ def reproduce(
     check_writable(folder / f"{paper}.md")
     with _progress(quiet=as_json) as progress:
         account = PAPERS[paper](progress)
-    files = [str(path) for path in account.write(folder)]
+    files = [str(path) for path in write(account, folder)]
     if as_json:
         print_json({**account.as_dict(), "files": files})
     else:
@@ -48,7 +49,7 @@ def reproduce(
 
 
 def _show(account: Account) -> None:
-    from ..studies.claim import Verdict
+    from ..studies.accounts.claim import Verdict
 
     typer.echo(f"{account.paper.source}\n  {account.summary()}; {account.seconds:.1f} s")
     for title, chapter in account.chapters.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,9 +22,11 @@ class Panel(NamedTuple):
     label
         Of its vertical axis, with the unit.
     curves
-        (n,) each, by their names in the legend; not finite: a gap.
+        (n,) each, by their names in the legend, an empty name for none; not finite: a gap.
     bounds
         Values to draw a dashed line at, by what is written on it.
+    dots
+        As `curves`, drawn as dots: what should lie on a curve.
     logarithmic
         Whether the vertical axis is.
     """
@@ -31,6 +34,7 @@ class Panel(NamedTuple):
     label: str
     curves: Mapping[str, np.ndarray]
     bounds: Mapping[str, float] = {}
+    dots: Mapping[str, np.ndarray] = {}
     logarithmic: bool = False
 
 
@@ -44,12 +48,14 @@ def curves(
 ) -> Figure:
     """Draw panels over `x` (n,); curves of one name look the same in all of them.
 
+    Every second curve is dashed, so that those that lie on one another can be seen.
+
     Parameters
     ----------
     logarithmic
         Whether the horizontal axis is.
     marks
-        Places on the horizontal axis to draw a dotted line at, by what is written on it.
+        Places on the horizontal axis to draw a line at, by their names in the legend.
     """
     canvas = style.figure(5.0, 1.2 + 2.0 * len(panels))
     looks: dict[str, int] = {}
@@ -61,18 +67,15 @@ def curves(
         ax.set_yscale("log" if panel.logarithmic else "linear")
         for name, values in panel.curves.items():
             index = looks.setdefault(name, len(looks))
-            ax.plot(x, values, color=style.colour(index), linestyle=style.line_style(index), label=name)
+            ax.plot(x, values, color=style.colour(index), linestyle=("-", "--")[index % 2], label=name)
+        for name, values in panel.dots.items():
+            index = looks.setdefault(name, len(looks))
+            ax.plot(x, values, "o", markersize=4, color=style.colour(index), label=name)
         for text, bound in panel.bounds.items():
             ax.axhline(bound, **style.LIMIT)
-            ax.annotate(text, (1, bound), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8)
-        for text, place in (marks or {}).items():
-            ax.axvline(place, color="#666666", linestyle=":", linewidth=1.0)
-            where = ("data", "axes fraction")
-            paper = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-            look = {"ha": "right", "va": "top", "rotation": 90, "fontsize": 8}
-            ax.annotate(
-                text, (place, 0.98), xycoords=where, xytext=(-2, 0), textcoords="offset points", bbox=paper, **look
-            )
+            ax.annotate(text, (0.01, bound), xycoords=("axes fraction", "data"), ha="left", va="bottom", fontsize=8)
+        for (text, place), dashes in zip((marks or {}).items(), cycle((":", "-.")), strict=False):
+            ax.axvline(place, color="#666666", linestyle=dashes, linewidth=1.2, label=text)
         ax.margins(x=0.01)
     style.legend_below(canvas, *canvas.axes)
     return canvas

@@ -81,7 +81,7 @@ def reached(found: xr.Dataset) -> Figure:
     """
     thick = [name for name in ("x", "y", "z") if found.sizes[name] > 1]
     pairs = [(a, b) for a, b in (("x", "y"), ("x", "z"), ("y", "z")) if a in thick and b in thick]
-    canvas = style.figure(width=1.0 + 3.6 * max(len(pairs), 1), height=3.4)
+    canvas = style.figure(width=0.9 + 2.2 * max(len(pairs), 1), height=2.8)
     if not pairs:
         _reached_along(canvas, found, thick[0] if thick else "x")
         return canvas

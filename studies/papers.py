@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from . import flying, towing
-from .account import Account, Progress
+from .accounts.account import Account, Progress
+from .flying import study as flying
+from .towing import study as towing
 
 PAPERS: dict[str, Callable[[Progress | None], Account]] = {
     "flying": flying.account,

@@ -5,8 +5,8 @@ import pytest
 
 from towline.models import Dynamics, Robot
 from towline.models.statics import equilibria
-from towline.studies import towing_workspace as study
-from towline.studies.towing_plans import DRIVES, robot
+from towline.studies.towing import workspace as study
+from towline.studies.towing.plans import DRIVES, robot
 from towline.workspace import EquilibriumPosture, ExistsPlacement, ForceBalance, Places
 from towline.workspace.volume import volume
 

@@ -26,7 +26,7 @@ class Condition(Part, ABC):
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
 
-    def __init__(self, **fields: Any):
+    def __init__(self, /, **fields: Any):
         try:
             super().__init__(**fields)
         except ValidationError as error:
@@ -86,9 +86,9 @@ def condition_from(data: Any) -> Condition:
     accepted = ", ".join(sorted(Condition.kinds))
     if not isinstance(data, dict) or "kind" not in data:
         raise InputError(f"condition: is {data!r}; accepted: a mapping with a kind, one of {accepted}")
-    if data["kind"] not in Condition.kinds:
+    if not isinstance(data["kind"], str) or data["kind"] not in Condition.kinds:
         raise InputError(f"condition.kind: {data['kind']!r} is unknown; accepted: {accepted}")
-    return Condition.kinds[data["kind"]](**data)
+    return Condition.kinds[data["kind"]](**{str(name): value for name, value in data.items()})
 
 
 AnyCondition = Annotated[SerializeAsAny[Condition], BeforeValidator(condition_from)]

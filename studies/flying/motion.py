@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..models import Dynamics
-from ..ocp.tasks.path import CirclePath, Motion
-from .flying_plans import BELOW, RATE, SECONDS
+from ...models import Dynamics
+from ...ocp.tasks.path import CirclePath, Motion
+from .plans import BELOW, RATE, SECONDS
 
 RADIUS = 1.0  # of the circle in VI.A and VI.B [m]
 FEASIBLE = 0.15  # [m], assumed where the paper's own circle has no tensions to speak of

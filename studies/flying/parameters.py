@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..models import Robot, load
-from .account import Chapter
-from .claim import Claim, compared, stated
-from .flying_plans import BELOW
+from ...models import Robot, load
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated
+from .plans import BELOW
 
 # As printed, in the paper's own units.
 PRINTED = {

@@ -7,19 +7,14 @@ complete.
 
 from __future__ import annotations
 
-import json
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
-from ..errors import SolverError
-from ..figures import style
-from ..figures.drawing import Drawing
-from ..writing import whole_file
-from . import account_page, account_text
+from ...errors import SolverError
+from ...figures.drawing import Drawing
 from .claim import Claim, Verdict
 
 __all__ = ["Account", "Chapter", "Paper", "Progress", "gather"]
@@ -95,29 +90,6 @@ class Account:
             "claims": [claim.as_dict() for claim in self.claims],
         }
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write report (Markdown and HTML), errata, claims (JSON) and figures (PNG) into `folder`; their paths.
-
-        Each file is written whole or not at all.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be written to.
-        """
-        name = self.paper.name
-        texts = {
-            f"{name}.md": account_text.report(self),
-            f"{name}.html": account_page.page(self),
-            f"{name}-errata.md": account_text.errata(self),
-            f"{name}.json": json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n",
-        }
-        files = [_write(folder / file, text) for file, text in texts.items()]
-        for chapter in self.chapters.values():
-            for figure, drawing in chapter.drawings.items():
-                files.append(style.save(drawing.figure, folder / account_text.FIGURES / f"{figure}.png"))
-        return files
-
 
 def gather(paper: Paper, chapters: Mapping[str, Callable[[], Chapter]], progress: Progress | None = None) -> Account:
     """Compute the chapters of a paper, in order.
@@ -142,9 +114,3 @@ def gather(paper: Paper, chapters: Mapping[str, Callable[[], Chapter]], progress
     if progress is not None:
         progress("done", len(chapters), len(chapters))
     return Account(paper, found, broken, time.perf_counter() - start)
-
-
-def _write(path: Path, text: str) -> Path:
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path

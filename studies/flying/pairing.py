@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.drawing import Drawing
-from ..figures.from_above import from_above
-from ..models import load
-from ..models.diagnosis import diagnose
-from .account import Chapter
-from .claim import Verdict, stated
+from ...figures.drawing import Drawing
+from ...figures.from_above import from_above
+from ...models import load
+from ...models.diagnosis import diagnose
+from ..accounts.account import Chapter
+from ..accounts.claim import Verdict, stated
 
 ROWS = 6  # of J, whose inverse step 7 of section V takes
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from . import towing_equations, towing_modes, towing_ranges, towing_tensions
-from .account import Account, Paper, Progress, gather
+from ..accounts.account import Account, Paper, Progress, gather
+from . import equations, modes, ranges, tensions
 
 PAPER = Paper(
     "ctmrts",
@@ -11,10 +11,10 @@ PAPER = Paper(
     "towing system",
 )
 CHAPTERS = {
-    "The model, Eqs. 1 to 13": towing_equations.chapter,
-    "Tensions, Eqs. 11, 16, 17": towing_tensions.chapter,
-    "Workspaces, figures 2 to 6": towing_ranges.chapter,
-    "Three ways to drive, three to six robots": towing_modes.chapter,
+    "The model, Eqs. 1 to 13": equations.chapter,
+    "Tensions, Eqs. 11, 16, 17": tensions.chapter,
+    "Workspaces, figures 2 to 6": ranges.chapter,
+    "Three ways to drive, three to six robots": modes.chapter,
 }
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..figures import page as html
-from ..figures import style
+from ...figures import page as html
+from ...figures import style
 from .claim import Claim, told
 
 if TYPE_CHECKING:

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ..figures import workspace as figures
-from ..figures.drawing import Drawing
-from ..models.statics import equilibria
-from ..workspace import ExistsPlacement, ForceBalance, Places
-from .account import Chapter
-from .claim import Claim, Verdict, compared, stated, undetermined
-from .towing_plans import DRIVES, FIXED, robot
-from .towing_workspace import PRINTED, SECTIONS, Loops, in_prism, loops, placed_as_both, reach, volume_of
+from ...figures import workspace as figures
+from ...figures.drawing import Drawing
+from ...models.statics import equilibria
+from ...workspace import ExistsPlacement, ForceBalance, Places
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .plans import DRIVES, FIXED, robot
+from .workspace import PRINTED, SECTIONS, Loops, in_prism, loops, placed_as_both, reach, volume_of
 
 THICKNESS = 0.02  # of a section [m]
 READ = 0.08  # [m]: how near 60 000 random points come to the ends of ranges, which are corners of the workspaces

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..ocp import Plan, plan
-from .account import Chapter
-from .claim import Claim, Verdict, stated
-from .towing_equations import SIZES
-from .towing_plans import DRIVES, FIXED, Drive, robot, task
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...ocp import Plan, plan
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, stated
+from .equations import SIZES
+from .plans import DRIVES, FIXED, Drive, robot, task
 
 STEPS = 50
 SAID = {

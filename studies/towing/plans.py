@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
-from ..models import Robot, load
-from ..models.statics import equilibria
-from ..ocp import Task
-from ..ocp.tasks.path import AnyPath, LinePath
-from ..ocp.tasks.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
+from ...models import Robot, load
+from ...models.statics import equilibria
+from ...ocp import Task
+from ...ocp.tasks.path import AnyPath, LinePath
+from ...ocp.tasks.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
 
 Drive = Literal["fixed-length", "variable-length", "both"]
 DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")

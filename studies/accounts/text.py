@@ -14,7 +14,7 @@ FIGURES = "figures"  # the folder beside the report
 
 def report(account: Account) -> str:
     """Chapter by chapter: a table of its claims, and its figures."""
-    from .. import __version__
+    from ... import __version__
 
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
     for title, chapter in account.chapters.items():

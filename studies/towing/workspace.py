@@ -27,14 +27,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..figures import style
-from ..figures import workspace as figures
-from ..models import Robot
-from ..models.robot import Box, MobileCarrier
-from ..workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
-from ..workspace.hanging import hanging
-from ..workspace.volume import Volume, volume
-from .towing_plans import DRIVES, Drive, robot
+from ...figures import style
+from ...figures import workspace as figures
+from ...models import Robot
+from ...models.robot import Box, MobileCarrier
+from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
+from ...workspace.hanging import hanging
+from ...workspace.volume import Volume, volume
+from .plans import DRIVES, Drive, robot
 
 __all__ = ["PRINTED", "Loops", "draw", "in_prism", "loops", "placed_as_both", "reach", "volume_of"]
 

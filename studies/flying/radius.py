@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..figures.curves import Panel, curves
-from ..figures.drawing import Drawing
-from ..models import Dynamics, load
-from ..solvers import solve_batch
-from .account import Chapter
-from .claim import Verdict, stated
-from .flying_motion import RADIUS, TIMES, circle, steady_tensions
-from .flying_plans import BELOW
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, load
+from ...solvers import solve_batch
+from ..accounts.account import Chapter
+from ..accounts.claim import Verdict, stated
+from .motion import RADIUS, TIMES, circle, steady_tensions
+from .plans import BELOW
 
 PRECISION = 1e-4  # [m]
 TURN = TIMES[:-1:5]  # 200 instants of one turn

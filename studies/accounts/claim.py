@@ -150,7 +150,7 @@ def told(value: Value, unit: str = "") -> str:
     if isinstance(value, str):
         text = value
     elif isinstance(value, tuple):
-        text = "(" + ", ".join(f"{each:.4g}" for each in value) + ")"
+        text = "(" + ", ".join(f"{each:.5g}" for each in value) + ")"
     else:
-        text = f"{value:.4g}"
+        text = f"{value:.5g}"
     return f"{text} {unit}" if unit else text
