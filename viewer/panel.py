@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from .subject import Subject
 
 RATE = 25.0  # [1/s] of playing
+TICK = 0.01  # [s] of the time line
 SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
 
 
@@ -34,7 +36,9 @@ class Panel:
         self._busy = threading.Lock()
         self._shown: tuple[float, ...] | None = None
         self._closed = threading.Event()
-        self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
+        self._gui.configure_theme(
+            control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
+        )
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
         if subject.replay is None:
@@ -85,8 +89,7 @@ class Panel:
         first, last = float(replay.times[0]), float(replay.times[-1])
         with self._gui.add_folder("Time"):
             play = self._gui.add_button("Play")
-            step = min(0.01, max(last - first, 1e-6))
-            now = self._gui.add_slider("time [s]", first, max(last, first + step), step, first)
+            now = self._gui.add_slider("time [s]", first, _whole(last - first, TICK) + first, TICK, first)
             speed = self._gui.add_dropdown("speed", SPEEDS, initial_value="1x")
         playing = threading.Event()
 
@@ -127,3 +130,8 @@ class Panel:
                 return
             self._stage.show(found)
             self._readout.content = words.readout(found, self._subject.robot)
+
+
+def _whole(length: float, step: float) -> float:
+    """The whole steps that cover a length, at least one, so that the end reads well."""
+    return round(max(math.ceil(length / step - 1e-6), 1) * step, 6)

@@ -103,7 +103,7 @@ def _page(subject: Subject) -> str:
     title = escape(subject.title)
     # Above the picture, but the mouse goes through to it.
     aside = (
-        '<aside style="position:fixed;left:8px;top:8px;max-width:260px;z-index:1;pointer-events:none;color:#222;'
+        '<aside style="position:fixed;left:8px;bottom:52px;max-width:260px;z-index:1;pointer-events:none;color:#222;'
         f'background:#ffffffcc;font-family:system-ui,sans-serif"><div style="padding:4px 12px;font-weight:600">{title}'
         f"</div>{words.legend(subject, stage.cell)}</aside>"
     )

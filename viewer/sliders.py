@@ -11,6 +11,7 @@ from ..models.robot import COORDINATES, MobileCarrier, QuadrotorCarrier
 from .geometry import Geometry
 
 TURN = 1.0  # [rad] to each side of home
+BEYOND = 0.25  # of the robot's room, to each side: also where it cannot be is worth seeing
 TILT = 0.6  # [rad] of carriers that have no limit of their own
 
 
@@ -43,20 +44,19 @@ class Slider(NamedTuple):
 def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
     """First those of the platform, then carrier by carrier.
 
-    The platform goes where the robot has room; mobile carriers go through their reach boxes, unless the drive keeps
-    them; what flies goes half the robot's size to each side, and tilts as far as its file allows.
+    The platform goes through the robot's room and a little beyond; mobile carriers go through their reach boxes, unless
+    the drive keeps them; what flies goes half the robot's size to each side, and tilts as far as its file allows.
     """
     home = robot.home
     found = []
     for coordinate, name in enumerate(COORDINATES):
         if name in robot.platform.dof:
-            around = home[coordinate]
-            low, high = (
-                (geometry.room.low[coordinate], geometry.room.high[coordinate])
-                if coordinate < 3
-                else (around - TURN, around + TURN)
-            )
-            found.append(_slider(None, coordinate, low, high, around))
+            at, room = home[coordinate], geometry.room
+            low, high = at - TURN, at + TURN
+            if coordinate < 3:
+                beyond = BEYOND * (room.high - room.low)[coordinate]
+                low, high = room.low[coordinate] - beyond, room.high[coordinate] + beyond
+            found.append(_slider(None, coordinate, low, high, at))
     for index, carrier in enumerate(robot.carriers):
         if isinstance(carrier, MobileCarrier):
             if robot.drive != "variable-length":

@@ -75,15 +75,15 @@ class Stage:
             if handle is not None:
                 _place(handle, pose)
         middles = 0.6 * exits + 0.4 * points.attachments
-        for label, at, tension in zip(self._numbers, middles, instant.tensions, strict=True):
-            label.position = at
-            _write(label, f"{tension:.3g} N" if np.isfinite(tension) else "")
+        for index, (label, tension) in enumerate(zip(self._numbers, instant.tensions, strict=True)):
+            label.position = middles[index]
+            _write(label, f"{index + 1}: {tension:.3g} N" if np.isfinite(tension) else f"{index + 1}")
         self._point(instant)
         if self._caption is not None:
             _write(self._caption, words.caption(instant))
 
     def show_numbers(self, shown: bool) -> None:
-        """Whether tensions stand at the cables."""
+        """Whether number and tension stand at the cables."""
         for label in self._numbers:
             label.visible = shown
 
