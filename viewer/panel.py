@@ -36,9 +36,8 @@ class Panel:
         self._busy = threading.Lock()
         self._shown: tuple[float, ...] | None = None
         self._closed = threading.Event()
-        self._gui.configure_theme(
-            control_layout="fixed", control_width="medium", show_logo=False, show_share_button=False
-        )
+        self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
+        self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
         if subject.replay is None:

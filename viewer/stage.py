@@ -26,6 +26,8 @@ FIELD_OF_VIEW = 0.75  # [rad]
 CABLE_WIDTH = 4.0  # [pixels]
 THIN = 1.5
 BLACK, GREY = (0, 0, 0), (150, 150, 150)
+HEAD = 0.25  # of an arrow's length
+BARBS = 12
 CELLS = 10  # of the grid along the robot's size, about
 
 
@@ -92,7 +94,7 @@ class Stage:
         ends = arrow(instant, self._size)
         self._arrow.visible = self._short.visible = ends is not None
         if ends is not None:
-            self._arrow.points = ends[None].astype(np.float32)
+            self._arrow.points = _strokes(*ends).astype(np.float32)
             self._short.position = ends[1]
             _write(self._short, words.shortfall(instant))
 
@@ -108,7 +110,7 @@ class Stage:
 
     def _draw_surroundings(self, subject: Subject) -> None:
         scene, cell = self._scene, self.cell
-        # Shadows tell little here, and their shaders keep a slow machine busy for seconds.
+        # Shadows tell little here, and their shaders keep a machine without a GPU busy for seconds.
         scene.configure_default_lights(cast_shadow=False)
         width = 2 * cell * np.ceil(self._size / cell)
         floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._room.low[2]])
@@ -160,7 +162,8 @@ class Stage:
         )
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
-        scene.add_icosphere("/platform/com", 0.008 * size, rgb(style.colour(0)), position=robot.platform.com)
+        com = np.array([robot.platform.com], np.float32)
+        scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=0.012 * size, point_shape="circle")
         self._carriers: list[viser.FrameHandle | None] = []
         for index, carrier in enumerate(robot.carriers):
             if carrier.kind == "ground":
@@ -179,13 +182,12 @@ class Stage:
             scene.add_label(f"/tensions/{index + 1}", "", anchor="center-center", font_screen_scale=0.8)
             for index in range(robot.m)
         ]
-        self._arrow = scene.add_arrows(
+        self._arrow = scene.add_line_segments(
             "/missing",
-            np.zeros((1, 2, 3), np.float32),
+            np.zeros((1 + BARBS, 2, 3), np.float32),
             rgb(style.colour(1)),
-            shaft_radius=0.008 * size,
-            head_radius=0.02 * size,
-            head_length=0.05 * size,
+            thickness=1.5 * CABLE_WIDTH,
+            thickness_units="screen",
             visible=False,
         )
         self._short = scene.add_label("/shortfall", "", anchor="bottom-center", visible=False)
@@ -202,11 +204,22 @@ class Stage:
                 np.array(triangles, np.uint32),
                 color=colour,
                 opacity=0.7,
+                material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
                 flat_shading=True,
                 side="double",
                 cast_shadow=False,
                 receive_shadow=False,
             )
+
+
+def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """An arrow as line segments (1 + BARBS, 2, 3): its shaft, and a head of lines around it."""
+    along = tip - start
+    _, _, axes = np.linalg.svd(along[None])
+    angles = np.linspace(0.0, 2 * np.pi, BARBS, endpoint=False)[:, None]
+    around = np.cos(angles) * axes[1] + np.sin(angles) * axes[2]
+    ends = tip - HEAD * along + HEAD / 3 * np.linalg.norm(along) * around
+    return np.concatenate([[[start, tip]], np.stack([np.tile(tip, (BARBS, 1)), ends], axis=1)])
 
 
 def _hull(corners: np.ndarray) -> list[np.ndarray]:
