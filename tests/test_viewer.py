@@ -231,6 +231,16 @@ def test_what_cannot_be_shown_is_one_line(folder):
             pass
 
 
+def test_nobody_can_have_it_open_a_tunnel():
+    from towline.viewer import server
+
+    started = server._start("127.0.0.1", 0)
+    try:
+        assert started.request_share_url() is None
+    finally:
+        server._stop(started)
+
+
 def test_names_from_files_cannot_be_code(folder, tmp_path):
     saved = xr.load_dataset(folder / "line.nc").isel(time=slice(3))
     saved.attrs["status"] = "</title><script>alert(1)</script>"

@@ -19,7 +19,7 @@ from towline.workspace import pose_problem
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 if CHROMIUM is None:
-    pytest.skip("no browser; to run these: apt-get install chromium", allow_module_level=True)
+    pytest.skip("no browser is installed; to run these: apt-get install chromium", allow_module_level=True)
 playwright = pytest.importorskip("playwright.sync_api", reason="to run these: pip install playwright")
 
 PATIENCE = 30_000  # [ms] drawing is in software here

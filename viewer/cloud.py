@@ -11,8 +11,8 @@ from ..errors import InputError
 from ..figures import style
 from .colours import rgb
 
-MOST_POINTS = 40_000  # more are slow to turn, and are not told apart
-ACCEPTED, REFUSED = style.colour(2), style.colour(1)  # bluish green and vermilion: told apart with any colour vision
+MOST_POINTS = 10_000  # more hide the robot among them
+ACCEPTED, REFUSED = style.colour(2), style.colour(5)  # bluish green and orange: told apart with any colour vision
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,9 @@ class Panel:
         with self._gui.add_folder("Picture"):
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
+            if subject.cloud is not None:
+                points = self._gui.add_checkbox("points", True)
+                points.on_update(lambda _: stage.show_cloud(points.value))
             self._gui.add_html(words.legend(subject, stage.cell))
 
     def close(self) -> None:

@@ -132,8 +132,15 @@ def _start(host: str, port: int) -> viser.ViserServer:
         import viser
     except ImportError:
         raise InputError("viewer: viser is not installed; accepted: pip install 'towline[viewer]'") from None
+
+    class Unshared(viser.ViserServer):
+        """No client can have it open a tunnel through a server of somebody else."""
+
+        def request_share_url(self, verbose: bool = True) -> str | None:
+            return None
+
     with _quiet():
-        return viser.ViserServer(host=host, port=port, verbose=False)
+        return Unshared(host=host, port=port, verbose=False)
 
 
 def _stop(server: viser.ViserServer) -> None:

@@ -76,13 +76,23 @@ class Stage:
         for handle, pose in zip(self._carriers, instant.carriers, strict=True):
             if handle is not None:
                 _place(handle, pose)
-        middles = 0.6 * exits + 0.4 * points.attachments
+        # Not all at one height, for cables that run close to each other.
+        along = (np.arange(self._robot.m) % 2 * 0.2 + 0.3)[:, None]
+        middles = (1 - along) * exits + along * points.attachments
         for index, (label, tension) in enumerate(zip(self._numbers, instant.tensions, strict=True)):
             label.position = middles[index]
-            _write(label, f"{index + 1}: {tension:.3g} N" if np.isfinite(tension) else f"{index + 1}")
+            _write(
+                label,
+                f"{index + 1}: {words.newtons(round(float(tension), 3))}" if np.isfinite(tension) else f"{index + 1}",
+            )
         self._point(instant)
         if self._caption is not None:
             _write(self._caption, words.caption(instant))
+
+    def show_cloud(self, shown: bool) -> None:
+        """Whether the points of a workspace are there."""
+        if self._cloud is not None:
+            self._cloud.visible = shown
 
     def show_numbers(self, shown: bool) -> None:
         """Whether number and tension stand at the cables."""
@@ -134,12 +144,13 @@ class Stage:
             self._lines("/path", [subject.replay.path], rgb(style.colour(0)), 2 * THIN)
             self._lines("/carrier_paths", subject.replay.carrier_paths, GREY)
             self._lines("/keep_out", subject.replay.obstacles, rgb(style.colour(5)))
+        self._cloud = None
         if subject.cloud is not None and len(subject.cloud.positions):
-            scene.add_point_cloud(
+            self._cloud = scene.add_point_cloud(
                 "/workspace",
                 subject.cloud.positions.astype(np.float32),
                 subject.cloud.colours,
-                point_size=0.005 * self._size,
+                point_size=0.004 * self._size,
                 point_shape="circle",
                 precision="float32",
             )

@@ -13,7 +13,7 @@ from ..figures import style
 from ..models import Robot
 from ..models.robot import COORDINATES
 from .colours import NO_TENSION, place, shades
-from .instant import Instant
+from .instant import Instant, arrow
 from .subject import Subject
 
 MUTED = "#595959"
@@ -34,6 +34,8 @@ def readout(instant: Instant, robot: Robot) -> str:
     if instant.certificate is not None:
         words = escape(instant.certificate.in_words()).replace("\n", "<br>")
         lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
+        if arrow(instant, 1.0) is None:
+            lines.append(f'<div style="color:{MUTED}">There is hardly any force in it, so it has no arrow.</div>')
     pose = ", ".join(f"{value:.3f}" for value in instant.pose + 0.0)
     lines.append(f'<div style="color:{MUTED}">({", ".join(COORDINATES)}) = ({pose}) m, rad</div>')
     return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{_table(instant, robot)}</div>'
@@ -77,7 +79,7 @@ def caption(instant: Instant) -> str:
     """Time, status, margin or shortfall in two or three short lines of plain text, for the picture itself."""
     lines = [instant.status if instant.time is None else f"t = {instant.time:.2f} s, {instant.status}"]
     if np.isfinite(instant.margin):
-        lines.append(f"smallest margin {instant.margin:.3g} N, of cable {instant.nearest + 1}")
+        lines.append(f"smallest margin {newtons(instant.margin)}, of cable {instant.nearest + 1}")
     if instant.certificate is not None:
         lines.append(shortfall(instant))
     return "\n".join(lines)
@@ -85,7 +87,7 @@ def caption(instant: Instant) -> str:
 
 def shortfall(instant: Instant) -> str:
     """What stands at the certificate's arrow; empty if there is none."""
-    return "" if instant.certificate is None else f"short by {instant.certificate.shortfall:.3g} N"
+    return "" if instant.certificate is None else f"short by {newtons(instant.certificate.shortfall)}"
 
 
 def legend(subject: Subject, cell: float) -> str:
@@ -115,7 +117,12 @@ def legend(subject: Subject, cell: float) -> str:
 def _limit(name: str, limits: np.ndarray) -> str:
     """A limit, or from where to where if the cables' differ."""
     low, high = float(limits.min()), float(limits.max())
-    return f"{name} = {low:g} N" if low == high else f"{name} = {low:g} to {high:g} N"
+    return f"{name} = {newtons(low, 6)}" if low == high else f"{name} = {newtons(low, 6)} to {newtons(high, 6)}"
+
+
+def newtons(force: float, digits: int = 3) -> str:
+    """A force in N, or in kN where it has five figures and more."""
+    return f"{force:.{digits}g} N" if abs(force) < 1e4 else f"{force / 1e3:.{digits}g} kN"
 
 
 def refusal(message: str) -> str:
