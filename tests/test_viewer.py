@@ -206,7 +206,7 @@ def test_what_cannot_be_shown_is_one_line(folder):
     wanted = {
         "text.nc": "cannot be read",
         "cut.nc": "cannot be read",
-        "gone.nc": "cannot be read",
+        "gone.nc": "is not there",
         "half.nc": "has no 'tensions'",
         "few.nc": "tensions: has the shape",
         "other.nc": "neither a plan nor a workspace",

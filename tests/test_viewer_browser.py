@@ -3,6 +3,7 @@
 Screenshots are left in pytest's temporary folder.
 """
 
+import io
 import re
 import shutil
 from pathlib import Path
@@ -10,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
 
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.solvers import solve
 from towline.viewer import read, save_page, serve
+from towline.viewer.colours import place, shades
 from towline.workspace import pose_problem
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -111,4 +114,15 @@ def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     assert 0 < float(clock.input_value()) <= 4.1
     assert "t_max = 60 N" in page.locator(".towline-legend").inner_text()
     page.keyboard.press("Space")
-    page.screenshot(path=tmp_path / "page.png")
+    saved = xr.load_dataset(plan_file)
+    drawn = shades(place(saved["tensions"][40].to_numpy(), saved["t_min"].to_numpy(), saved["t_max"].to_numpy()))
+
+    def cables_are_drawn():
+        pixels = np.asarray(Image.open(io.BytesIO(page.screenshot(path=tmp_path / "page.png"))).convert("RGB"))
+        return (np.abs(pixels.astype(int) - drawn[0].astype(int)).max(axis=2) < 16).sum() > 200
+
+    for _ in range(60):  # what appears fades in
+        if cables_are_drawn():
+            return
+        page.wait_for_timeout(250)
+    pytest.fail(f"nothing in the picture has the colour of the first cable, {drawn[0]}")

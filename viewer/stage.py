@@ -67,10 +67,10 @@ class Stage:
         points = instant.points
         colours = shades(place(instant.tensions, self._robot.t_min, self._robot.t_max))
         exits = np.where(np.isfinite(points.exits), points.exits, points.anchors)
-        ways = ((exits, points.attachments), (points.anchors, exits))
-        lines = np.concatenate([np.stack(way, axis=1) for way in ways])
-        self._cables.points = lines.astype(np.float32)
-        self._cables.colors = np.repeat(np.tile(colours, (2, 1))[:, None], 2, axis=1)
+        ways = np.stack([points.anchors, exits, exits, points.attachments], axis=1).reshape(-1, 2, 2, 3)
+        for cable, way, colour in zip(self._cables, ways.astype(np.float32), colours, strict=True):
+            cable.points = way
+            cable.colors = colour
         self._ends.points = np.concatenate([points.anchors, points.attachments]).astype(np.float32)
         _place(self._platform, instant.pose)
         for handle, pose in zip(self._carriers, instant.carriers, strict=True):
@@ -123,7 +123,8 @@ class Stage:
         # Shadows tell little here, and their shaders keep a machine without a GPU busy for seconds.
         scene.configure_default_lights(cast_shadow=False)
         width = 2 * cell * np.ceil(self._size / cell)
-        floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._room.low[2]])
+        # A little below, where no platform lies in it.
+        floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._room.low[2] - 0.03 * self._size])
         scene.add_grid(
             "/grid",
             width=width,
@@ -164,12 +165,17 @@ class Stage:
 
     def _make_actors(self, captioned: bool) -> None:
         scene, robot, size = self._scene, self._robot, self._size
-        nowhere = np.zeros((2 * robot.m, 2, 3), np.float32)
-        self._cables = scene.add_line_segments(
-            "/cables", nowhere, np.zeros((2 * robot.m, 2, 3), np.uint8), thickness=CABLE_WIDTH, thickness_units="screen"
-        )
+        # An object each: viser shows one colour as it is, but colours of single segments too pale.
+        nowhere = np.zeros((2, 2, 3), np.float32)
+        self._cables = [
+            scene.add_line_segments(
+                f"/cables/{index + 1}", nowhere, BLACK, thickness=CABLE_WIDTH, thickness_units="screen"
+            )
+            for index in range(robot.m)
+        ]
+        ends = np.zeros((2 * robot.m, 3), np.float32)
         self._ends = scene.add_point_cloud(
-            "/ends", nowhere[:, 0], BLACK, point_size=0.008 * size, point_shape="circle", precision="float32"
+            "/ends", ends, BLACK, point_size=0.008 * size, point_shape="circle", precision="float32"
         )
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))

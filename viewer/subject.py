@@ -105,6 +105,8 @@ def _is_netcdf(path: Path) -> bool:
 def _open(path: Path) -> xr.Dataset:
     import xarray as xr
 
+    if not path.exists():
+        raise InputError(f"{path}: is not there; accepted: {ACCEPTED}")
     try:
         if path.suffix == ".zarr":
             return xr.open_zarr(path).load()
