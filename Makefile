@@ -1,7 +1,8 @@
 # Needs python3 >= 3.11 and make, nothing else. Each target installs what it needs into .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
+# Modules are compiled when they are first imported; most never are.
+INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
 .PHONY: demo test setup lint types unit clean
 

@@ -1,5 +1,8 @@
 """Files and folders that are written whole or not at all."""
 
+from __future__ import annotations
+
+import errno
 import os
 import shutil
 import stat
@@ -7,8 +10,14 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
@@ -33,9 +42,26 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.chmod(_mode(target))
         os.replace(temporary, target)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno in NO_ROOM:
+            raise _refusal(path, error) from None
         raise
+
+
+def save_netcdf(found: xr.Dataset, path: Path, encoding: dict[str, Any] | None = None) -> Path:
+    """Save a dataset as NetCDF, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the place cannot be written to, or is full.
+    """
+    # In memory first: HDF5 brings the process down, file left behind, where a disk is full.
+    content = found.to_netcdf(engine="h5netcdf", encoding=encoding)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+    return path
 
 
 @contextmanager
@@ -60,8 +86,10 @@ def whole_folder(path: Path) -> Iterator[Path]:
         os.umask(mask)
         temporary.chmod(0o777 & ~mask)
         temporary.rename(target)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(temporary, ignore_errors=True)
+        if isinstance(error, OSError) and error.errno in NO_ROOM:
+            raise _refusal(path, error) from None
         raise
 
 

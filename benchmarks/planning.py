@@ -23,7 +23,7 @@ import numpy as np
 
 from ..models import Dynamics, load
 from ..ocp import Planner, Task
-from ..studies.flying_circle import HOVER, tasks
+from ..studies.flying.circle import HOVER, tasks
 from .machine import machine
 
 ROBOT = "wang-flying"

@@ -24,8 +24,8 @@ from ..ocp.nlp.rows import Mesh
 from ..ocp.nlp.solver import Solver
 from ..ocp.tasks.scenario import lay_out
 from ..ocp.tasks.scheme import SCHEMES
-from ..studies import towing_plans
-from ..studies.flying_circle import tasks
+from ..studies.flying.circle import tasks
+from ..studies.towing import plans as towing_plans
 from .machine import machine
 
 STEPS = (10, 20, 40, 80)

@@ -16,7 +16,7 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Fly paper F's circle: impossible while the quadrotor hovers, possible when it moves."""
-    from ..studies import flying_circle
+    from ..studies.flying import circle as flying_circle
 
     with watching("planning the circle with the base free", quiet=as_json) as progress:
         result = flying_circle.run(folder, progress)

@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TowlineError
-from . import bench, demo, export, import_, plan, robots, tension, time, view, workspace
+from . import bench, demo, export, import_, plan, reproduce, robots, tension, time, view, workspace
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -28,6 +28,7 @@ app.command("time")(time.time)
 app.command("workspace")(workspace.workspace)
 app.command("view")(view.view)
 app.add_typer(import_.app, name="import")
+app.command("reproduce")(reproduce.reproduce)
 app.command("export")(export.export)
 app.add_typer(bench.app, name="bench")
 

@@ -11,7 +11,18 @@ from ..errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot of the library, or a robot file (YAML).")]
+
+def _robots(incomplete: str) -> list[str]:
+    """What a shell completes a robot's name to: those of the library, and files that shells know by themselves."""
+    from ..models import available
+
+    return [name for name in available() if name.startswith(incomplete)]
+
+
+RobotArgument = Annotated[
+    str,
+    typer.Argument(metavar="ROBOT", help="A robot of the library, or a robot file (YAML).", autocompletion=_robots),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 
 

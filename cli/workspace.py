@@ -78,9 +78,13 @@ def workspace(
         raise InputError(f"--checkpoint: {checkpoint} beside --resume {resume}; accepted: one of them")
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh: {mesh} of a region whose attitude or carriers vary; accepted: positions that vary")
-    for file in (target, figure, mesh):
-        if file is not None and check_writable(file) in [kept.resolve() for kept in (checkpoint, resume) if kept]:
-            raise InputError(f"{file}: is the checkpoint; accepted: another file for what is found")
+    taken = {kept.resolve(): "the checkpoint" for kept in (checkpoint, resume) if kept is not None}
+    for what, file in (("--out", target), ("--figure", figure), ("--mesh", mesh)):
+        place = None if file is None else check_writable(file)
+        if place in taken:
+            raise InputError(f"{what}: {file} is {taken[place]}; accepted: another file for what is found")
+        if place is not None:
+            taken[place] = f"{what} already"
     # Before the samples, so that what is wrong with it is told before hours of work.
     surface = None if mesh is None else _boundary(loaded, asked, region)
     with _progress(f"sampling {loaded.name}", quiet=as_json) as progress:
@@ -108,7 +112,7 @@ def workspace(
     if as_json:
         print_json({**summary, "file": str(target), "figure": _name(figure), "mesh": _name(mesh)})
     else:
-        _show(found, summary)
+        _show(found, summary, size)
         typer.echo("  Written")
         for path in written:
             typer.echo(f"    {path}")
@@ -174,7 +178,7 @@ def _three(option: str, text: str) -> list[float]:
 
 
 def _count(samples: float) -> int:
-    if not float(samples).is_integer():
+    if not float(samples).is_integer() or samples > 1e15:
         raise InputError(f"--samples: is {samples:g}; accepted: a whole number from 1 on")
     return int(samples)
 
@@ -224,7 +228,7 @@ def _summary(found: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _show(found: xr.Dataset, summary: dict[str, Any]) -> None:
+def _show(found: xr.Dataset, summary: dict[str, Any], size: float | None) -> None:
     import math
 
     accepted, samples = summary["accepted"], summary["samples"]
@@ -233,6 +237,10 @@ def _show(found: xr.Dataset, summary: dict[str, Any]) -> None:
     unit = summary["volume_unit"].replace("1", "")
     between = "" if math.isnan(low) else f", between {low:.6g} and {high:.6g} ({found['volume_interval'].long_name})"
     typer.echo(f"  volume {summary['volume']:.6g} {unit}{between}")
+    if "cell_edges" in found:
+        longest = float(found["cell_edges"].max())
+        more = f", not {size:g} m: that takes more samples" if size is not None and longest > size * (1 + 1e-9) else ""
+        typer.echo(f"  smallest cells {longest:.3g} m long{more}")
     if accepted:
         for name, (least, most) in summary["bounds"].items():
             typer.echo(f"  {name} from {least:.4g} to {most:.4g} m")

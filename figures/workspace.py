@@ -63,6 +63,7 @@ def cross_sections(
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             middle, half = (low + high) / 2, 0.55 * max(float((high - low).max()), 1e-6)
+            ax.set_adjustable("box")  # the limits are what is to be equal
             ax.set_xlim(middle[0] - half, middle[0] + half)
             ax.set_ylim(middle[1] - half, middle[1] + half)
     return canvas
@@ -80,7 +81,7 @@ def reached(found: xr.Dataset) -> Figure:
     """
     thick = [name for name in ("x", "y", "z") if found.sizes[name] > 1]
     pairs = [(a, b) for a, b in (("x", "y"), ("x", "z"), ("y", "z")) if a in thick and b in thick]
-    canvas = style.figure(width=1.0 + 3.6 * max(len(pairs), 1), height=3.4)
+    canvas = style.figure(width=0.9 + 2.2 * max(len(pairs), 1), height=2.8)
     if not pairs:
         _reached_along(canvas, found, thick[0] if thick else "x")
         return canvas

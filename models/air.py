@@ -102,12 +102,12 @@ def dryden(
 
 def _along(step: float, noise: np.ndarray) -> np.ndarray:
     """Unit white noise through sqrt(2) / (1 + s), sampled every `step`, of variance one: an exact recursion."""
-    keep, kick = np.exp(-step), np.sqrt(-np.expm1(-2 * step))
+    keep, kick = float(np.exp(-step)), np.sqrt(-np.expm1(-2 * step))
     values = np.empty(len(noise) - 1)
-    x = noise[0, 0]
-    for k in range(len(values)):
+    x = float(noise[0, 0])
+    for k, innovation in enumerate((kick * noise[1:, 0]).tolist()):
         values[k] = x
-        x = keep * x + kick * noise[k + 1, 0]
+        x = keep * x + innovation
     return values
 
 
@@ -122,13 +122,14 @@ def _across(step: float, noise: np.ndarray) -> np.ndarray:
     s = h * (nodes + 1) / 2
     impulse = np.exp(-s) * np.stack([s, 1 - s])
     root = np.linalg.cholesky(h / 2 * (impulse * weights) @ impulse.T)
-    transition = np.exp(-h) * np.array([[1 + h, h], [-h, 1 - h]])
-    values = np.empty(len(noise) - 1)
-    x = noise[0] / 2  # in its stationary distribution both have variance 1/4
-    for k in range(len(values)):
-        values[k] = x[0] + np.sqrt(3) * x[1]
-        x = transition @ x + root @ noise[k + 1]
-    return values
+    (a, b), (c, d) = (np.exp(-h) * np.array([[1 + h, h], [-h, 1 - h]])).tolist()
+    states = np.empty((len(noise) - 1, 2))
+    x, y = (noise[0] / 2).tolist()  # in its stationary distribution both have variance 1/4
+    # Numbers of Python's own: ten times as fast as arrays of two.
+    for k, (kick, other) in enumerate((noise[1:] @ root.T).tolist()):
+        states[k] = x, y
+        x, y = a * x + b * y + kick, c * x + d * y + other
+    return states @ np.array([1.0, np.sqrt(3)])
 
 
 def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int | None, least: float = -np.inf) -> np.ndarray:

@@ -105,7 +105,10 @@ class Dynamics:
         return call(self._in_wind, arguments | {"wind": wind})["w"]
 
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
-        """W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`."""
+        """W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`.
+
+        Arguments as in `required_wrench`.
+        """
         arguments = {"pose": pose, "velocity": velocity, "wind": wind}
         return call(self._aerodynamic, arguments)["W_e"]
 
@@ -182,10 +185,12 @@ class Dynamics:
     ) -> tuple[Array, Array]:
         """Linearised forward dynamics, d(dx)/dt = A dx + B dt about a state x = (pose, velocity) and tensions.
 
+        Arguments as in `acceleration`.
+
         Returns
         -------
-        A, (..., 12, 12), and B, (..., 12, m). The tensions stay as they are when the platform moves; for elastic cables
-        see `stiffness`.
+        A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2 per N]. The tensions stay as they are when
+        the platform moves; for elastic cables see `stiffness`.
         """
         arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
         arguments["carrier_pose"] = self._carriers(carrier_pose)
@@ -199,6 +204,10 @@ class Dynamics:
 
         Parameters
         ----------
+        pose, carrier_pose
+            As in `wrench_matrix`.
+        tensions
+            (..., m) [N].
         elastic
             True: the cables stretch, each needs its `stiffness`; False: their tensions stay, only geometry counts.
 

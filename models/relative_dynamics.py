@@ -19,8 +19,9 @@ Array: TypeAlias = Any  # NumPy arrays with leading batch dimensions in and out,
 class RelativeDynamics:
     """Paper F's form of the dynamics: everything in {A}, the carrier's motion apart in D_B (paper F, Eq. 38).
 
-    `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, as seen in {A}; `carrier_*`
-    are those of {A} in {G}. Each is (..., 6), a single carrier having no row of its own.
+    `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, as seen in {A};
+    `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, None: at home and at rest.
+    Each is (..., 6) [m, rad], a single carrier having no row of its own.
 
     Attributes
     ----------
@@ -37,7 +38,7 @@ class RelativeDynamics:
         self.functions: dict[str, ca.Function] = _relative_functions(robot)
 
     def wrench_matrix(self, pose: Array) -> Array:
-        """Wrench matrix A in {A}, (..., 6, m); it depends on the relative pose alone."""
+        """Wrench matrix A in {A}, (..., 6, m) [N and N m per N]; it depends on the relative pose alone."""
         return call(self.functions["wrench_matrix"], {"pose": pose}, matrices=("A",))["A"]
 
     def base_disturbance(
@@ -85,7 +86,7 @@ class RelativeDynamics:
         carrier_velocity: Array | None = None,
         carrier_acceleration: Array | None = None,
     ) -> tuple[Array, Array, Array]:
-        """Pose, velocity and acceleration of the platform frame in {G}, (..., 6) each.
+        """Pose, velocity and acceleration of the platform frame in {G}, (..., 6) each [m, rad] and per s, s^2.
 
         The Euler angles lie in (-pi, pi], so that a series of them may jump by 2 pi; `numpy.unwrap` undoes it.
         """

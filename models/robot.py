@@ -335,39 +335,39 @@ class Robot(Part):
 
     @property
     def anchors(self) -> np.ndarray:
-        """Anchors A_i, each in the frame of its carrier [m]."""
+        """Anchors A_i, each in the frame of its carrier, (m, 3) [m]."""
         return np.array([cable.anchor for cable in self.cables])  # (m, 3)
 
     @property
     def attachments(self) -> np.ndarray:
-        """Attachments B_i in the platform frame [m]."""
+        """Attachments B_i in the platform frame, (m, 3) [m]."""
         return np.array([cable.attachment for cable in self.cables])  # (m, 3)
 
     @property
     def pulley_radii(self) -> np.ndarray:
-        """Radius of each cable's pulley [m], 0 for a point anchor."""
+        """Radius of each cable's pulley, (m,) [m], 0 for a point anchor."""
         return np.array([cable.pulley.radius if cable.pulley else 0.0 for cable in self.cables])  # (m,)
 
     @property
     def pulley_axes(self) -> np.ndarray:
-        """Swivel axis of each cable's pulley in the frame of its carrier, of unit length; z for a point anchor."""
+        """Swivel axis of each cable's pulley in the frame of its carrier, (m, 3) [-]; z for a point anchor."""
         axes = np.array([cable.pulley.axis if cable.pulley else (0.0, 0.0, 1.0) for cable in self.cables])
         return axes / np.linalg.norm(axes, axis=1, keepdims=True)  # (m, 3)
 
     @property
     def carrier_of_cable(self) -> np.ndarray:
-        """Index of the carrier that each cable hangs from."""
+        """Index of the carrier that each cable hangs from, (m,)."""
         names = [carrier.name for carrier in self.carriers]
         return np.array([names.index(cable.carrier) for cable in self.cables])  # (m,)
 
     @property
     def t_min(self) -> np.ndarray:
-        """Smallest tensions [N]."""
+        """Smallest tensions, (m,) [N]."""
         return np.array([cable.t_min for cable in self.cables])  # (m,)
 
     @property
     def t_max(self) -> np.ndarray:
-        """Largest tensions [N]."""
+        """Largest tensions, (m,) [N]."""
         return np.array([cable.t_max for cable in self.cables])  # (m,)
 
     @property
@@ -379,12 +379,12 @@ class Robot(Part):
 
     @property
     def carrier_home(self) -> np.ndarray:
-        """Home poses of the carriers in {G} [m, rad]."""
+        """Home poses of the carriers in {G}, (c, 6) [m, rad]."""
         return np.array([carrier.home for carrier in self.carriers])  # (c, 6)
 
     @property
     def home(self) -> np.ndarray:
-        """Home pose of the platform in {G} [m, rad], from the file or, if it has none, amid or below the anchors."""
+        """Home pose of the platform in {G}, (6,) [m, rad], from the file or else amid or below the anchors."""
         if self.platform.home is not None:
             return np.array(self.platform.home)  # (6,)
         from . import kinematics
@@ -393,7 +393,7 @@ class Robot(Part):
 
     @property
     def home_anchors(self) -> np.ndarray:
-        """Anchors in {G} with the carriers at home [m]."""
+        """Anchors in {G} with the carriers at home, (m, 3) [m]."""
         from . import kinematics
 
         at_home = kinematics.ca.DM(self.carrier_home)
@@ -401,14 +401,14 @@ class Robot(Part):
 
     @property
     def home_attachments(self) -> np.ndarray:
-        """Attachments in {G} with the platform at home [m]."""
+        """Attachments in {G} with the platform at home, (m, 3) [m]."""
         from . import kinematics
 
         return kinematics.transform(kinematics.ca.DM(self.home), self.attachments).full().T  # (m, 3)
 
     @property
     def home_com(self) -> np.ndarray:
-        """CoM in {G} with the platform at home [m]."""
+        """CoM in {G} with the platform at home, (3,) [m]."""
         from . import kinematics
 
         com = np.array([self.platform.com])
@@ -416,12 +416,12 @@ class Robot(Part):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Inertia matrix I_b about the CoM in platform axes [kg m^2], zero for a platform that cannot turn."""
+        """Inertia matrix I_b about the CoM in platform axes, (3, 3) [kg m^2], zero for a platform that cannot turn."""
         return inertia_matrix(self.platform.inertia or (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))  # (3, 3)
 
     @property
     def dof_mask(self) -> np.ndarray:
-        """1 for the wrench rows that the cables have to balance, 0 for those of coordinates that cannot move."""
+        """(6,): 1 for the wrench rows that the cables have to balance, 0 for those of coordinates that cannot move."""
         return np.array([float(name in self.platform.dof) for name in COORDINATES])  # (6,)
 
     @property

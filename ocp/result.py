@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..figures import animation, style
-from ..writing import whole_file
+from ..writing import save_netcdf, whole_file
 from .reports.drawings import drawings
 from .reports.finding import Finding, PlanStatus
 from .reports.report import as_text
@@ -41,10 +41,7 @@ class Plan(Finding):
         InputError
             If the place cannot be written to.
         """
-        path = Path(file)
-        with whole_file(path) as temporary:
-            self.trajectory.to_netcdf(temporary, engine="h5netcdf")
-        return path
+        return save_netcdf(self.trajectory, Path(file))
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Draw path, views, tensions, base offset, other limits and convergence as PNG files in `folder`; their paths.

@@ -85,7 +85,7 @@ class BatchSolution:
     def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
         """Solve one row again by itself, for its certificate and all that a `TensionSolution` can tell.
 
-        With the method "active-set", or "soft-wrench" if `rho` was given.
+        With the method "active-set", or "soft-wrench" if `rho` was given; `index` picks it, a number or a tuple.
 
         Raises
         ------

@@ -71,14 +71,14 @@ class Method(ABC):
     def attempt(self, problem: TensionProblem) -> tuple[Status, NDArray[np.float64] | None] | None:
         """Answer on the spot, or return None: then `propose` is asked and judged.
 
-        What is returned here is not judged again. Tensions are inside the limits and give w within
+        What is returned here is not judged again. Tensions, (m,) [N], are inside the limits and give w within
         `TensionProblem.tolerance`; "infeasible" and "singular" rest on a direction that proves it by several times as
         much, so that `certify` finds the sharpest certificate when somebody asks for it.
         """
         return None
 
     def direction(self, problem: TensionProblem) -> NDArray[np.float64] | None:
-        """Return the direction, shape (n,), on which "infeasible" or "singular" of `attempt` rests.
+        """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of `attempt` rests.
 
         It is asked for only where `certify` finds none.
         """
@@ -86,4 +86,14 @@ class Method(ABC):
 
     @abstractmethod
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
-        """Choose s with Q s = b and lower <= s <= upper."""
+        """Choose s with Q s = b and lower <= s <= upper.
+
+        Parameters
+        ----------
+        form :
+            The problem in standard form.
+        backend :
+            One of `backends`; None = the first.
+        options :
+            As `options` lists them.
+        """

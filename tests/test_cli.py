@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -307,3 +308,31 @@ def test_version_and_help():
     assert run("--version").stdout.strip() == "towline 0.1.0"
     for command in ("demo", "robots", "tension", "plan", "export"):
         assert run(command, "--help").returncode == 0
+
+
+def test_shells_complete_commands_and_robots(monkeypatch):
+    """Bash asks with the line so far in the environment."""
+    monkeypatch.setenv("_TOWLINE_COMPLETE", "complete_bash")
+    for line, completed in (
+        ("towline ten", {"tension"}),
+        ("towline tension wang-f", {name for name in available() if name.startswith("wang-f")}),
+    ):
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
+        assert set(run().stdout.split()) == completed
+
+
+def test_what_was_meant_is_told():
+    for words, meant in ((("tensio", "wang-flying"), "tension"), (("tension", "wang-fliing"), "wang-flying")):
+        done = run(*words)
+        assert done.returncode == 2
+        assert re.search(f"did you mean '{meant}'", done.stderr, re.IGNORECASE)
+
+
+def test_help_starts_at_once():
+    """Nothing heavy is imported for it: 0.3 s on a free core."""
+    code = "import sys; import towline.cli.main; print(*sys.modules)"
+    loaded = set(
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    )
+    assert not loaded & {"casadi", "numba", "xarray", "matplotlib", "scipy", "qpsolvers", "osqp", "viser", "pandas"}

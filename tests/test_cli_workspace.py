@@ -115,7 +115,10 @@ def test_checkpoint_then_resume(folder):
         (("--checkpoint", "mass.yaml"), "mass.yaml: is there already"),
         (("--resume", "mass.yaml"), "mass.yaml: is no checkpoint of towline"),
         (("--resume", "a", "--checkpoint", "b"), "--checkpoint: b beside --resume a"),
-        (("--resume", "a", "--out", "a"), "a: is the checkpoint"),
+        (("--resume", "a", "--out", "a"), "--out: a is the checkpoint"),
+        (("--out", "a.nc", "--figure", "a.nc"), "--figure: a.nc is --out already"),
+        (("--samples", "1e300"), "--samples: is 1e+300"),
+        (("--condition", '{"kind": ["margin"]}'), "condition.kind: ['margin'] is unknown"),
         (("--mesh", "m.stl", "--box", "0 0 0; 1 1 0"), "box: from"),
         (
             ("--mesh", "m.stl", "--attitude", "0 0 0; 0 0 1"),

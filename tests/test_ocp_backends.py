@@ -11,7 +11,8 @@ from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.tasks.scenario import lay_out
 from towline.ocp.tasks.task import Task
-from towline.studies import flying_circle, towing_plans
+from towline.studies.flying import circle as flying_circle
+from towline.studies.towing import plans as towing_plans
 
 LINE = {
     "path": {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.3]},

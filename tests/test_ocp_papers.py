@@ -6,7 +6,8 @@ import pytest
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.ocp.tasks.path import Motion
-from towline.studies import flying_plans, towing_plans
+from towline.studies.flying import plans as flying_plans
+from towline.studies.towing import plans as towing_plans
 
 
 def missing(robot, audited):

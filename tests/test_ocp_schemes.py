@@ -15,7 +15,8 @@ from towline.ocp.tasks import spline
 from towline.ocp.tasks.scenario import Deviation, lay_out
 from towline.ocp.tasks.scheme import SCHEMES
 from towline.ocp.tasks.task import Task
-from towline.studies import flying_circle, towing_plans
+from towline.studies.flying import circle as flying_circle
+from towline.studies.towing import plans as towing_plans
 
 GRAVITY = 9.81
 NAMES = tuple(SCHEMES)

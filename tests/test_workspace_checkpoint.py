@@ -12,7 +12,7 @@ import pytest
 from towline.errors import InputError
 from towline.models import load
 from towline.workspace import Condition, StaticEquilibrium, sample, save
-from towline.workspace.checkpoint import MAGIC, open_checkpoint
+from towline.workspace.checkpoint import MAGIC, begin, open_checkpoint
 from towline.workspace.sampling import CHUNK
 
 TOWLINE = Path(sys.executable).with_name("towline")
@@ -94,9 +94,10 @@ def test_garbage_at_the_end_is_dropped(tmp_path, whole):
     """As a power cut can leave: the length is there, the content is not."""
     content, result = whole
     file = tmp_path / "run.checkpoint"
-    file.write_bytes(content[:-100] + bytes(100))
-    assert save(run(file, True), tmp_path / "result.nc").read_bytes() == result
-    assert file.read_bytes() == content
+    for lost, zeros in ((100, 100), (RECORD + 5, 3 * RECORD)):
+        file.write_bytes(content[:-lost] + bytes(zeros))
+        assert save(run(file, True), tmp_path / "result.nc").read_bytes() == result
+        assert file.read_bytes() == content
 
 
 def test_what_is_there_is_not_asked_again(tmp_path):
@@ -184,6 +185,37 @@ def test_nothing_is_overwritten(tmp_path):
     with pytest.raises(InputError, match="cannot be written"):
         run(file / "below", True)
     assert os.listdir(tmp_path) == ["notes.txt"]
+
+
+def test_of_two_runs_that_begin_at_once_one_has_the_file(tmp_path):
+    """Both have seen that it is not there yet."""
+    file = tmp_path / "run.checkpoint"
+    assert begin(file, b"first")
+    assert not begin(file, b"second")
+    assert file.read_bytes() == b"first"
+    assert os.listdir(tmp_path) == ["run.checkpoint"]
+
+
+def test_a_full_disk_is_told_and_what_is_there_is_gone_on_with(tmp_path, whole):
+    """A limit on the size of files stands for the disk."""
+    resource = pytest.importorskip("resource")
+    file = tmp_path / "run.checkpoint"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole[0]) - RECORD, before[1]))
+        with pytest.raises(InputError, match=r"run.checkpoint: cannot be written \(File too large\) after chunk 2"):
+            run(file, False)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    found = run(file, True)
+    assert file.read_bytes() == whole[0]
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+        with pytest.raises(InputError, match=r"result.nc: cannot be written \(File too large\)"):
+            save(found, tmp_path / "result.nc")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert os.listdir(tmp_path) == ["run.checkpoint"]
 
 
 def test_one_run_at_a_time(tmp_path):

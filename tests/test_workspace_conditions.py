@@ -329,6 +329,20 @@ def test_cables_keep_away_from_obstacles():
         assert 0 < held.sum() < 80
 
 
+def test_a_cable_through_an_obstacle_is_not_free_whatever_its_kind():
+    """Without any clearance too: the ball, the capsule and the box lie about the middle of the first cable."""
+    robot = load("point-mass-3")
+    places = Places.at_home(robot, robot.home)
+    middle = (robot.home_anchors[0] + robot.home[:3] + robot.attachments[0]) / 2
+    beyond = middle + 100.0
+    for at, free in ((middle, False), (beyond, True)):
+        low, high = (at - 0.01).tolist(), (at + 0.01).tolist()
+        ball = {"kind": "sphere", "centre": at.tolist(), "radius": 0.01}
+        capsule = {"kind": "capsule", "start": low, "end": high, "radius": 0.01}
+        for obstacle in (ball, capsule, {"kind": "box", "min": low, "max": high}):
+            assert Interference(obstacles=(obstacle,)).holds(robot, places)[0] == free, obstacle
+
+
 def test_cables_keep_apart():
     """Least distance of two cables that share no end: bounded least squares over where on each."""
     robot, places = some_places("ipanema-2", 40, turn=0.6)
@@ -415,6 +429,12 @@ def test_one_bad_pose_is_no_and_leaves_the_others_alone():
         ({"kind": "lengths", "min": 2, "max": 1}, "min must not exceed max"),
         ({"kind": "all", "conditions": [{"kind": "margin", "abov": 1}]}, "abov: is not a known key"),
         ({"kind": "wrench-with-tolerance", "tolerance": -1}, "tolerance"),
+        ({"kind": ["margin"]}, "condition.kind: ['margin'] is unknown"),
+        ({"kind": "margin", "self": 1}, "self: is not a known key"),
+        ({"kind": "margin", 1: 2}, "1: is not a known key"),
+        ({"kind": "lengths", "min": [2, 1], "max": [3, 0.5]}, "min must not exceed max"),
+        ({"kind": "lengths", "min": [1, 2], "max": 1.5}, "min must not exceed max"),
+        ({"kind": "interference", "between_cables": 0}, "between_cables: "),
     ],
 )
 def test_wrong_conditions_are_told_in_a_line(data, told):

@@ -5,8 +5,8 @@ import pytest
 
 from towline.models import Dynamics, Robot
 from towline.models.statics import equilibria
-from towline.studies import towing_workspace as study
-from towline.studies.towing_plans import robot
+from towline.studies.towing import workspace as study
+from towline.studies.towing.plans import DRIVES, robot
 from towline.workspace import EquilibriumPosture, ExistsPlacement, ForceBalance, Places
 from towline.workspace.volume import volume
 
@@ -15,7 +15,7 @@ REACH = 0.0577350269  # of an attachment from the load's middle [m]
 
 @pytest.fixture(scope="module")
 def found():
-    return {drive: study.loops(drive) for drive in study.DRIVES}
+    return {drive: study.loops(drive) for drive in DRIVES}
 
 
 def triangle(corners):
@@ -44,7 +44,7 @@ def test_what_is_held_is_held_by_pulling(found):
         tensions = np.linalg.solve(U, np.tile([[0.0], [0.0], [system.robot.weight]], (len(places), 1, 1)))[..., 0]
         assert tensions.min() > -1e-9
         assert tensions.max() < 500 + 1e-6
-        low, high = study._reach(system.robot)
+        low, high = study.reach(system.robot)
         ends = places.carriers[:, :, :3]
         assert ((ends >= low) & (ends <= high)).all()
 
@@ -84,7 +84,7 @@ def test_ranges_are_beside_the_printed_ones(found):
     printed = np.array(study.PRINTED["both"])
     np.testing.assert_allclose(both, printed, atol=0.1)
     system = found["both"].robot
-    low, high = study._reach(system)
+    low, high = study.reach(system)
     assert (both[:, 0] >= [*low[:, :2].min(axis=0) - REACH, 0]).all()
     assert (both[:, 1] <= high.max(axis=0) + REACH).all()
 
@@ -104,7 +104,7 @@ def test_the_level_workspace_of_variable_length_is_a_prism():
 
 
 def test_volumes_grow_from_one_type_to_the_next():
-    sizes = [study.volume_of(drive, samples=4000, tries=24) for drive in study.DRIVES]
+    sizes = [study.volume_of(drive, samples=4000, tries=24) for drive in DRIVES]
     assert sizes[0].high < sizes[1].low < sizes[1].high < sizes[2].low
     assert all(size.low < size.value < size.high for size in sizes)
 

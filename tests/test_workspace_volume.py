@@ -144,6 +144,21 @@ def test_a_flat_box_has_no_mesh():
         boundary(robot, StaticEquilibrium(), np.zeros(3), np.array([1.0, 0.0, 1.0]))
 
 
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"cells": np.nan}, "cells: is nan; accepted: a whole number from 2"),
+        ({"cells": 10**6}, "cells: is 1000000"),
+        ({"high": [1, 1, np.inf]}, "high: is"),
+        ({"low": "here"}, "low: is 'here'; accepted: three finite numbers"),
+        ({"attitude": [0, 0]}, r"attitude: is \[0, 0\]"),
+    ],
+)
+def test_a_mesh_of_nothing_sensible_is_refused(wrong, told):
+    with pytest.raises(InputError, match=told):
+        boundary(load("point-mass-3"), StaticEquilibrium(), **{"low": [0, 0, 0], "high": [1, 1, 1], **wrong})
+
+
 def test_pictures_have_units_and_equal_scales():
     points = np.random.default_rng(0).uniform(0, 1, (500, 3))
     canvas = figures.projections({"one": points, "two": points + 0.2}, marks=np.eye(3))

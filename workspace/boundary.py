@@ -6,14 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..models import Robot
 from ..writing import whole_file
 from .condition import Condition
 from .places import Places
+from .sampling import whole
 
 __all__ = ["Mesh", "boundary", "boundary_of_values"]
+
+MOST_CELLS = 512  # along an edge: 10^8 poses at once
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -56,15 +60,17 @@ class Mesh:
 def boundary(
     robot: Robot,
     condition: Condition,
-    low: np.ndarray,
-    high: np.ndarray,
+    low: ArrayLike,
+    high: ArrayLike,
     cells: int = 48,
-    attitude: np.ndarray | None = None,
+    attitude: ArrayLike | None = None,
 ) -> Mesh:
     """Mesh of the boundary of the positions where a condition holds, at one attitude, with the carriers at home.
 
     Parameters
     ----------
+    robot, condition
+        Whose positions, and what is to hold there.
     low, high
         Corners of the box to look in, (3,) in {G} [m].
     cells
@@ -75,20 +81,32 @@ def boundary(
     Raises
     ------
     InputError
-        If the box is flat or there are too few cells.
+        If the box is flat, or there are too few cells or too many.
     """
-    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    if low.shape != (3,) or high.shape != (3,) or not (high > low).all():
+    low, high = _three("low", low), _three("high", high)
+    if not (high > low).all():
         raise InputError(f"box: from {low.tolist()} to {high.tolist()}; accepted: three numbers each, low below high")
-    if cells < 2:
-        raise InputError(f"cells: is {cells}; accepted: 2 and more")
+    whole("cells", cells, 2, MOST_CELLS)
+    angles = robot.home[3:] if attitude is None else _three("attitude", attitude)
     counts = np.maximum(np.ceil((high - low) / ((high - low).max() / cells)).astype(int), 1) + 1
     axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
     poses = np.empty((int(np.prod(counts)), 6))
     poses[:, :3] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    poses[:, 3:] = robot.home[3:] if attitude is None else attitude
+    poses[:, 3:] = angles
     held = condition.holds(robot, Places.at_home(robot, poses))
     return boundary_of_values(held.reshape(counts) - 0.5, low, high)
+
+
+def _three(field: str, values: ArrayLike) -> np.ndarray:
+    """Return (3,), or raise `InputError` if values are not three finite numbers."""
+    accepted = f"{field}: is {values!r}; accepted: three finite numbers"
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(accepted) from None
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise InputError(accepted)
+    return array
 
 
 def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:

@@ -16,16 +16,18 @@ import json
 import os
 import struct
 import time
+import uuid
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..writing import check_writable, whole_file
+from ..writing import check_writable
 from .sampling import CHUNK
 
 MAGIC = b"towline workspace checkpoint 1\n"
@@ -44,7 +46,7 @@ class Checkpoint:
         How many chunks it had when it was opened.
     """
 
-    def __init__(self, path: Path, stream: BinaryIO, start: int, stored: int):
+    def __init__(self, path: Path, stream: FileIO, start: int, stored: int):
         self.stored = stored
         self._path, self._stream, self._read = path, stream, 0
         self._safe_at = time.monotonic()
@@ -67,17 +69,30 @@ class Checkpoint:
         return record[2]
 
     def append(self, chunk: int, size: int, flags: bytes) -> None:
-        """Add a chunk; those that are there already are not added again."""
+        """Add a chunk; those that are there already are not added again.
+
+        Raises
+        ------
+        InputError
+            If there is no room for it. What was there before is safe.
+        """
         if chunk < self.stored:
             return
         accepted = int(np.unpackbits(np.frombuffer(flags, np.uint8)).sum())
         record = _HEAD.pack(chunk, size, accepted) + flags
-        self._stream.seek(0, os.SEEK_END)
-        self._stream.write(record + _SUM.pack(zlib.crc32(record)))
-        self._stream.flush()
-        if time.monotonic() - self._safe_at > _SAFE_EVERY:
-            os.fsync(self._stream.fileno())
-            self._safe_at = time.monotonic()
+        left = memoryview(record + _SUM.pack(zlib.crc32(record)))
+        try:
+            self._stream.seek(0, os.SEEK_END)
+            while left:
+                left = left[self._stream.write(left) :]
+            if time.monotonic() - self._safe_at > _SAFE_EVERY:
+                os.fsync(self._stream.fileno())
+                self._safe_at = time.monotonic()
+        except OSError as error:
+            raise InputError(
+                f"{self._path}: cannot be written ({error.strerror}) after chunk {chunk}; accepted: to resume it, once "
+                "there is room"
+            ) from None
 
 
 @contextmanager
@@ -99,11 +114,10 @@ def open_checkpoint(path: Path, header: dict[str, Any], resume: bool) -> Iterato
     if target.exists() and not resume:
         raise InputError(f"{path}: is there already; accepted: a new path, or resume to go on with it")
     text = json.dumps(header, sort_keys=True).encode()
-    if not target.exists():
-        with whole_file(target) as place:
-            place.write_bytes(MAGIC + _SUM.pack(len(text)) + text + _SUM.pack(zlib.crc32(text)))
     try:
-        stream = target.open("r+b")
+        if not target.exists() and not begin(target, MAGIC + _SUM.pack(len(text)) + text + _SUM.pack(zlib.crc32(text))):
+            raise InputError(f"{path}: another run has just begun it; accepted: a checkpoint that is not in use")
+        stream = FileIO(target, "r+b")
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); accepted: a writable place") from None
     with stream:
@@ -117,7 +131,23 @@ def open_checkpoint(path: Path, header: dict[str, Any], resume: bool) -> Iterato
         os.fsync(stream.fileno())
 
 
-def _lock(path: Path, stream: BinaryIO) -> None:
+def begin(target: Path, content: bytes) -> bool:
+    """Make a new file, whole or not at all; False if there is one by now, which is left as it is."""
+    temporary = target.with_name(f".{uuid.uuid4().hex}")
+    try:
+        temporary.write_bytes(content)
+        try:
+            os.link(temporary, target)  # other than a renaming it never replaces a file
+        except FileExistsError:
+            return False
+        except OSError:  # a file system without links
+            os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return True
+
+
+def _lock(path: Path, stream: FileIO) -> None:
     """Keep other processes away as long as the stream is open, where the system can."""
     try:
         import fcntl
@@ -131,7 +161,7 @@ def _lock(path: Path, stream: BinaryIO) -> None:
         return
 
 
-def _check_header(path: Path, stream: BinaryIO, header: dict[str, Any]) -> None:
+def _check_header(path: Path, stream: FileIO, header: dict[str, Any]) -> None:
     """Read the header, and raise unless it is this run's."""
     if stream.read(len(MAGIC)) != MAGIC:
         raise InputError(f"{path}: is no checkpoint of towline; accepted: {ACCEPTED}, or a new path")
@@ -146,18 +176,21 @@ def _check_header(path: Path, stream: BinaryIO, header: dict[str, Any]) -> None:
             raise InputError(f"{path}: is of another run: its {name} is {theirs}, not {ours}; accepted: {ACCEPTED}")
 
 
-def _scan(path: Path, stream: BinaryIO) -> tuple[int, int]:
+def _scan(path: Path, stream: FileIO) -> tuple[int, int]:
     """How many whole records there are, and where they end."""
     chunk, end = 0, stream.tell()
     length = os.fstat(stream.fileno()).st_size
     while (record := _record(stream)) is not None and record[0] == chunk:
         chunk, end = chunk + 1, stream.tell()
-    if length - end > _LONGEST:
+    stream.seek(end)
+    stream.read(_LONGEST)
+    # A power cut can leave a file as long as it was to be, with zeros where nothing was written.
+    if length - end > _LONGEST and any(any(block) for block in iter(lambda: stream.read(_LONGEST), b"")):
         raise InputError(f"{path}: is damaged after chunk {chunk}, byte {end}; accepted: {ACCEPTED}")
     return chunk, end
 
 
-def _record(stream: BinaryIO) -> tuple[int, int, bytes] | None:
+def _record(stream: FileIO) -> tuple[int, int, bytes] | None:
     """The next record, (chunk, samples, flags), or None if there is no whole one."""
     head = stream.read(_HEAD.size)
     if len(head) < _HEAD.size:

@@ -26,7 +26,7 @@ class Condition(Part, ABC):
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
 
-    def __init__(self, **fields: Any):
+    def __init__(self, /, **fields: Any):
         try:
             super().__init__(**fields)
         except ValidationError as error:
@@ -39,7 +39,7 @@ class Condition(Part, ABC):
             Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Whether the condition holds, (n,) of bool; False where a number of the place is not finite.
+        """Whether the condition holds at each of n places, (n,) of bool; False where a number of one is not finite.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Condition(Part, ABC):
 
 
 def condition_from(data: Any) -> Condition:
-    """A condition from its mapping, as `model_dump` makes it or as a file has it.
+    """A condition from its data: a mapping, as `model_dump` makes it or as a file has it.
 
     Raises
     ------
@@ -86,9 +86,9 @@ def condition_from(data: Any) -> Condition:
     accepted = ", ".join(sorted(Condition.kinds))
     if not isinstance(data, dict) or "kind" not in data:
         raise InputError(f"condition: is {data!r}; accepted: a mapping with a kind, one of {accepted}")
-    if data["kind"] not in Condition.kinds:
+    if not isinstance(data["kind"], str) or data["kind"] not in Condition.kinds:
         raise InputError(f"condition.kind: {data['kind']!r} is unknown; accepted: {accepted}")
-    return Condition.kinds[data["kind"]](**data)
+    return Condition.kinds[data["kind"]](**{str(name): value for name, value in data.items()})
 
 
 AnyCondition = Annotated[SerializeAsAny[Condition], BeforeValidator(condition_from)]

@@ -104,10 +104,13 @@ def _on_processes(pool: ProcessPoolExecutor, packed: bytes, jobs: Iterable[Job],
 def _cluster(address: str) -> Iterator[Any]:
     try:
         import distributed
+        from distributed.comm.addressing import get_address_host
     except ModuleNotFoundError:
         raise SolverError("scheduler: needs the extra cluster; install it by: pip install 'towline[cluster]'") from None
     accepted = "the address of a Dask scheduler that is running, as tcp://host:8786"
     try:
+        # A client of an address that is none is never closed, which takes long and is told in many lines.
+        get_address_host(address)
         client = distributed.Client(address, timeout=CONNECT_WITHIN, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = "no answer" if isinstance(error, OSError) else str(error)

@@ -50,7 +50,7 @@ class Outcome:
             self._flags.append(tally.accepted[: self._room])
             self._room -= len(self._samples[-1])
 
-    def dataset(self, keep: str, refinement: Refinement | None) -> xr.Dataset:
+    def dataset(self, keep: str, method: str, refinement: Refinement | None) -> xr.Dataset:
         """All of it; what it has is told by `sample`."""
         import xarray as xr
 
@@ -67,7 +67,7 @@ class Outcome:
             "bounds": (("end", "axis"), bounds, metres),
             "tried": (("x", "y", "z"), self._counts[0], {"units": "1", "long_name": "samples tried in the cell"}),
             "reached": (("x", "y", "z"), self._counts[1], {"units": "1", "long_name": "of them accepted"}),
-            **_measures(self._counts, domain, self.tried, self.accepted, refinement),
+            **_measures(self._counts, domain, self.tried, self.accepted, method, refinement),
         }
         coordinates: dict[str, Any] = {
             "axis": AXES,
@@ -105,7 +105,7 @@ class Outcome:
 
 
 def _measures(
-    counts: np.ndarray, domain: Domain, tried: int, accepted: int, refinement: Refinement | None
+    counts: np.ndarray, domain: Domain, tried: int, accepted: int, method: str, refinement: Refinement | None
 ) -> dict[str, Any]:
     """The volume and its ends."""
     whole = domain.measure
@@ -116,6 +116,9 @@ def _measures(
     elif domain.hangs:
         value = np.count_nonzero(counts[1]) / counts[1].size
         ends, told = (np.nan, np.nan), "none: positions are not uniform; the volume is that of the cells reached"
+    elif method == "grid":
+        value, ends = accepted / tried, (np.nan, np.nan)
+        told = "none: a grid has no chance in it; it can be off by half a layer of cells along the boundary"
     else:
         value, ends = accepted / tried, share_interval(accepted, tried)
         told = f"interval of Clopper and Pearson at {LEVEL:.0%}, of independent samples"

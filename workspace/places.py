@@ -29,7 +29,7 @@ class Places:
 
     @classmethod
     def at_home(cls, robot: Robot, pose: ArrayLike) -> Places:
-        """Poses (n, 6) with every carrier at home."""
+        """Poses (n, 6) in {G} [m, rad] with every carrier at home."""
         poses = np.atleast_2d(np.asarray(pose, dtype=float))
         home = robot.carrier_home
         return cls(poses, np.broadcast_to(home, (len(poses), *home.shape)))

@@ -68,8 +68,8 @@ def masked_problem(
 def hints(dynamics: Dynamics, count: int = 400, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """A first look at the workspace: random positions about home and whether the robot can rest there.
 
-    The positions fill the box of home, anchors and carriers, at the attitude of home. For the workspace itself, with
-    volumes and conditions, this is no substitute.
+    The positions fill the box of home, anchors and carriers at random, by `seed`, at the attitude of home. For the
+    workspace itself, with volumes and conditions, this is no substitute.
 
     Returns
     -------

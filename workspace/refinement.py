@@ -15,7 +15,9 @@ from ..errors import InputError
 from .domain import Domain
 from .sampling import cells_of
 
+AT_ONCE = 2**16  # cells
 FIRST_CELLS = 16  # along each axis, where the axes are equally long and the samples suffice
+MOST = 2_000_000  # samples: some 400 bytes each
 
 
 class Refinement:
@@ -36,8 +38,13 @@ class Refinement:
     def __init__(self, domain: Domain, samples: int, size: float | None):
         if domain.hangs or (domain.varying >= 3).any():
             raise InputError("method: adaptive refines positions; accepted: a region in which nothing else varies")
-        if size is not None and not 0 < size < np.inf:
+        number = isinstance(size, int | float | np.number) and not isinstance(size, bool)
+        if size is not None and not (number and 0 < size < np.inf):
             raise InputError(f"size: is {size!r}; accepted: a number > 0 [m], or None for as fine as the samples allow")
+        if samples > MOST:
+            raise InputError(
+                f"samples: is {samples}; accepted: at most {MOST} with method adaptive, which remembers its corners"
+            )
         self.inside = self.mixed = self.estimate = 0.0
         self._extent, self._samples, self._size = domain.extent, samples, size
         d = len(self._extent)
@@ -51,8 +58,9 @@ class Refinement:
         cells = np.stack(np.unravel_index(np.arange(self._count.prod()), self._count), axis=1)
         used = 0
         while True:
-            keys = self._keys(cells)  # (n, 2^d)
-            new = np.setdiff1d(keys, self._known)
+            corners = np.unique(np.concatenate([np.unique(self._keys(some)) for some in _pieces(cells)]))
+            new = np.setdiff1d(corners, self._known, assume_unique=True)
+            del corners
             if used and used + len(new) > self._samples:
                 # As fine as the samples allow; the mixed cells of the level before stay.
                 return
@@ -60,7 +68,7 @@ class Refinement:
             flags = yield np.stack(np.unravel_index(new, self._count + 1), axis=1) / self._count
             order = np.argsort(merged := np.concatenate([self._known, new]))
             self._known, self._flags = merged[order], np.concatenate([self._flags, flags])[order]
-            hits = self._flags[np.searchsorted(self._known, keys)].sum(axis=1)
+            hits = np.concatenate([self._hits(some) for some in _pieces(cells)])
             share = float(1.0 / self._count.prod())
             differ = (hits > 0) & (hits < len(self._corners))
             self.inside += share * int((hits == len(self._corners)).sum())
@@ -71,12 +79,20 @@ class Refinement:
                 return
             if self._count.max() > 2**19:  # three such indices fill a key
                 return
-            cells = self._halve(cells[differ])
+            cells = cells[differ]
+            # No other corner is one of a cell to come.
+            keep = np.unique(np.concatenate([np.unique(self._keys(some)) for some in _pieces(cells)]))
+            self._known, self._flags = keep, self._flags[np.searchsorted(self._known, keep)]
+            cells = self._halve(cells)
 
     def _keys(self, cells: np.ndarray) -> np.ndarray:
         """Numbers on the lattice of the corners of cells (n, d), (n, 2^d)."""
         corners = cells[:, None, :] + self._corners
         return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1)))
+
+    def _hits(self, cells: np.ndarray) -> np.ndarray:
+        """How many corners of cells (n, d) are accepted, (n,)."""
+        return self._flags[np.searchsorted(self._known, self._keys(cells))].sum(axis=1, dtype=np.int8)
 
     def _halve(self, cells: np.ndarray) -> np.ndarray:
         """The halves of cells (n, d) on the next, finer lattice, to which all that is known goes."""
@@ -85,6 +101,11 @@ class Refinement:
         # Twice the indices in the same order: the keys stay sorted.
         self._known = np.ravel_multi_index(tuple(known.T), tuple(self._count + 1))
         return (2 * cells[:, None, :] + self._corners).reshape(-1, cells.shape[1])
+
+
+def _pieces(cells: np.ndarray) -> list[np.ndarray]:
+    """Cells (n, d) some at a time: all their corners at once would take most of the memory."""
+    return [cells[start : start + AT_ONCE] for start in range(0, max(len(cells), 1), AT_ONCE)]
 
 
 def _first_cells(extent: np.ndarray, samples: int) -> tuple[int, ...]:

@@ -17,7 +17,7 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from ..models import Robot
-from ..writing import whole_file, whole_folder
+from ..writing import save_netcdf, whole_folder
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
 from .domain import Domain
@@ -104,8 +104,8 @@ def sample(
         volume, volume_interval (end) [m^3]
             Share of the samples that was accepted times the volume of the box, the mean over what varies beside the
             position, with the interval of Clopper and Pearson at 95 %: an area or a length of a box without thickness
-            along some axes. With `lengths`: of the cells reached, no interval. Adaptive: between the cells that lie
-            inside, and these with those that the boundary passes through.
+            along some axes. With `lengths`: of the cells reached, no interval; a grid has none either. Adaptive:
+            between the cells that lie inside, and these with those that the boundary passes through.
         boundary (cell, axis) [m], cell_edges (axis) [m]
             Of adaptive: centres of the smallest cells with corners that differ, and their edges.
 
@@ -120,6 +120,8 @@ def sample(
         If workers end before their work, or the extra `cluster` is not there.
     """
     start = time.perf_counter()
+    if not isinstance(robot, Robot):
+        raise InputError(f"robot: is {robot!r}; accepted: a Robot, as load('wang-flying') returns it")
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
     region = _region(region)
     check_sampling(method, samples, seed)
@@ -155,7 +157,7 @@ def sample(
             work.through(sampler)
         else:
             work.refine(refinement)
-    found = outcome.dataset(keep, refinement)
+    found = outcome.dataset(keep, method, refinement)
     seconds = time.perf_counter() - start
     found.attrs = {
         **asked,
@@ -188,9 +190,7 @@ def save(found: xr.Dataset, file: str | os.PathLike[str]) -> Path:
         return _save_zarr(lasting, path)
     packed = {"zlib": True, "complevel": 1}
     encoding = {str(name): packed for name, variable in lasting.data_vars.items() if variable.size > CHUNK}
-    with whole_file(path) as temporary:
-        lasting.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
-    return path
+    return save_netcdf(lasting, path, encoding)
 
 
 def _save_zarr(found: xr.Dataset, path: Path) -> Path:

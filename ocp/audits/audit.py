@@ -8,7 +8,6 @@ decide (`wind_set`), and where there is none, of winds inside the box too. All o
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -28,7 +27,7 @@ from .excess import Excess
 TOLERANCE = 1e-6  # [N]
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
-LOOKS = 50  # at a time, for the worst instant of a wind in which there are no tensions
+NEAREST = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
 INNER_WINDS = 8  # of a box of winds, at each instant others
 
 
@@ -182,8 +181,8 @@ class _Distribution:
     """Tensions of every instant of a motion with wrench matrices A (n, 6, m), for any wrenches that it may need.
 
     Where the tensions nearest to the wished ones, without limits, happen to lie inside the limits they are the answer:
-    a batch of pseudo-inverses finds those. The exact solver judges the others, and those that it finds none for one by
-    one.
+    a batch of pseudo-inverses finds those. The exact solver judges the others. Where it proves that there are none, how
+    far the wrench is from those available is told by a batch too, and the certificate is that of the farthest.
 
     Of few cables, whose columns do not span all wrenches, a wrench outside of what they span is expected to miss a
     little. Inside of it nothing may: there the limits count as for any robot.
@@ -194,12 +193,8 @@ class _Distribution:
         self._scaled_A = _scaled(scenario, A)
         self._inverse = np.linalg.pinv(self._scaled_A, rcond=INDEPENDENT if few else 1e-9)
 
-    def __call__(self, w: np.ndarray, wished: np.ndarray | None, looks: int | None = None) -> _Verdict:
-        """What becomes of the required wrenches w (n, 6), with tensions near the wished ones (n, m).
-
-        With `looks` the largest violation is looked for at so many of the instants without tensions, and then at all
-        near the worst of them; elsewhere the violation is the least that a verified direction proves.
-        """
+    def __call__(self, w: np.ndarray, wished: np.ndarray | None) -> _Verdict:
+        """What becomes of the required wrenches w (n, 6), with tensions near the wished ones (n, m)."""
         scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
         robot, (low, high) = scenario.robot, scenario.bounds()
         scaled_A, scaled_w = self._scaled_A, _scaled(scenario, w)
@@ -214,51 +209,55 @@ class _Distribution:
         beyond = 0.0
         rows = np.flatnonzero(~(inside & good))
         if rows.size:
-            mask = robot.dof_mask
-            batch = solve_batch(A[rows] * mask[:, None], w[rows] * mask, low, high, wish[rows], length=robot.length)
-            solved = rows[batch.feasible]
-            tensions[solved], violation[solved] = batch.tensions[batch.feasible], batch.residual[batch.feasible]
-            rows, proven = rows[~batch.feasible], batch.shortfall[~batch.feasible]
-            if looks is not None and not few and len(rows) > 2 * looks and np.isfinite(proven).all():
-                violation[rows] = proven
-                tensions[rows] = np.nan
-                rows = _worst_of(rows, looks, lambda k: _distance(scenario, A[k], w[k]))
-        for k in rows:
-            problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
-            solution = solve(problem)
-            certificate = solution.certificate
-            tensions[k] = np.nan if solution.tensions is None else solution.tensions
-            if solution.tensions is not None:
-                violation[k] = solution.residual
-            elif certificate is None:
-                violation[k] = np.inf
-            else:
-                closest = certificate.closest
-                violation[k] = np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w)
+            batch = solve_batch(scaled_A[rows], scaled_w[rows], low, high, wish[rows])
+            solved, proven = batch.feasible, np.isfinite(batch.shortfall)
+            tensions[rows[solved]], violation[rows[solved]] = batch.tensions[solved], batch.residual[solved]
+            left = list(rows[~solved & ~proven])
+            if proven.any():
+                proofs = rows[proven]
+                closest, away = _nearest(scaled_A[proofs], scaled_w[proofs], low, high)
+                violation[proofs] = np.fmax(away, batch.shortfall[proven])
+                tensions[proofs] = closest if few else np.nan
+                short = violation[proofs]
                 if few:
-                    tensions[k] = closest
-                    inside_range = certify(_inside_range(problem))
-                    if inside_range is not None:
-                        certificate, beyond = inside_range, max(beyond, inside_range.shortfall)
-                if worst is None or certificate.shortfall > worst.shortfall:
+                    in_range = _short_in_range(scaled_A[proofs], scaled_w[proofs], low, high)
+                    beyond, short = float(in_range.max()), np.where(in_range > 0, in_range, short)
+                left.append(proofs[np.argmax(short)])
+            for k in left:
+                problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
+                tensions[k], violation[k], certificate = self._alone(problem)
+                if certificate is not None and (worst is None or certificate.shortfall > worst.shortfall):
                     worst, at = certificate, int(k)
         return _Verdict(tensions, violation, worst, at, beyond)
 
+    def _alone(self, problem: TensionProblem) -> tuple[np.ndarray, float, Certificate | None]:
+        """Tensions, violation and, if there is one, the certificate of one instant, by the exact solver."""
+        solution = solve(problem)
+        if solution.tensions is not None:
+            return solution.tensions, solution.residual, None
+        certificate = solution.certificate
+        if certificate is None:
+            return np.full(problem.m, np.nan), np.inf, None
+        closest = certificate.closest
+        violation = float(np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w))
+        if not self.few:
+            return np.full(problem.m, np.nan), violation, certificate
+        return closest, violation, certify(_inside_range(problem)) or certificate
 
-def _worst_of(rows: np.ndarray, looks: int, value: Callable[[int], float]) -> np.ndarray:
-    """Rows about the one of the largest value, looked for evenly and then closer."""
-    stride = -(-len(rows) // looks)
-    while stride > 1:
-        best = int(np.argmax([value(k) for k in rows[::stride]])) * stride
-        rows = rows[max(best - stride, 0) : best + stride + 1]
-        stride = -(-len(rows) // looks)
-    return rows
+
+def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tensions inside the limits whose wrenches are nearest to w, (n, m), and how far these are, (n,) [N]."""
+    nearest = solve_batch(A, w, low, high, rho=NEAREST)
+    return nearest.tensions, nearest.residual
 
 
-def _distance(scenario: Scenario, A: np.ndarray, w: np.ndarray) -> float:
-    """Of a required wrench from those available [N]."""
-    certificate = certify(masked_problem(scenario.dynamics, A, w, *scenario.bounds()))
-    return 0.0 if certificate is None else certificate.shortfall
+def _short_in_range(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """How far the part of w that the columns of A span is from what they give inside the limits, (n,) [N]."""
+    U, values, _ = np.linalg.svd(A, full_matrices=False)
+    U = np.where(values[:, None] > INDEPENDENT * values[:, None, :1], U, 0.0)
+    within = (U @ (U.swapaxes(1, 2) @ w[..., None]))[..., 0]
+    short = ~solve_batch(A, within, low, high).feasible
+    return np.where(short, _nearest(A, within, low, high)[1], 0.0)
 
 
 def _in_all_winds(
@@ -277,7 +276,7 @@ def _in_all_winds(
     def judge(winds: np.ndarray) -> None:
         nonlocal worst, wind
         push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
-        found = distribute(without_air - push, wish, LOOKS)
+        found = distribute(without_air - push, wish)
         worse = _shortfall(found) > _shortfall(worst)
         if worse and found.at is not None:
             wind = as_wind(winds[found.at])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...figures import plan as figures
 from ...figures.convergence import convergence
+from ...figures.drawing import Drawing
 from ...figures.limits import limits
 from ...figures.views import views
 from .finding import Finding
@@ -17,18 +18,10 @@ from .trajectory import output_rows
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
-__all__ = ["Drawing", "drawings"]
+__all__ = ["drawings"]
 
 INSTANTS = 60  # of carriers' ways in the views
-
-
-class Drawing(NamedTuple):
-    """A figure and what stands below it."""
-
-    caption: str
-    figure: Figure
 
 
 def drawings(found: Finding, trajectory: xr.Dataset) -> dict[str, Drawing]:

@@ -35,6 +35,8 @@ def trajectory(found: Finding) -> xr.Dataset:
         variables[name] = over(body, part[rows], names[name], f"{name} of the platform frame in G")
         variables[f"carrier_{name}"] = over(base, carrier_part[rows], names[name], f"{name} of each carrier in G")
     variables["tensions"] = over(("time", "cable"), seen.tensions[rows], "N", "cable tensions")
+    lengths = found.scenario.dynamics.cable_lengths(seen.motion.pose[rows], seen.carriers.pose[rows])
+    variables["cable_lengths"] = over(("time", "cable"), lengths, "m", "from anchor to attachment")
     about = "tensions of least norm without limits; negative: to push"
     variables["tensions_unlimited"] = over(("time", "cable"), seen.tensions_unlimited[rows], "N", about)
     variables["violation"] = over(("time",), seen.violation[rows], "N", "missing wrench, moments over length")

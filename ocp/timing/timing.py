@@ -125,7 +125,7 @@ class Timing:
         return self.timed(self.course.path)
 
     def task(self, name: str = "timed") -> Task:
-        """A task that fixes this motion of platform and carriers: `plan` audits it.
+        """A task with this `name` that fixes this motion of platform and carriers: `plan` audits it.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Timing:
         }
 
     def save_task(self, file: str | os.PathLike[str], name: str = "timed") -> Path:
-        """Save `task` as a task file (YAML), whole or not at all: `towline plan` and `plan` read it.
+        """Save `task`, with this `name`, as a task file (YAML), whole or not at all: `towline plan` and `plan` read it.
 
         Raises
         ------

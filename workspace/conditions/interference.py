@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
-from ...models.robot import Box, NonNegative
+from ...models.robot import Box, NonNegative, Positive
 from ...models.shapes import Block, Capsule, Sphere
 from ..balance import anchors, attachments, in_platform
 from ..condition import Condition
@@ -34,7 +34,7 @@ class Interference(Condition):
     """
 
     kind: Literal["interference"] = "interference"
-    between_cables: NonNegative | None = Field(default=None, description="least distance of two cables [m]; none: any")
+    between_cables: Positive | None = Field(default=None, description="least distance of two cables [m]; none: any")
     platform: Box | None = Field(
         default=None, description="the platform's body in its own frame, which no cable may enter [m]; none: no body"
     )
@@ -58,7 +58,9 @@ class Interference(Condition):
                 free &= ~_enters(low, high, robot.attachments[cable], in_platform(places, starts[:, cable]))
         for obstacle in self.obstacles:
             for cable in range(robot.m):
-                free &= _outside(obstacle, starts[:, cable], ends[:, cable]) >= self.clearance
+                distance = _outside(obstacle, starts[:, cable], ends[:, cable])
+                # Of a box the distance is zero all through its inside, which no clearance makes free.
+                free &= (distance > 0.0) & (distance >= self.clearance)
         return free
 
 

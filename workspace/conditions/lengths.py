@@ -26,7 +26,11 @@ class Lengths(Condition):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if self.max is not None and np.ndim(self.min) == np.ndim(self.max) == 0 and np.greater(self.min, self.max):
+        if self.max is None:
+            return self
+        least, most = np.atleast_1d(self.min), np.atleast_1d(self.max)
+        # Of numbers for each cable that are not equally many, one is not as many as the robot has cables.
+        if (1 in (least.size, most.size) or least.size == most.size) and np.greater(least, most).any():
             raise ValueError(f"min must not exceed max, but they are {self.min} m and {self.max} m")
         return self
 

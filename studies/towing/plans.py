@@ -12,13 +12,14 @@ from typing import Literal
 
 import numpy as np
 
-from ..models import Robot, load
-from ..models.statics import equilibria
-from ..ocp import Task
-from ..ocp.tasks.path import AnyPath, LinePath
-from ..ocp.tasks.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
+from ...models import Robot, load
+from ...models.statics import equilibria
+from ...ocp import Task
+from ...ocp.tasks.path import AnyPath, LinePath
+from ...ocp.tasks.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
 
 Drive = Literal["fixed-length", "variable-length", "both"]
+DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")
 Aim = Literal["effort", "time"]
 FIXED, LONG, SHORT = 1.2, 1.25, 1.1  # lengths [m]
 SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..ocp import Task
-from ..ocp.tasks.path import CirclePath, LinePath, SamplePath
-from ..ocp.tasks.task import FreeBase, GivenBase
-from . import flying_circle
+from ...ocp import Task
+from ...ocp.tasks.path import CirclePath, LinePath, SamplePath
+from ...ocp.tasks.task import FreeBase, GivenBase
+from .circle import tasks
 
 START, END, SECONDS = np.array([-20.0, -30.0, 40.0]), np.array([40.0, 20.0, 102.45]), 10.0  # VI.A [m], [s]
 RATE = 0.2 * np.pi  # [rad/s]
@@ -30,7 +30,7 @@ Vector = tuple[float, float, float]
 
 def circle() -> Task:
     """VI.B: the circle about a hovering point, the quadrotor free."""
-    return flying_circle.tasks()[1]
+    return tasks()[1]
 
 
 def helix() -> Task:
@@ -49,23 +49,27 @@ def helix() -> Task:
 
 def pitching() -> Task:
     """VI.C: a small circle in the frame of a quadrotor that moves and pitches."""
+    path = CirclePath(kind="circle", frame="quad", centre=(0, 0, -BELOW), radius=0.15, rate=RATE)
+    return Task(name="circle-pitching", path=path, base=GivenBase(kind="given", paths={"quad": pitching_flight()}))
+
+
+def pitching_flight(largest: float = PITCH) -> SamplePath:
+    """The flight of VI.C, pitching by up to `largest` [rad], with the surge that belongs to it."""
     times = np.linspace(0.0, SECONDS, 101)
-    pitch = PITCH * np.sin(RATE * times)
+    pitch = largest * np.sin(RATE * times)
     flight = START + times[:, None] * (END - START) / SECONDS
-    flight[:, 0] += surge(times)
+    flight[:, 0] += surge(times, largest)
     still = np.zeros_like(times)
     poses = np.column_stack([flight, still, pitch, still])
-    given = SamplePath(kind="samples", times=tuple(times), poses=tuple(map(tuple, poses)))
-    path = CirclePath(kind="circle", frame="quad", centre=(0, 0, -BELOW), radius=0.15, rate=RATE)
-    return Task(name="circle-pitching", path=path, base=GivenBase(kind="given", paths={"quad": given}))
+    return SamplePath(kind="samples", times=tuple(times), poses=tuple(map(tuple, poses)))
 
 
-def surge(times: np.ndarray) -> np.ndarray:
+def surge(times: np.ndarray, largest: float = PITCH) -> np.ndarray:
     """How far along x the pitch throws the quadrotor off its line [m]: ddx = g tan(pitch), to third order in pitch.
 
-    tan(P s) = P s + (P s)^3 / 3 with s = sin(RATE t) and s^3 = (3 sin(RATE t) - sin(3 RATE t)) / 4.
+    With s = sin(RATE t) and P = `largest`, tan(P s) = P s + (P s)^3 / 3 and s^3 = (3 sin(RATE t) - sin(3 RATE t)) / 4.
     """
-    first, third = PITCH + PITCH**3 / 4, -(PITCH**3) / 12
+    first, third = largest + largest**3 / 4, -(largest**3) / 12
     return -GRAVITY / RATE**2 * (first * np.sin(RATE * times) + third / 9 * np.sin(3 * RATE * times))
 
 

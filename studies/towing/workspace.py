@@ -27,20 +27,19 @@ from pathlib import Path
 
 import numpy as np
 
-from ..figures import style
-from ..figures import workspace as figures
-from ..models import Robot
-from ..models.robot import Box, MobileCarrier
-from ..workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
-from ..workspace.hanging import hanging
-from ..workspace.volume import Volume, volume
-from .towing_plans import Drive, robot
+from ...figures import style
+from ...figures import workspace as figures
+from ...models import Robot
+from ...models.robot import Box, MobileCarrier
+from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
+from ...workspace.hanging import hanging
+from ...workspace.volume import Volume, volume
+from .plans import DRIVES, Drive, robot
 
-__all__ = ["PRINTED", "Loops", "draw", "loops", "placed_as_both", "volume_of"]
+__all__ = ["PRINTED", "Loops", "draw", "in_prism", "loops", "placed_as_both", "reach", "volume_of"]
 
 LOOPS = 60_000
 POSTURE = 1.0  # [rad], the most of each angle
-DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")
 # Ranges of x, y and z in sections 5.1 to 5.3 [m].
 PRINTED = {
     "fixed-length": ((1.15, 1.34), (0.7, 1.18), (0.6, 1.38)),
@@ -113,10 +112,21 @@ def volume_of(drive: Drive, samples: int = 20_000, tries: int = TRIES, seed: int
 def placed_as_both(places: Places) -> np.ndarray:
     """Whether places are in W3 by its definition: above the ground, robot-ends in their boxes, forces balanced."""
     system = robot("wang-ctmrts", "both")
-    low, high = _reach(system)
+    low, high = reach(system)
     ends = places.carriers[:, :, :3]
     within = np.all((ends >= low - 1e-12) & (ends <= high + 1e-12), axis=(1, 2)) & (places.pose[:, 2] > 0)
     return within & ForceBalance().holds(system, places)
+
+
+def in_prism(system: Robot, points: np.ndarray) -> np.ndarray:
+    """Whether points (n, 3) [m] are in the prism below the three robot-ends at home, (n,) of bool.
+
+    The prism that section 5 speaks of: the shares of the corners are positive, and the plane through them is above.
+    """
+    ends = system.carrier_home[:, :3]
+    corners = np.vstack([ends[:, :2].T, np.ones(3)])
+    shares = np.linalg.solve(corners, np.vstack([points[:, :2].T, np.ones(len(points))]))  # (3, n)
+    return (shares >= 0).all(axis=0) & (points[:, 2] < shares.T @ ends[:, 2])
 
 
 def draw(found: dict[str, Loops], folder: Path) -> list[Path]:
@@ -137,7 +147,7 @@ def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
     """Places of one system type, uniform in what its drive moves."""
     carriers = np.tile(system.carrier_home, (count, 1, 1))
     if system.drive != "variable-length":
-        carriers[:, :, :3] = rng.uniform(*_reach(system), carriers[:, :, :3].shape)
+        carriers[:, :, :3] = rng.uniform(*reach(system), carriers[:, :, :3].shape)
     angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
     if system.fixed_lengths is not None:
         places = hanging(system, angles, carriers, system.fixed_lengths)
@@ -146,7 +156,7 @@ def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
     return Places(np.concatenate([rng.uniform(low, high, (count, 3)), angles], axis=1), carriers)
 
 
-def _reach(system: Robot) -> tuple[np.ndarray, np.ndarray]:
+def reach(system: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the reach boxes, (3, 3) each [m]."""
     boxes: list[Box] = [carrier.reach for carrier in system.carriers if isinstance(carrier, MobileCarrier)]
     return np.array([box.min for box in boxes]), np.array([box.max for box in boxes])
@@ -154,7 +164,7 @@ def _reach(system: Robot) -> tuple[np.ndarray, np.ndarray]:
 
 def _box(system: Robot) -> tuple[np.ndarray, np.ndarray]:
     """The box of Eq. 15, of all places that the robot-ends may have, down to the ground: corners (3,) each [m]."""
-    ends = [system.carrier_home[:, :3]] if system.drive == "variable-length" else list(_reach(system))
+    ends = [system.carrier_home[:, :3]] if system.drive == "variable-length" else list(reach(system))
     low, high = np.min(ends, axis=(0, 1)), np.max(ends, axis=(0, 1))
     low[2] = 0.0
     return low, high

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..figures import plan as figures
-from ..figures import style
-from ..models import load
-from ..ocp import Plan, Task, plan
-from ..ocp.nlp.solver import Progress
-from ..ocp.tasks.path import AnyPath, CirclePath, RestPath
-from ..ocp.tasks.task import FreeBase, HoldBase
+from ...figures import plan as figures
+from ...figures import style
+from ...models import load
+from ...ocp import Plan, Task, plan
+from ...ocp.nlp.solver import Progress
+from ...ocp.tasks.path import AnyPath, CirclePath, RestPath
+from ...ocp.tasks.task import FreeBase, HoldBase
 
 HOVER = (50.0, 50.0, 100.0, 0.0, 0.0, 0.0)  # paper F, section VI.B [m, rad]
 CIRCLE = CirclePath(kind="circle", centre=(50.0, 50.0, 99.0), radius=1.0, rate=0.2 * np.pi)

@@ -1,0 +1,79 @@
+"""`towline reproduce`: a paper recomputed, claim by claim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import InputError
+from .options import JsonOption, print_json
+
+if TYPE_CHECKING:
+    from ..studies.accounts.account import Account, Progress
+
+
+def reproduce(
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="flying: the flying cable robot; ctmrts: the towing robots.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for report, errata and figures; none: towline-PAPER.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Recompute every equation, table and figure of a paper: what holds, what differs, what cannot be."""
+    from ..studies.accounts.files import write
+    from ..studies.papers import PAPERS
+    from ..writing import check_writable
+
+    if paper not in PAPERS:
+        raise InputError(f"PAPER: {paper!r}; accepted: {', '.join(PAPERS)}")
+    folder = out if out is not None else Path(f"towline-{paper}")
+    check_writable(folder / f"{paper}.md")
+    with _progress(quiet=as_json) as progress:
+        account = PAPERS[paper](progress)
+    files = [str(path) for path in write(account, folder)]
+    if as_json:
+        print_json({**account.as_dict(), "files": files})
+    else:
+        _show(account)
+        typer.echo("  Written")
+        for name in files:
+            typer.echo(f"    {name}")
+    if not account.complete:
+        raise typer.Exit(1)
+
+
+def _show(account: Account) -> None:
+    from ..studies.accounts.claim import Verdict
+
+    typer.echo(f"{account.paper.source}\n  {account.summary()}; {account.seconds:.1f} s")
+    for title, chapter in account.chapters.items():
+        typer.echo(f"  {title}")
+        for claim in chapter.claims:
+            typer.echo(f"    {claim.verdict.value:<15} {claim.id}")
+            if claim.verdict is not Verdict.REPRODUCED:
+                typer.echo(f"      {claim.place}: {claim.why}")
+    for title, why in account.broken.items():
+        typer.echo(f"  {title}: not computed: {why}")
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Progress]:
+    """A bar over the chapters on standard error, if a person is watching."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    to = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
+        line = shown.add_task("", total=None)
+
+        def tell(what: str, done: int, total: int) -> None:
+            shown.update(line, description=what, completed=done, total=total)
+
+        yield tell

@@ -1,0 +1,81 @@
+"""Curves over one axis, in panels one below the other, with the bounds that they are to keep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Panel(NamedTuple):
+    """One panel.
+
+    Attributes
+    ----------
+    label
+        Of its vertical axis, with the unit.
+    curves
+        (n,) each, by their names in the legend, an empty name for none; not finite: a gap.
+    bounds
+        Values to draw a dashed line at, by what is written on it.
+    dots
+        As `curves`, drawn as dots: what should lie on a curve.
+    logarithmic
+        Whether the vertical axis is.
+    """
+
+    label: str
+    curves: Mapping[str, np.ndarray]
+    bounds: Mapping[str, float] = {}
+    dots: Mapping[str, np.ndarray] = {}
+    logarithmic: bool = False
+
+
+def curves(
+    x: np.ndarray,
+    xlabel: str,
+    panels: Sequence[Panel],
+    *,
+    logarithmic: bool = False,
+    marks: Mapping[str, float] | None = None,
+) -> Figure:
+    """Draw panels over `x` (n,); curves of one name look the same in all of them.
+
+    Every second curve is dashed, so that those that lie on one another can be seen.
+
+    Parameters
+    ----------
+    logarithmic
+        Whether the horizontal axis is.
+    marks
+        Places on the horizontal axis to draw a line at, by their names in the legend.
+    """
+    canvas = style.figure(5.0, 1.2 + 2.0 * len(panels))
+    looks: dict[str, int] = {}
+    for row, panel in enumerate(panels):
+        last = row + 1 == len(panels)
+        ax = style.axes(canvas, xlabel if last else "", panel.label, (len(panels), 1, row + 1))
+        ax.tick_params(labelbottom=last)
+        ax.set_xscale("log" if logarithmic else "linear")
+        ax.set_yscale("log" if panel.logarithmic else "linear")
+        for name, values in panel.curves.items():
+            index = looks.setdefault(name, len(looks))
+            ax.plot(x, values, color=style.colour(index), linestyle=("-", "--")[index % 2], label=name)
+        for name, values in panel.dots.items():
+            index = looks.setdefault(name, len(looks))
+            ax.plot(x, values, "o", markersize=4, color=style.colour(index), label=name)
+        for text, bound in panel.bounds.items():
+            ax.axhline(bound, **style.LIMIT)
+            ax.annotate(text, (0.01, bound), xycoords=("axes fraction", "data"), ha="left", va="bottom", fontsize=8)
+        for (text, place), dashes in zip((marks or {}).items(), cycle((":", "-.")), strict=False):
+            ax.axvline(place, color="#666666", linestyle=dashes, linewidth=1.2, label=text)
+        ax.margins(x=0.01)
+    style.legend_below(canvas, *canvas.axes)
+    return canvas

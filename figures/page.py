@@ -1,0 +1,114 @@
+"""A page as one HTML file: a verdict, tables, figures inside, nothing to load.
+
+Whatever is told passes `html.escape`; the figures are images of their own, in which nothing can run.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+from string import Template
+
+from . import style
+from .drawing import Drawing
+
+PAGE = Template("""\
+<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>$title</title>
+<style>
+:root { color-scheme: light; }
+body { font: 16px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 46rem; margin: 0 auto;
+  padding: 0.5rem 1rem 3rem; overflow-wrap: anywhere; }
+h1 { font-size: 1.5rem; margin: 0.8rem 0 0.3rem; }
+h2 { font-size: 1.1rem; margin: 1.6rem 0 0.3rem; }
+h3 { font-size: 1rem; margin: 1.2rem 0 0.2rem; }
+.verdict { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: #f6f6f6; margin: 0.6rem 0; }
+table { border-collapse: collapse; width: 100%; }
+th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid #ddd; }
+th { font-weight: 600; width: 9.5rem; }
+.wide { overflow-x: auto; overflow-wrap: normal; }
+table.columns th { width: auto; }
+tr.more th, tr.more td { border-top: 0; padding-top: 0; }
+figure { margin: 1.2rem 0; }
+img { max-width: 100%; height: auto; display: block; margin: auto; }
+figcaption, footer, .source { color: #555; font-size: 0.9rem; }
+pre { overflow-x: auto; font-size: 0.8rem; background: #f6f6f6; padding: 0.6rem; overflow-wrap: normal; }
+</style>
+</head>
+<body>
+<h1>$title</h1>
+<p class="verdict"><strong>$word</strong>: $told</p>
+$parts
+<footer>towline $version</footer>
+</body>
+</html>
+""")
+
+
+def page(title: str, word: str, told: str, colour: str, parts: Iterable[str]) -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    title
+        Of the page.
+    word, told, colour
+        The verdict: one word, what decided it, and the colour of the bar beside them, as `style.colour` has it.
+    parts
+        What the functions of this module made, in order.
+    """
+    from .. import __version__
+
+    return PAGE.substitute(
+        title=escape(title),
+        word=escape(word),
+        told=escape(told),
+        colour=colour,
+        parts="\n".join(parts),
+        version=escape(__version__),
+    )
+
+
+def heading(text: str, level: int = 2) -> str:
+    """A heading of level 2 or 3."""
+    return f"<h{level}>{escape(text)}</h{level}>"
+
+
+def paragraph(text: str) -> str:
+    """A paragraph of plain text."""
+    return f"<p>{escape(text)}</p>"
+
+
+def facts(title: str, rows: Iterable[tuple[str, str]], level: int = 2) -> str:
+    """Named facts under a heading; one without a name goes on with the one before it."""
+    lines = [
+        f'<tr{"" if name else " class=more"}><th scope="row">{escape(name)}</th><td>{escape(fact)}</td></tr>'
+        for name, fact in rows
+    ]
+    return heading(title, level) + "\n<table>\n" + "\n".join(lines) + "\n</table>"
+
+
+def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table with a name for each column, under a heading; on a narrow screen it scrolls."""
+    first = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
+    lines = ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows]
+    inner = "\n".join([f"<tr>{first}</tr>", *lines])
+    return f'{heading(title)}\n<div class="wide"><table class="columns">\n{inner}\n</table></div>'
+
+
+def picture(drawing: Drawing) -> str:
+    """A figure with its caption, inside the page."""
+    caption = escape(drawing.caption)
+    image = base64.b64encode(style.svg(drawing.figure).encode()).decode()
+    source = f"data:image/svg+xml;base64,{image}"
+    return f'<figure><img alt="{caption}" src="{source}"><figcaption>{caption}</figcaption></figure>'
+
+
+def file(title: str, text: str) -> str:
+    """The text of a file, folded away under its title."""
+    return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"

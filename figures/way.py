@@ -1,0 +1,32 @@
+"""Ways of points in space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import style
+from .plan import equal_scales, few_ticks
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def way(ways: Mapping[str, np.ndarray]) -> Figure:
+    """Draw ways (n, 3) [m] under their names, one scale on all axes; a dot where each begins."""
+    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
+
+    canvas = style.figure(5.0, 4.4)
+    ax: Any = canvas.add_subplot(projection=Axes3D.name)
+    for index, (name, points) in enumerate(ways.items()):
+        look = {"color": style.colour(index), "linestyle": style.line_style(index)}
+        ax.plot(*points.T, **look, label=name)
+        ax.plot(*points[0], "o", color=style.colour(index), markersize=4)
+    for axis in "xyz":
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
+        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    equal_scales(ax, np.concatenate(list(ways.values())))
+    ax.legend(fontsize="small", loc="upper left")
+    return canvas

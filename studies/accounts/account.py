@@ -1,0 +1,116 @@
+"""`Account`: a paper recomputed, claim by claim, with a figure beside each claim that has one.
+
+A study is a mapping from the titles of its chapters to functions, each of which computes one `Chapter`; `gather` runs
+them one after the other. A chapter whose solver breaks does not stop the others: it is told, and the account is not
+complete.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+from ...errors import SolverError
+from ...figures.drawing import Drawing
+from .claim import Claim, Verdict
+
+__all__ = ["Account", "Chapter", "Paper", "Progress", "gather"]
+
+Progress: TypeAlias = Callable[[str, int, int], None]  # what is being computed, chapters done, all of them
+
+
+class Paper(NamedTuple):
+    """A paper: the name of its study, and its source."""
+
+    name: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """Claims that belong together, and figures by name."""
+
+    claims: list[Claim]
+    drawings: dict[str, Drawing] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Account:
+    """What became of a paper's claims.
+
+    Attributes
+    ----------
+    paper
+        Which one.
+    chapters
+        By title, in order.
+    broken
+        Titles of chapters that could not be computed, and why.
+    seconds
+        Wall time of the whole run.
+    """
+
+    paper: Paper
+    chapters: dict[str, Chapter]
+    broken: dict[str, str]
+    seconds: float
+
+    @property
+    def claims(self) -> list[Claim]:
+        """All of them, in order."""
+        return [claim for chapter in self.chapters.values() for claim in chapter.claims]
+
+    @property
+    def errata(self) -> list[Claim]:
+        """Those that were not reproduced."""
+        return [claim for claim in self.claims if claim.verdict is not Verdict.REPRODUCED]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every chapter was computed, so that every claim has a verdict."""
+        return bool(self.claims) and not self.broken
+
+    def summary(self) -> str:
+        """How many claims have which verdict, in a line."""
+        counts = Counter(claim.verdict for claim in self.claims)
+        parts = [f"{counts[verdict]} {verdict.value}" for verdict in Verdict if counts[verdict]]
+        missing = [f"not computed: {', '.join(self.broken)}"] if self.broken else []
+        return "; ".join([f"{len(self.claims)} claims: {', '.join(parts)}", *missing])
+
+    def as_dict(self) -> dict[str, Any]:
+        """{"paper", "complete", "broken", "seconds", "claims"}, ready for JSON."""
+        return {
+            "paper": self.paper.name,
+            "complete": self.complete,
+            "broken": self.broken,
+            "seconds": self.seconds,
+            "claims": [claim.as_dict() for claim in self.claims],
+        }
+
+
+def gather(paper: Paper, chapters: Mapping[str, Callable[[], Chapter]], progress: Progress | None = None) -> Account:
+    """Compute the chapters of a paper, in order.
+
+    Parameters
+    ----------
+    chapters
+        What computes each, by its title.
+    progress
+        Told before each chapter, and once at the end.
+    """
+    found: dict[str, Chapter] = {}
+    broken: dict[str, str] = {}
+    start = time.perf_counter()
+    for done, (title, compute) in enumerate(chapters.items()):
+        if progress is not None:
+            progress(title, done, len(chapters))
+        try:
+            found[title] = compute()
+        except SolverError as error:
+            broken[title] = str(error)
+    if progress is not None:
+        progress("done", len(chapters), len(chapters))
+    return Account(paper, found, broken, time.perf_counter() - start)

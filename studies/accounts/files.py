@@ -1,0 +1,43 @@
+"""An account as files: reports, errata, claims and figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from ...figures import style
+from ...writing import whole_file
+from . import page, text
+from .account import Account
+
+__all__ = ["write"]
+
+
+def write(account: Account, folder: Path) -> list[Path]:
+    """Write report (Markdown and HTML), errata, claims (JSON) and figures (PNG) into `folder`; their paths.
+
+    Each file is written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to.
+    """
+    name = account.paper.name
+    texts = {
+        f"{name}.md": text.report(account),
+        f"{name}.html": page.page(account),
+        f"{name}-errata.md": text.errata(account),
+        f"{name}.json": json.dumps(account.as_dict(), indent=2, allow_nan=False) + "\n",
+    }
+    files = [_write(folder / file, text) for file, text in texts.items()]
+    for chapter in account.chapters.values():
+        for figure, drawing in chapter.drawings.items():
+            files.append(style.save(drawing.figure, folder / text.FIGURES / f"{figure}.png"))
+    return files
+
+
+def _write(path: Path, text: str) -> Path:
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path

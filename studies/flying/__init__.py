@@ -1,0 +1,1 @@
+"""Paper F: a six-cable platform under a quadrotor."""

@@ -1,0 +1,123 @@
+"""Paper F's section VI.C: the tension of cable 1 with and without D_B, under a quadrotor that moves and pitches.
+
+The paper draws the flight and the pitch and prints no numbers. Assumed, as in `flying_plans`: VI.A's line, pitching by
+0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its thrust pitches; and a circle of 0.15 m in {A}, on
+which every cable pulls. Without D_B means: as under a quadrotor that hovers, level, whose D_B is the weight alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...figures.way import way
+from ...models import Dynamics, load
+from ...ocp.tasks.path import Motion
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, stated, undetermined
+from .helix import flight
+from .motion import FEASIBLE, TIMES, circle, steady_tensions
+from .plans import PITCH, SECONDS, pitching_flight
+
+PITCHES = np.linspace(0.0, 0.3, 7)  # largest pitch [rad]
+
+
+def chapter() -> Chapter:
+    """With and without D_B, and how tensions spread as the quadrotor moves more."""
+    dynamics = Dynamics(load("wang-flying"))
+    body, base = circle(FEASIBLE), flown(PITCH)
+    without, moving = steady_tensions(dynamics, body), steady_tensions(dynamics, body, base)
+    straight = steady_tensions(dynamics, body, pitching_on_the_line())
+    error, worse = (100 * np.abs(without - part) / np.abs(part) for part in (moving, straight))
+    spans = np.array([np.ptp(steady_tensions(dynamics, body, flown(float(pitch)))) for pitch in PITCHES])
+    claims = [_motion(), _error(error, worse), _felt(error), _mobility(spans)]
+    drawings = {
+        "disturbance-flight": Drawing(
+            "Figure 12: the quadrotor's flight in {G}, assumed", way({"quadrotor": base.pose[:, :3]})
+        ),
+        "disturbance": Drawing(
+            "Figures 13 to 15: pitch, tension of cable 1 with and without D_B, and its relative error",
+            curves(
+                TIMES,
+                "time [s]",
+                [
+                    Panel("pitch [degrees]", {"assumed": np.degrees(base.pose[:, 4])}),
+                    Panel("tension [N]", {"with D_B": moving[:, 0], "without D_B": without[:, 0]}),
+                    Panel("relative error [%]", {"of cable 1": error[:, 0]}),
+                ],
+            ),
+        ),
+        "mobility": Drawing(
+            "Conclusion 3: the range of all tensions against the quadrotor's largest pitch",
+            curves(np.degrees(PITCHES), "largest pitch [degrees]", [Panel("largest - smallest T [N]", {"": spans})]),
+        ),
+    }
+    return Chapter(claims, drawings)
+
+
+def flown(pitch: float) -> Motion:
+    """The quadrotor in {G}, pitching by up to `pitch` [rad] with its surge, (n, 6) each."""
+    return pitching_flight(pitch).at(TIMES, SECONDS)
+
+
+def pitching_on_the_line() -> Motion:
+    """The same pitch on VI.A's straight line, which no thrust along the quadrotor's axis can fly."""
+    turned, line = flown(PITCH), flight()
+    return Motion(*(np.hstack([ahead[:, :3], tilt[:, 3:]]) for ahead, tilt in zip(line, turned, strict=True)))
+
+
+def _motion() -> Claim:
+    return undetermined(
+        "fig-12-13",
+        "VI.C, figures 12 and 13",
+        "The quadrotor moves and pitches: largest pitch.",
+        None,
+        float(np.degrees(PITCH)),
+        missing="Neither flight nor pitch is printed; assumed: VI.A's line, a sine of pitch, its surge along x.",
+        unit="degrees",
+        figure="disturbance-flight",
+    )
+
+
+def _error(error: np.ndarray, worse: np.ndarray) -> Claim:
+    return undetermined(
+        "fig-15",
+        "VI.C, figures 14 and 15",
+        "The relative error of the tension of cable 1 when D_B is left out: its largest value.",
+        None,
+        float(error[:, 0].max()),
+        missing="No value is printed, nor the motion; a quadrotor that surges as it pitches mostly feels its load "
+        f"along its own axis, while the same pitch on a straight line would give {worse[:, 0].max():.0f} %.",
+        unit="%",
+        figure="disturbance",
+    )
+
+
+def _felt(error: np.ndarray) -> Claim:
+    most = float(error.max())
+    return stated(
+        "conclusion-D_B",
+        "abstract, VI.C, conclusion 3",
+        "The quadrotor's motion affects the tensions apparently: largest relative error of any cable without D_B.",
+        "apparently",
+        f"{most:.1f} %",
+        holds=most > 1.0,
+        agrees="More than one per cent, with the motion assumed.",
+        differs="Less than one per cent, with the motion assumed.",
+        figure="disturbance",
+    )
+
+
+def _mobility(spans: np.ndarray) -> Claim:
+    return stated(
+        "conclusion-mobility",
+        "conclusion 3",
+        "The higher the quadrotor's mobility, the wider the range between the largest and the smallest tension.",
+        "wider",
+        f"{spans[0]:.2f} N at rest, {spans[-1]:.2f} N pitching by {np.degrees(PITCHES[-1]):.0f} degrees",
+        holds=bool((np.diff(spans) > 0).all()),
+        agrees="The range grows with every step of the largest pitch.",
+        differs="The range does not grow all the way.",
+        figure="mobility",
+    )

@@ -1,0 +1,164 @@
+"""Paper F's section VI.A: the quadrotor flies straight, the platform circles below it (figures 6 and 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...figures.way import way
+from ...models import Dynamics, load
+from ...ocp.tasks.path import LinePath, Motion
+from ...solvers import TensionProblem, solve
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated
+from .instants import instants
+from .motion import RADIUS, TIMES, circle, steady_tensions
+from .plans import END, RATE, SECONDS, START
+
+LIKE_A_SINE = 0.05  # of the amplitude, assumed: what an eye would not see in figure 7
+
+
+def chapter() -> Chapter:
+    """Trajectories, lengths and tensions of VI.A."""
+    dynamics = Dynamics(load("wang-flying"))
+    body, base = circle(RADIUS), flight()
+    world = Motion(*dynamics.relative.motion_in_world(*body, *base))
+    lengths = dynamics.cable_lengths(world.pose, base.pose[:, None])
+    tensions = steady_tensions(dynamics, body, base)
+    claims = [
+        _turns(world, base),
+        _independent(dynamics),
+        _sine("fig-7-lengths", "lengths", lengths),
+        _sine("fig-7-tensions", "tensions", tensions),
+        _undisturbed(dynamics, body, tensions),
+        _positive(dynamics, world, base, tensions),
+    ]
+    drawings = {
+        "helix": Drawing(
+            "Figure 6: the quadrotor's straight flight and the platform's helix in {G}",
+            way({"quadrotor": base.pose[:, :3], "platform": world.pose[:, :3]}),
+        ),
+        "helix-arm": Drawing(
+            "Figure 6, near: the platform's place from the quadrotor, along the axes of {G}",
+            curves(TIMES, "time [s]", [_arm(world, base)]),
+        ),
+        "helix-cables": Drawing(
+            "Figure 7: lengths, and tensions that the motion asks for; below 0 N a cable would have to push",
+            curves(TIMES, "time [s]", [_panel("length [m]", lengths), _panel("tension [N]", tensions, {"0 N": 0.0})]),
+        ),
+    }
+    return Chapter(claims, drawings)
+
+
+def flight() -> Motion:
+    """The quadrotor's flight, level and at one speed, (n, 6) each."""
+    line = LinePath(kind="line", start=(*START, 0, 0, 0), end=(*END, 0, 0, 0), timing="uniform")
+    return line.at(TIMES, SECONDS)
+
+
+def _arm(world: Motion, base: Motion) -> Panel:
+    arm = world.pose[:, :3] - base.pose[:, :3]
+    return Panel("from the quadrotor [m]", {name: arm[:, axis] for axis, name in enumerate("xyz")})
+
+
+def _panel(label: str, values: np.ndarray, bounds: dict[str, float] | None = None) -> Panel:
+    return Panel(label, {f"cable {index + 1}": values[:, index] for index in range(6)}, bounds or {})
+
+
+def _turns(world: Motion, base: Motion) -> Claim:
+    """Radius about the flight's line, and turns."""
+    arm = world.pose[:, :2] - base.pose[:, :2]
+    angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
+    return compared(
+        "fig-6",
+        "VI.A, figure 6",
+        "In {G} the platform goes round a helix of r = 1 m once in 10 s, 0.2 pi rad/s: radius [m], turns.",
+        (1.0, 0.2 * SECONDS / 2),
+        (float(np.linalg.norm(arm, axis=1).mean()), float(np.ptp(angle) / (2 * np.pi))),
+        within=1e-9,
+        agrees="About the quadrotor, which flies at one speed, 1 m below it.",
+        differs="The composed motion is another.",
+        figure="helix",
+    )
+
+
+def _independent(dynamics: Dynamics) -> Claim:
+    """Lengths at one relative pose under quadrotors that tilt and turn."""
+    seen = instants()
+    body, zero = np.tile(circle(RADIUS).pose[0], (len(seen.base.pose), 1)), np.zeros_like(seen.base.pose)
+    world = dynamics.relative.motion_in_world(body, zero, zero, seen.base.pose, zero, zero)[0]
+    lengths = dynamics.cable_lengths(world, seen.base.pose[:, None])
+    change = float(np.ptp(lengths, axis=0).max())
+    return stated(
+        "eq-5",
+        "Eqs. 4, 5",
+        "The lengths depend on the quadrotor's attitude, not on its position: how much they change with it.",
+        "they change",
+        f"{change:.0e} m",
+        holds=change > 1e-9,
+        agrees="At one pose in {A} they do.",
+        differs="R_A turns the whole vector and leaves its norm: with x_b and R_B given in {A}, as they are here, "
+        "the lengths depend on neither.",
+    )
+
+
+def _sine(name: str, what: str, values: np.ndarray) -> Claim:
+    """The farthest from the nearest sine of the printed rate, over its amplitude."""
+    basis = np.stack([np.ones_like(TIMES), np.cos(RATE * TIMES), np.sin(RATE * TIMES)], axis=1)
+    found = np.linalg.lstsq(basis, values)[0]
+    off = np.abs(values - basis @ found).max(axis=0) / np.hypot(found[1], found[2])
+    most = float(off.max())
+    return stated(
+        name,
+        "VI.A, figure 7",
+        f"The {what} vary as a sine or cosine, because the motion is a spiral: how far off a sine, over its amplitude.",
+        0.0,
+        most,
+        holds=most <= LIKE_A_SINE,
+        agrees=f"No farther than {LIKE_A_SINE:.0%}, which no figure shows.",
+        differs=f"Off by more than {LIKE_A_SINE:.0%}, taken for what a figure shows: the squares of the lengths are "
+        "sines, but lengths and tensions have overtones.",
+        figure="helix-cables",
+    )
+
+
+def _undisturbed(dynamics: Dynamics, body: Motion, tensions: np.ndarray) -> Claim:
+    hovering = steady_tensions(dynamics, body)
+    return compared(
+        "VI.A-flight",
+        "VI.A",
+        "Ideally only the winding moves the platform: how much a flight in a straight line changes the tensions.",
+        0.0,
+        float(np.abs(hovering - tensions).max()),
+        within=1e-9,
+        agrees="A flight without acceleration, level, is no disturbance: the tensions are those of hovering.",
+        differs="The flight disturbs the tensions.",
+        unit="N",
+    )
+
+
+def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndarray) -> Claim:
+    """The smallest tension, and the certificate at its instant."""
+    row = int(tensions.min(axis=1).argmin())
+    problem = TensionProblem(
+        dynamics.wrench_matrix(world.pose[row], base.pose[row, None]),
+        dynamics.required_wrench(*(part[row] for part in world)),
+        np.zeros(6),
+        dynamics.robot.t_max,
+    )
+    proof = solve(problem).certificate
+    shortfall = proof.shortfall if proof is not None and proof.verify(problem) else 0.0
+    return stated(
+        "fig-7-positive",
+        "VI.A, figure 7, section II",
+        "Cables pull, F > 0, all along the helix of r = 1 m: the smallest tension of its only solution.",
+        "> 0 N",
+        f"{tensions.min():.1f} N",
+        holds=shortfall <= 0,
+        otherwise=Verdict.IMPOSSIBLE,
+        agrees="Tensions above zero exist at the worst instant too.",
+        differs=f"At {TIMES[row]:.1f} s no pulling cables give the wrench, whatever their strength up to t_max: along "
+        f"a direction that was verified they are {shortfall:.2f} N short.",
+        figure="helix-cables",
+    )

@@ -1,0 +1,88 @@
+"""Random instants of both bodies of paper F, with rotations and their time derivatives from CasADi.
+
+Angular velocity and acceleration follow from these alone, R^T dR = [omega]x and R^T ddR = [alpha]x + [omega]x^2, so
+that the paper's formulas, and this toolkit's, are held against something that knows neither.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...models.rotation import rotation
+from ...ocp.tasks.path import Motion
+
+COUNT = 200
+ANGLES, RATES, ACCELERATIONS = 0.3, 0.6, 1.0  # largest of each [rad, rad/s, rad/s^2], and of positions in metres
+
+
+class Turning(NamedTuple):
+    """A rotation and its derivatives, (n, 3, 3) each."""
+
+    R: np.ndarray
+    dR: np.ndarray  # noqa: N815
+    ddR: np.ndarray  # noqa: N815
+
+    def then(self, other: Turning) -> Turning:
+        """The product self R x other R, and its derivatives."""
+        R, dR, ddR = self
+        S, dS, ddS = other
+        return Turning(R @ S, dR @ S + R @ dS, ddR @ S + 2 * dR @ dS + R @ ddS)
+
+    @property
+    def rate(self) -> np.ndarray:
+        """Angular velocity in the turned frame, (n, 3) [rad/s]."""
+        return _axial(self.R.transpose(0, 2, 1) @ self.dR)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Its time derivative, (n, 3) [rad/s^2]."""
+        return _axial(self.R.transpose(0, 2, 1) @ self.ddR)
+
+
+class Instants(NamedTuple):
+    """Motions at n instants that have nothing to do with each other.
+
+    Attributes
+    ----------
+    body
+        Of the platform relative to {A}.
+    base
+        Of {A} in {G}.
+    R_B, R_A
+        Their rotations.
+    """
+
+    body: Motion
+    base: Motion
+    R_B: Turning
+    R_A: Turning
+
+
+def instants(seed: int = 0) -> Instants:
+    """Seeded instants: both bodies move and turn, the platform about 1 m below the base."""
+    rng = np.random.default_rng(seed)
+    sizes = (ANGLES, RATES, ACCELERATIONS)
+    body, base = (Motion(*(rng.uniform(-size, size, (COUNT, 6)) for size in sizes)) for _ in range(2))
+    body.pose[:, 2] -= 1.0
+    return Instants(body, base, turning(body), turning(base))
+
+
+def turning(motion: Motion) -> Turning:
+    """The rotations of a motion: R of angles + t rates + t^2 / 2 accelerations, derived by t at t = 0."""
+    angles, rates, accelerations = (ca.SX.sym(name, 3) for name in ("angles", "rates", "accelerations"))
+    t = ca.SX.sym("t")
+    R = ca.vec(rotation(angles + t * rates + t**2 / 2 * accelerations))
+    dR = ca.jacobian(R, t)
+    ddR = ca.jacobian(dR, t)
+    f = ca.Function("turning", [t, angles, rates, accelerations], [R, dR, ddR])
+    columns = f(0, *(part[:, 3:].T for part in motion))  # CasADi's columns are a row's three columns in turn
+    return Turning(*(np.asarray(part).T.reshape(-1, 3, 3).transpose(0, 2, 1) for part in columns))
+
+
+def _axial(matrices: np.ndarray) -> np.ndarray:
+    """The vectors of the skew parts of (n, 3, 3): what is symmetric, [omega]x^2, falls out."""
+    skew = (matrices - matrices.transpose(0, 2, 1)) / 2
+    return np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)

@@ -1,0 +1,149 @@
+"""Paper F's Table 1: what this run computes with, and whether its numbers go together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...models import Robot, load
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated
+from .plans import BELOW
+
+# As printed, in the paper's own units.
+PRINTED = {
+    "E": 100.0,  # [GPa]
+    "cross section": 0.13,  # [mm^2]
+    "C": 0.2,  # [N/(mm/s)]
+    "r_A": 0.52,  # [m]
+    "alpha_A": 60.0,  # [degrees]
+    "H_1": 0.07,  # [m]
+    "r_B": 0.25,  # [m]
+    "alpha_B": 60.0,  # [degrees]
+    "H_2": 0.03,  # [m]
+    "m_B": 1.2,  # [kg]
+    "I_x": 0.81,  # [kg m^2]
+    "I_y": 0.81,  # [kg m^2]
+    "I_z": 1.57,  # [kg m^2]
+    "rho": 1.29,  # [kg/m^3]
+    "C_d": 0.45,
+    "C_l": 0.05,
+    "S": 0.16,  # [m^2]
+}
+QUADROTOR, CIRCLE = 100.0, 99.0  # heights in {G} that section VI.B prints [m]
+CENTRE = 1.0  # z of the circle's centre in {A}, as sections VI.A and VI.B print it [m]
+
+
+def chapter() -> Chapter:
+    """Table 1 against the robot that the run uses, and against itself."""
+    robot = load("wang-flying-printed")
+    return Chapter([*_used(robot), _rigid(), _gyration(), _height(robot)])
+
+
+def _used(robot: Robot) -> list[Claim]:
+    """The robot file against the table, in groups."""
+    aero = robot.platform.aero
+    assert aero is not None
+    cable = robot.cables[0]
+    pascal, square_metre, per_metre = 1e9, 1e-6, 1e3
+    cables = (PRINTED["E"] * pascal * PRINTED["cross section"] * square_metre, PRINTED["C"] * per_metre)
+    rings = (*_ring(robot.anchors), *_ring(robot.attachments))
+    groups = [
+        (
+            "geometry",
+            "r_A [m], alpha_A [degrees], H_1 [m] and r_B, alpha_B, H_2",
+            tuple(PRINTED[name] for name in ("r_A", "alpha_A", "H_1", "r_B", "alpha_B", "H_2")),
+            rings,
+        ),
+        (
+            "cable",
+            "E A = 100 GPa x 0.13 mm^2 [N] and C = 0.2 N/(mm/s) [N s/m]",
+            cables,
+            (cable.stiffness, cable.damping),
+        ),
+        (
+            "mass",
+            "m_B [kg] and I_x, I_y, I_z [kg m^2]",
+            tuple(PRINTED[name] for name in ("m_B", "I_x", "I_y", "I_z")),
+            (robot.platform.mass, *np.diag(robot.inertia)),
+        ),
+        (
+            "air",
+            "rho [kg/m^3], C_d, C_l and S [m^2]",
+            tuple(PRINTED[name] for name in ("rho", "C_d", "C_l", "S")),
+            (aero.air_density, aero.drag, aero.lift, aero.area),
+        ),
+    ]
+    return [
+        compared(
+            f"table-1-{name}",
+            "Table 1",
+            f"{says}.",
+            printed,
+            tuple(float(value) for value in computed),
+            within=1e-9 * max(printed),
+            agrees="What this run computes with, read back from the robot's file.",
+            differs="The robot's file has other numbers than the table.",
+        )
+        for name, says, printed, computed in groups
+    ]
+
+
+def _ring(points: np.ndarray) -> tuple[float, float, float]:
+    """Radius [m], angle between neighbours [degrees] and distance along z [m] of six points, (6, 3)."""
+    angles = np.sort(np.arctan2(points[:, 1], points[:, 0]))
+    return (
+        float(np.hypot(points[:, 0], points[:, 1]).mean()),
+        float(np.degrees(np.diff(angles)).mean()),
+        float(np.abs(points[:, 2]).mean()),
+    )
+
+
+def _rigid() -> Claim:
+    others = PRINTED["I_x"] + PRINTED["I_y"]
+    return stated(
+        "table-1-rigid",
+        "Table 1",
+        "The moments of inertia are those of a rigid body: none exceeds the sum of the others.",
+        PRINTED["I_z"],
+        others,
+        holds=PRINTED["I_z"] <= others,
+        agrees="I_z is no more than I_x + I_y, the computed value.",
+        differs="I_z is more than I_x + I_y, the computed value, which no body has.",
+        unit="kg m^2",
+    )
+
+
+def _gyration() -> Claim:
+    """I_z of all mass on a circle of radius r is m r^2: no body that ends there has more."""
+    reach = max(PRINTED["r_B"], float(np.sqrt(PRINTED["S"] / np.pi)))
+    most = PRINTED["m_B"] * reach**2
+    radius = float(np.sqrt(PRINTED["I_z"] / PRINTED["m_B"]))
+    return stated(
+        "table-1-gyration",
+        "Table 1",
+        "A platform of 1.2 kg, with its cables at r_B = 0.25 m and a cross section of 0.16 m^2, has this I_z.",
+        PRINTED["I_z"],
+        most,
+        holds=PRINTED["I_z"] <= most,
+        agrees="A body within that radius can have it.",
+        differs=f"All of the mass at {reach:.2f} m from the axis gives the computed value; I_z asks for a gyration "
+        f"radius of {radius:.2f} m. It is computed with as printed.",
+        unit="kg m^2",
+    )
+
+
+def _height(robot: Robot) -> Claim:
+    """Heights in {G} decide the sign of z in {A}."""
+    centre = CIRCLE - QUADROTOR
+    return compared(
+        "eq-2-height",
+        "Eq. 2, VI.A, VI.B",
+        "a_i has z = +H_1 and the circle's centre z = +1 in {A}, whose z axis points up.",
+        (PRINTED["H_1"], CENTRE),
+        (float(np.sign(centre)) * PRINTED["H_1"], centre),
+        within=1e-9,
+        agrees="The heights in {G} say so too.",
+        differs=f"The circle is at {CIRCLE:g} m under a quadrotor at {QUADROTOR:g} m, so what hangs below has z < 0 in "
+        f"{{A}}: the ring at {robot.anchors[0, 2]:g} m, the centre at {-BELOW:g} m.",
+        unit="m",
+    )

@@ -1,0 +1,188 @@
+"""Paper F's section V, the procedure for the driving forces, run step by step and held against the toolkit's own.
+
+Each step is taken as printed, where it can be, instant by instant and cable by cable: lengths by Eq. 5, damping by
+Eq. 11, elasticity by the assembled chain of Eq. 21, T by Eq. 38. `driving_force` does the same in one pass over arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import accumulate
+
+import casadi as ca
+import numpy as np
+
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, Robot, load
+from ...models.cables import ElementChain
+from ...models.cables.driving_force import DrivingForce, driving_force
+from ...models.diagnosis import diagnose
+from ...models.rotation import rotation
+from ...ocp.tasks.path import Motion
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .motion import FEASIBLE, TIMES, circle
+from .vibration import ELEMENTS, STEP, vibration
+
+AMPLITUDE = 1e-6  # of the vibration [m], assumed
+ROWS = slice(0, 101, 5)  # the instants of the run: the first second
+SAME = 1e-9  # [m, N]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the steps gave, (n, 6) each; see `driving_force` for the names."""
+
+    times: np.ndarray  # (n,)
+    lengths: np.ndarray
+    elements: np.ndarray
+    dT_C: np.ndarray  # noqa: N815
+    dT_K: np.ndarray  # noqa: N815
+    T: np.ndarray
+
+
+def chapter() -> Chapter:
+    """The eight steps, and where they are wrong or open."""
+    robot, motion, shake = load("wang-flying"), Motion(*(part[ROWS] for part in circle(FEASIBLE))), vibration(AMPLITUDE)
+    run = steps(robot, motion, shake[ROWS])
+    own = driving_force(robot, *motion, shake[ROWS], STEP, ELEMENTS)
+    claims = [
+        _given(),
+        _same("step-2", "2", "cable lengths l_i(t), Eq. 5", run.lengths, own.lengths, "m"),
+        _same("step-3", "3", "element lengths e_i(t) = l_i(t) / n", run.elements, own.lengths / ELEMENTS, "m"),
+        _same("step-4", "4", "damping increments dT_C, Eqs. 10 and 11", run.dT_C, own.dT_C, "N"),
+        _same("step-5", "5", "elastic increments dT_K, Eq. 21 as corrected", run.dT_K, own.dT_K, "N"),
+        _same("step-6", "6", "increments dT = dT_C + dT_K, Eq. 23", run.dT_C + run.dT_K, own.dT, "N"),
+        _traction(robot, motion, run),
+        _inverse(),
+        _clock(),
+    ]
+    return Chapter(claims, {"procedure": _figure(run, own)})
+
+
+def steps(robot: Robot, motion: Motion, shake: np.ndarray) -> Run:
+    """Steps 2 to 8 for a quadrotor that hovers, level, so that {A} and {G} have the same axes."""
+    rows = [_instant(robot, pose, small) for pose, small in zip(motion.pose, shake, strict=True)]
+    lengths, elements, dT_C, dT_K = (np.stack(part) for part in zip(*rows, strict=True))
+    dynamics = Dynamics(robot).relative
+    T = np.stack(
+        [
+            np.linalg.solve(J, w - J @ dT)
+            for J, w, dT in zip(
+                dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion), dT_C + dT_K, strict=True
+            )
+        ]
+    )
+    return Run(TIMES[ROWS], lengths, elements, dT_C, dT_K, T)
+
+
+def _instant(robot: Robot, pose: np.ndarray, shake: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Steps 2 to 5 at one instant: lengths, element lengths, dT_C and dT_K of each cable, (6,) each."""
+    R = rotation(ca.DM(pose[3:])).full()
+    found = []
+    for cable in robot.cables:
+        assert cable.stiffness is not None
+        assert cable.damping is not None
+        anchor, arm = np.array(cable.anchor), R @ cable.attachment
+        end = pose[:3] + arm
+        length = float(np.linalg.norm(anchor - end))
+        dB = shake[:3] + np.cross(shake[3:], arm)
+        moved = float(np.linalg.norm(anchor - end - dB))
+        chain = ElementChain(anchor, end, cable.stiffness, ELEMENTS)
+        found.append((length, length / ELEMENTS, cable.damping * (moved - length) / STEP, chain.end_increment(dB)))
+    return tuple(np.array(column) for column in zip(*found, strict=True))
+
+
+def _given() -> Claim:
+    return undetermined(
+        "step-1",
+        "section V, step 1",
+        "Given are the points A_i and B_i, the time step dt, E, A and C; then n elements, and the vibration.",
+        None,
+        f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um",
+        missing="Points, E, A and C are in Table 1; dt, n and the vibration are not printed, and assumed.",
+    )
+
+
+def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, unit: str) -> Claim:
+    """One step by hand against `driving_force`."""
+    off = float(np.abs(run - own).max())
+    return compared(
+        name,
+        f"section V, step {step}",
+        f"The {what}: largest difference of this step, taken cable by cable, from the toolkit's own.",
+        0.0,
+        off,
+        within=SAME,
+        agrees=f"The step gives what the toolkit has: up to {np.abs(own).max():.3g} {unit}.",
+        differs="The step gives something else than the toolkit.",
+        unit=unit,
+        figure="procedure",
+    )
+
+
+def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
+    """Newton and Euler in {G} with F = T + dT on the platform, and what is off if T' is the time derivative of T."""
+    dynamics = Dynamics(robot)
+    A, w = dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion)
+    dT = run.dT_C + run.dT_K
+    slope = np.gradient(run.T, run.times, axis=0)
+    meant, literal = (float(np.abs(np.einsum("nij,nj->ni", A, run.T + part) - w).max()) for part in (dT, slope))
+    return compared(
+        "step-7",
+        "section V, step 7",
+        "T = J^-1 (M ddX_b + F_B + D_B - W_e - J T'): what is left of the platform's balance if T' is dT/dt.",
+        0.0,
+        literal,
+        within=SAME,
+        agrees="The derivative balances the platform.",
+        differs=f"T' is defined nowhere; with dT, the increment of step 6, in its place {meant:.0e} N is left.",
+        unit="N",
+        figure="procedure",
+    )
+
+
+def _inverse() -> Claim:
+    rank = diagnose(load("wang-flying-printed")).rank_level
+    return stated(
+        "step-7-inverse",
+        "section V, step 7",
+        "J^-1 exists for the printed pairing at the level poses of section VI: the rank of J.",
+        6.0,
+        float(rank),
+        holds=rank == 6,
+        otherwise=Verdict.IMPOSSIBLE,
+        agrees="J has its inverse.",
+        differs="There is no inverse; step 7 is run with the crossed pairs.",
+    )
+
+
+def _clock() -> Claim:
+    """K = 1, 2, 3, ... with t = t + k dt each time."""
+    count = 4
+    printed = tuple(accumulate(k * STEP for k in range(count)))
+    return compared(
+        "step-8",
+        "section V, step 8",
+        "Let k = k + 1, then t = t + k dt: the first times of the loop.",
+        printed,
+        tuple(k * STEP for k in range(count)),
+        within=1e-12,
+        agrees="The times are equally far apart.",
+        differs="To the letter the steps grow with k; t = k dt is meant.",
+        unit="s",
+    )
+
+
+def _figure(run: Run, own: DrivingForce) -> Drawing:
+    panels = [
+        Panel("length [m]", {"in one pass": own.lengths[:, 0]}, dots={"step by step": run.lengths[:, 0]}),
+        Panel("dT_C [N]", {"in one pass": own.dT_C[:, 0]}, dots={"step by step": run.dT_C[:, 0]}),
+        Panel("dT_K [N]", {"in one pass": own.dT_K[:, 0]}, dots={"step by step": run.dT_K[:, 0]}),
+        Panel("T [N]", {"in one pass": own.T[:, 0]}, dots={"step by step": run.T[:, 0]}),
+    ]
+    return Drawing(
+        f"Section V for cable 1: circle of {FEASIBLE:g} m, vibration of {AMPLITUDE * 1e6:g} um",
+        curves(run.times, "time [s]", panels),
+    )

@@ -1,0 +1,43 @@
+"""Paper F recomputed, claim by claim: `towline reproduce flying`."""
+
+from __future__ import annotations
+
+from ..accounts.account import Account, Paper, Progress, gather
+from . import (
+    balance,
+    cable,
+    disturbance,
+    helix,
+    pairing,
+    parameters,
+    procedure,
+    radius,
+    repair,
+    rotations,
+    vibration,
+    wind,
+)
+
+PAPER = Paper(
+    "flying",
+    "Q. Wang, H. Chen, Y. Su, L. Qiao: Coupling dynamics analysis of the flying cable driven parallel robot",
+)
+CHAPTERS = {
+    "Table 1": parameters.chapter,
+    "Which cable goes where": pairing.chapter,
+    "Rotations (section II, IV)": rotations.chapter,
+    "A vibrating cable (section III)": cable.chapter,
+    "Forces and moments (section IV)": balance.chapter,
+    "The procedure (section V)": procedure.chapter,
+    "Wind (section VI)": wind.chapter,
+    "A straight flight (section VI.A)": helix.chapter,
+    "A circle of 1 m, and its repair (section VI.B)": repair.chapter,
+    "The largest circle (section VI.B)": radius.chapter,
+    "A vibrating platform (section VI.B)": vibration.chapter,
+    "A moving quadrotor (section VI.C)": disturbance.chapter,
+}
+
+
+def account(progress: Progress | None = None) -> Account:
+    """Recompute the paper."""
+    return gather(PAPER, CHAPTERS, progress)

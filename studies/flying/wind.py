@@ -1,0 +1,121 @@
+"""Paper F's wind (figure 5) and its force on the platform (Eq. 25)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, load
+from ...models.air import trapezoid
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated, undetermined
+from .motion import TIMES
+
+PEAK = (5.0, 6.0, 2.0)  # printed in section VI [m/s]
+NOISE = 0.5  # printed, either way [m/s]
+STEADY = (0.35, 0.65)  # of the time, well inside the top of the trapezoid
+AGAINST = np.array([-5.0, 0.0, 0.0])  # a wind that blows towards -x [m/s]
+
+
+def chapter() -> Chapter:
+    """Figure 5 as drawn by this run, and the force of the printed formula."""
+    dynamics = Dynamics(load("wang-flying"))
+    wind, calm = trapezoid(TIMES, PEAK, noise=NOISE), trapezoid(TIMES, PEAK, noise=0.0)
+    still = np.zeros((len(TIMES), 6))
+    force = dynamics.aerodynamic_wrench(still, still, wind)[:, :3]
+    claims = [_top(wind), _noise(wind - calm), _shape(), _sign(dynamics), _lift(dynamics)]
+    return Chapter(claims, {"wind": _figure(wind, force)})
+
+
+def _top(wind: np.ndarray) -> Claim:
+    share = TIMES / TIMES[-1]
+    top = wind[(share > STEADY[0]) & (share < STEADY[1])].mean(axis=0)
+    return compared(
+        "fig-5-peak",
+        "section VI, figure 5",
+        "The wind's largest speed along x, y and z, under the noise: its mean over the top of the trapezoid.",
+        PEAK,
+        tuple(float(value) for value in top),
+        within=0.05,
+        agrees="The trapezoid's top has the printed speeds.",
+        differs="The trapezoid's top has other speeds.",
+        unit="m/s",
+        figure="wind",
+    )
+
+
+def _noise(noise: np.ndarray) -> Claim:
+    most = float(np.abs(noise).max())
+    return stated(
+        "fig-5-noise",
+        "section VI, figure 5",
+        "A Gaussian sequence with amplitudes in [-0.5, 0.5] m/s is added.",
+        NOISE,
+        most,
+        holds=most <= NOISE,
+        agrees="No sample is beyond; the deviation, not printed, is taken for a third of that.",
+        differs="Some samples are beyond.",
+        unit="m/s",
+        figure="wind",
+    )
+
+
+def _shape() -> Claim:
+    corners = (0.1, 0.3, 0.7, 0.9)
+    return undetermined(
+        "fig-5-shape",
+        "figure 5",
+        "When the wind rises, is steady and falls is drawn only.",
+        None,
+        tuple(corner * TIMES[-1] for corner in corners),
+        missing="The corners of the trapezoid and the seed are not printed; assumed: rising and falling for 2 s each.",
+        unit="s",
+        figure="wind",
+    )
+
+
+def _sign(dynamics: Dynamics) -> Claim:
+    """V^2 forgets where the wind comes from."""
+    aero = dynamics.robot.platform.aero
+    assert aero is not None
+    printed = 0.5 * aero.drag * aero.air_density * AGAINST[0] ** 2 * aero.area
+    return compared(
+        "eq-25-drag",
+        "Eq. 25",
+        f"F_ex = C_d rho V_x^2 S / 2 in a wind of {AGAINST[0]:g} m/s along x.",
+        printed,
+        float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), AGAINST)[0]),
+        within=1e-9,
+        agrees="The force points where the wind blows.",
+        differs="The printed force is never negative, so a wind towards -x would pull the platform towards +x: it is "
+        "V |V|, V being the air's velocity relative to the platform.",
+        unit="N",
+    )
+
+
+def _lift(dynamics: Dynamics) -> Claim:
+    """C_l rho (V_x^2 + V_y^2) S / 2, up, at the strongest wind."""
+    aero = dynamics.robot.platform.aero
+    assert aero is not None
+    printed = 0.5 * aero.lift * aero.air_density * (PEAK[0] ** 2 + PEAK[1] ** 2) * aero.area
+    return compared(
+        "eq-25-lift",
+        "Eq. 25",
+        "F_ez = C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind, upwards.",
+        printed,
+        float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[2]),
+        within=1e-9,
+        agrees="Computed with as printed; the wind along z, drawn in figure 5, has no part in any force.",
+        differs="This run's lift is another.",
+        unit="N",
+    )
+
+
+def _figure(wind: np.ndarray, force: np.ndarray) -> Drawing:
+    winds = {name: wind[:, axis] for axis, name in enumerate("xyz")}
+    forces = {name: force[:, axis] for axis, name in enumerate("xyz")}
+    panels = [Panel("wind [m/s]", winds), Panel("force [N]", forces)]
+    return Drawing(
+        "Figure 5: the wind along x, y and z, and its force on a platform at rest", curves(TIMES, "time [s]", panels)
+    )

@@ -1,0 +1,14 @@
+"""The papers that `towline reproduce` knows, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from .accounts.account import Account, Progress
+from .flying import study as flying
+from .towing import study as towing
+
+PAPERS: dict[str, Callable[[Progress | None], Account]] = {
+    "flying": flying.account,
+    "ctmrts": towing.account,
+}

@@ -1,0 +1,1 @@
+"""Paper C: a load towed by three to six robots."""

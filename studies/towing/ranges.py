@@ -1,0 +1,222 @@
+"""Paper C's figures 2 to 6: the workspaces of the three system types, their ranges, shapes, volumes and inclusion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from ...figures import workspace as figures
+from ...figures.drawing import Drawing
+from ...models.statics import equilibria
+from ...workspace import ExistsPlacement, ForceBalance, Places
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .plans import DRIVES, FIXED, robot
+from .workspace import PRINTED, SECTIONS, Loops, in_prism, loops, placed_as_both, reach, volume_of
+
+THICKNESS = 0.02  # of a section [m]
+READ = 0.08  # [m]: how near 60 000 random points come to the ends of ranges, which are corners of the workspaces
+FIGURES = {"fixed-length": "figure-3", "variable-length": "figure-5", "both": "figure-6"}
+NAMES = {"fixed-length": "W1", "variable-length": "W2", "both": "W3"}
+TRIANGLE, RECTANGLE = 0.5, 1.0  # share of the smallest rectangle about it that a shape fills
+
+
+def chapter() -> Chapter:
+    """60 000 loops of each type, and volumes."""
+    found = {drive: loops(drive) for drive in DRIVES}
+    claims = [_boxes(found["both"])]
+    claims += [claim for drive in DRIVES for claim in _ranges(drive, found[drive])]
+    claims += [_least_height(), *_sections(found["fixed-length"]), _prism(found["variable-length"])]
+    claims += [_volumes(), _inside_both(found), _fixed_inside_variable()]
+    drawings = {
+        FIGURES[drive]: Drawing(
+            f"{NAMES[drive]}, {drive}: where forces balance, of 60 000 loops, seen from above and from the sides",
+            figures.projections({NAMES[drive]: system.points}, system.robot.home_anchors),
+        )
+        for drive, system in found.items()
+    }
+    drawings["figure-4"] = Drawing(
+        "Cross sections of W1", figures.cross_sections(found["fixed-length"].points, SECTIONS, THICKNESS)
+    )
+    drawings["figure-2"] = _drawn_boxes(found["both"])
+    return Chapter(claims, drawings)
+
+
+def _boxes(both: Loops) -> Claim:
+    low, high = reach(both.robot)
+    half = (high - low).max(axis=0) / 2
+    return undetermined(
+        "figure-2",
+        "figure 2",
+        "The robot-ends' boxes, drawn without numbers: half-widths along x and y.",
+        None,
+        (float(half[0]), float(half[1])),
+        missing="Centres and heights are printed, widths are not; the computed ones are the smallest that contain the "
+        "ranges of section 5.3.",
+        unit="m",
+        figure="figure-2",
+    )
+
+
+def _drawn_boxes(both: Loops) -> Drawing:
+    rng = np.random.default_rng(0)
+    low, high = reach(both.robot)
+    points = {f"robot-end {i + 1}": rng.uniform(low[i], high[i], (3000, 3)) for i in range(len(low))}
+    return Drawing("Boxes of the robot-ends, as inferred", figures.projections(points, both.robot.home_anchors))
+
+
+def _ranges(drive: str, found: Loops) -> list[Claim]:
+    claims = []
+    for axis, printed, computed in zip("xyz", PRINTED[drive], found.ranges, strict=True):
+        claims.append(
+            compared(
+                f"range-{NAMES[drive]}-{axis}",
+                f"section 5, {FIGURES[drive].replace('-', ' ')}",
+                f"Range of {axis} of {NAMES[drive]}.",
+                printed,
+                tuple(computed.tolist()),
+                within=READ,
+                agrees=f"To {READ:g} m, what the boxes and 60 000 points leave open.",
+                differs="Robot-ends anywhere in boxes that section 5.3 needs give the computed range"
+                + (", wider than printed." if drive == "fixed-length" else "."),
+                unit="m",
+                figure=FIGURES[drive],
+            )
+        )
+    return claims
+
+
+def _least_height() -> Claim:
+    """With the robot-ends at the centres that are printed, nothing is inferred."""
+    rest = equilibria(robot("wang-ctmrts", "fixed-length"), np.full(3, FIXED))[0].pose[2]
+    printed = PRINTED["fixed-length"][2][0]
+    return stated(
+        "range-W1-least-height",
+        "section 5.1",
+        "No load on cables of 1.2 m hangs lower than the least z of W1.",
+        printed,
+        float(rest),
+        holds=bool(rest >= printed - 0.01),
+        agrees="At the printed centres it hangs no lower.",
+        differs="With the robot-ends at the printed centres it hangs at the computed height, whatever the boxes.",
+        unit="m",
+    )
+
+
+def _sections(fixed: Loops) -> list[Claim]:
+    claims = []
+    for height, shape, ideal in zip(
+        SECTIONS, ("a triangle", None, "a rectangle"), (TRIANGLE, None, RECTANGLE), strict=True
+    ):
+        if shape is None or ideal is None:
+            continue
+        points = fixed.points[np.abs(fixed.points[:, 2] - height) <= THICKNESS / 2][:, :2]
+        filled = share_of_rectangle(points)
+        nearer = abs(filled - ideal) < abs(filled - (TRIANGLE + RECTANGLE - ideal))
+        claims.append(
+            stated(
+                f"figure-4-{height:g}",
+                "figure 4",
+                f"The section at z = {height:g} m is approximately {shape} (share of the smallest rectangle about it).",
+                ideal,
+                filled,
+                holds=nearer,
+                agrees=f"Nearer to {shape} than to the other.",
+                differs="Nearer to the other shape, with the boxes that were inferred.",
+                figure="figure-4",
+            )
+        )
+    return claims
+
+
+def share_of_rectangle(points: np.ndarray) -> float:
+    """Area of the convex hull of points (n, 2) over that of the smallest rectangle about it: a triangle's is 1/2.
+
+    One side of the smallest rectangle lies along a side of the hull.
+    """
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    sides = np.roll(corners, -1, axis=0) - corners
+    angles = np.arctan2(sides[:, 1], sides[:, 0])
+    areas = []
+    for angle in angles:
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        areas.append(np.prod(np.ptp(corners @ turn.T, axis=0)))
+    return float(hull.volume / min(areas))
+
+
+def _prism(variable: Loops) -> Claim:
+    inside = float(in_prism(variable.robot, variable.points).mean())
+    arm = float(np.linalg.norm(variable.robot.attachments, axis=1).max())
+    return stated(
+        "section-5-prism",
+        "sections 5, 5.2",
+        "The load has to be in the triangular prism below the robot-ends (share of W2 inside it).",
+        1.0,
+        inside,
+        holds=inside == 1.0,
+        agrees="Every point of W2 is.",
+        differs=f"Nearly: attachments are {arm:.3f} m off the load's middle, by which it can be outside.",
+        figure="figure-5",
+    )
+
+
+def _volumes() -> Claim:
+    sizes = [volume_of(drive, samples=8000) for drive in DRIVES]
+    told = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
+    return stated(
+        "volumes",
+        "sections 5, 6",
+        "The volumes grow from W1 to W2 to W3 (found, m^3).",
+        "W1 < W2 < W3",
+        tuple(size.value for size in sizes),
+        holds=sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low,
+        agrees=f"With intervals: {told}. They are of the places that a search finds, of W1 the most may be missing.",
+        differs=f"With intervals, they do not: {told}.",
+        unit="m^3",
+    )
+
+
+def _inside_both(found: Mapping[str, Loops]) -> Claim:
+    shares = []
+    for drive in ("fixed-length", "variable-length"):
+        places = found[drive].places.only(found[drive].held)
+        shares.append(float(placed_as_both(places).mean()))
+    return stated(
+        "inclusion-W3",
+        "section 5.3",
+        "W1 and W2 lie inside W3 (share of their points that do).",
+        (1.0, 1.0),
+        tuple(shares),
+        holds=min(shares) == 1.0,
+        agrees="Every point of both passes the test of W3.",
+        differs="Not every point passes the test of W3.",
+    )
+
+
+def _fixed_inside_variable() -> Claim:
+    """Places above everything that robot-ends at 1.2 m can pull up, asked of both types."""
+    fixed, variable = robot("wang-ctmrts", "fixed-length"), robot("wang-ctmrts", "variable-length")
+    arm = float(np.linalg.norm(variable.attachments, axis=1).max())
+    highest = float(variable.carrier_home[:, 2].max()) + arm
+    rng = np.random.default_rng(0)
+    poses = np.zeros((2000, 6))
+    poses[:, :3] = rng.uniform([1.1, 0.8, highest + 1e-3], [1.4, 1.1, highest + 0.06], (2000, 3))
+    held = ExistsPlacement(condition=ForceBalance(), tries=64, turn=0.1).holds(fixed, Places.at_home(fixed, poses))
+    there = ExistsPlacement(condition=ForceBalance(), tries=64, turn=1.0)
+    also = there.holds(variable, Places.at_home(variable, poses[held]))
+    return stated(
+        "inclusion-W1-W2",
+        "sections 5, 6",
+        "W1 lies inside W2: of places of W1 above the robot-ends of W2, the share in W2.",
+        1.0,
+        float(also.mean()) if held.any() else 1.0,
+        holds=bool(also.all()),
+        otherwise=Verdict.IMPOSSIBLE,
+        agrees="No place of W1 was found outside W2.",
+        differs=f"{held.sum()} places of W1 above z = {highest:.3f} m were found, where three cables from 1.2 m would "
+        f"all pull down; the printed ranges say so too: z up to {PRINTED['fixed-length'][2][1]:g} m in W1, "
+        f"{PRINTED['variable-length'][2][1]:g} m in W2.",
+    )

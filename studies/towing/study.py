@@ -1,0 +1,23 @@
+"""Paper C recomputed, claim by claim: `towline reproduce ctmrts`."""
+
+from __future__ import annotations
+
+from ..accounts.account import Account, Paper, Progress, gather
+from . import equations, modes, ranges, tensions
+
+PAPER = Paper(
+    "ctmrts",
+    "Y. Wang, Z. Zhao, J. Li, G. Ji: Analysis of workspace of cable-typing close-coupling multi-robot collaboratively "
+    "towing system",
+)
+CHAPTERS = {
+    "The model, Eqs. 1 to 13": equations.chapter,
+    "Tensions, Eqs. 11, 16, 17": tensions.chapter,
+    "Workspaces, figures 2 to 6": ranges.chapter,
+    "Three ways to drive, three to six robots": modes.chapter,
+}
+
+
+def account(progress: Progress | None = None) -> Account:
+    """Recompute the paper."""
+    return gather(PAPER, CHAPTERS, progress)

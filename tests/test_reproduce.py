@@ -1,0 +1,284 @@
+"""`towline reproduce flying`: its claims by second derivations, its verdicts by their numbers, and what a user sees."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline.errors import SolverError
+from towline.figures import style
+from towline.figures.drawing import Drawing
+from towline.models import Dynamics, load
+from towline.studies.accounts import text
+from towline.studies.accounts.account import Chapter, Paper, gather
+from towline.studies.accounts.claim import Verdict, compared, stated, told, undetermined
+from towline.studies.accounts.files import write
+from towline.studies.flying import (
+    balance,
+    cable,
+    disturbance,
+    helix,
+    instants,
+    motion,
+    pairing,
+    parameters,
+    plans,
+    procedure,
+    radius,
+    rotations,
+    study,
+    vibration,
+    wind,
+)
+
+CHEAP = [
+    parameters,
+    pairing,
+    rotations,
+    cable,
+    balance,
+    procedure,
+    wind,
+    helix,
+    disturbance,
+]
+
+
+@pytest.fixture(scope="module")
+def chapters():
+    return [part.chapter() for part in CHEAP]
+
+
+@pytest.fixture(scope="module")
+def claims(chapters):
+    return {claim.id: claim for chapter in chapters for claim in chapter.claims}
+
+
+def verdict(part, name):
+    return next(claim for claim in part.chapter().claims if claim.id == name).verdict
+
+
+# --- claims and accounts
+
+
+def test_a_verdict_follows_from_the_numbers():
+    words = {"agrees": "yes", "differs": "no"}
+    near = compared("a", "Eq. 1", "x", (1.0, 2.0), (1.0, 2.05), within=0.1, **words)
+    far = compared("a", "Eq. 1", "x", (1.0, 2.0), (1.0, 2.15), within=0.1, **words)
+    assert (near.verdict, near.why) == (Verdict.REPRODUCED, "yes")
+    assert (far.verdict, far.why) == (Verdict.DIFFERS, "no")
+    assert compared("a", "Eq. 1", "x", 1.0, float("nan"), within=0.1, **words).verdict is Verdict.DIFFERS
+    never = stated("b", "Eq. 2", "x", None, "y", holds=False, otherwise=Verdict.IMPOSSIBLE, **words)
+    assert never.verdict is Verdict.IMPOSSIBLE
+    assert told((1.0, 2.5), "m") == "(1, 2.5) m"
+
+
+def example(name, **broken):
+    """An account of two claims, one of them of text that would break a table or a page."""
+    good = compared("good", "Eq. 1", "says", 1.0, 1.0, within=0.1, agrees="so", differs="no", figure="plot")
+    nasty = undetermined("bad", "Eq. 2", "a | b <script>", None, "c\nd", missing="<b>not</b> printed")
+    canvas = style.figure()
+    style.axes(canvas, "x [m]", "y [m]").plot([0, 1], [0, 1])
+    drawings = {"plot": Drawing("A plot", canvas)}
+    return gather(Paper(name, "A paper"), {"One": lambda: Chapter([good, nasty], drawings), **broken})
+
+
+def test_an_account_is_written_from_the_same_claims(tmp_path):
+    account = example("small")
+    assert account.complete
+    files = write(account, tmp_path)
+    assert [file.relative_to(tmp_path).as_posix() for file in files] == [
+        "small.md",
+        "small.html",
+        "small-errata.md",
+        "small.json",
+        "figures/plot.png",
+    ]
+    report, page, errata, data = (file.read_text() for file in files[:4])
+    assert "| good |" in report
+    assert "a \\| b" in report
+    assert "(figures/plot.png)" in report
+    assert "good" not in errata
+    assert "| bad |" in errata
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
+    assert page.count("data:image/svg+xml;base64,") == 1
+    assert not re.search(r'(src|href)="(?!data:)', page)
+    assert [claim["verdict"] for claim in json.loads(data)["claims"]] == ["reproduced", "not determined"]
+
+
+def test_a_chapter_that_breaks_is_told_and_stops_no_other():
+    def breaks():
+        raise SolverError("the solver fell over")
+
+    seen = []
+    whole = example("small", Two=breaks)
+    assert not whole.complete
+    assert len(whole.claims) == 2
+    assert whole.broken == {"Two": "the solver fell over"}
+    assert "the solver fell over" in text.report(whole)
+    gather(Paper("p", "P"), {"One": lambda: Chapter([])}, lambda *told_so: seen.append(told_so))
+    assert seen == [("One", 0, 1), ("done", 1, 1)]
+
+
+# --- paper F
+
+
+def test_every_claim_is_told(chapters, claims):
+    for claim in claims.values():
+        assert claim.why.strip().endswith("."), claim.id
+        assert claim.says.strip(), claim.id
+        assert re.fullmatch(r"[\w.-]+", claim.id), claim.id
+        numbers = [value for value in (claim.printed, claim.computed) if isinstance(value, float | tuple)]
+        assert all(np.isfinite(value).all() for value in numbers), claim.id
+    for chapter in chapters:
+        assert {claim.figure for claim in chapter.claims if claim.figure} <= set(chapter.drawings)
+
+
+def test_known_errata_are_found(claims):
+    """Each row of the list of paper F's errors has its verdict, and what holds is called so."""
+    expected = {
+        Verdict.DIFFERS: "eq-1 eq-2-height eq-15 eq-16 eq-22 eq-25-drag eq-26-frame eq-26-wind eq-31-32 eq-36-alpha "
+        "eq-37-J step-7 step-8 table-1-gyration eq-5 eq-17 eq-21",
+        Verdict.IMPOSSIBLE: "pairing step-7-inverse fig-7-positive",
+        Verdict.REPRODUCED: "table-1-geometry table-1-cable table-1-mass table-1-air table-1-rigid eq-9 eq-19 eq-27-28 "
+        "eq-30 eq-26 eq-36 eq-38 eq-25-lift step-2 step-3 step-4 step-5 step-6 fig-6 VI.A-flight conclusion-mobility",
+        Verdict.NOT_DETERMINED: "step-1 fig-5-shape fig-12-13 fig-15",
+    }
+    for wanted, names in expected.items():
+        for name in names.split():
+            assert claims[name].verdict is wanted, name
+
+
+def test_table_1_is_read_back_and_a_misprint_is_seen(monkeypatch):
+    assert verdict(parameters, "table-1-mass") is Verdict.REPRODUCED
+    monkeypatch.setitem(parameters.PRINTED, "m_B", 1.3)
+    assert verdict(parameters, "table-1-mass") is Verdict.DIFFERS
+    monkeypatch.setitem(parameters.PRINTED, "I_z", 0.07)
+    assert verdict(parameters, "table-1-gyration") is Verdict.REPRODUCED
+    monkeypatch.setitem(parameters.PRINTED, "I_z", 1.7)
+    assert verdict(parameters, "table-1-rigid") is Verdict.DIFFERS
+    monkeypatch.setattr(parameters, "CIRCLE", 101.0)
+    assert verdict(parameters, "eq-2-height") is Verdict.REPRODUCED
+
+
+def test_other_printed_values_change_the_verdict(monkeypatch):
+    monkeypatch.setattr(pairing, "ROWS", 3)
+    assert verdict(pairing, "pairing") is Verdict.REPRODUCED
+    monkeypatch.setattr(helix, "RADIUS", 0.2)
+    assert verdict(helix, "fig-7-positive") is Verdict.REPRODUCED
+
+
+def test_rates_and_accelerations_by_differences():
+    """The derivatives that the equations are held against, by scipy's rotations at three instants."""
+    seen = instants.instants()
+    step = 1e-4
+    angles, rates, bends = (part[:, 3:] for part in seen.base)
+    before, now, after = (
+        Rotation.from_euler("ZYX", (angles + t * rates + t**2 / 2 * bends)[:, ::-1]) for t in (-step, 0, step)
+    )
+    np.testing.assert_allclose(seen.R_A.R, now.as_matrix(), atol=1e-14)
+    forward, backward = (now.inv() * after).as_rotvec() / step, (before.inv() * now).as_rotvec() / step
+    np.testing.assert_allclose(seen.R_A.rate, (forward + backward) / 2, atol=1e-7)
+    # the turn of the second step is that of the first, carried on in the turned frame
+    np.testing.assert_allclose(seen.R_A.acceleration, (forward - backward) / step, atol=1e-3)
+
+
+def test_the_missing_newtons_of_the_helix(claims):
+    """By scipy's non-negative least squares: what pulling cables lack at the instant of the claim."""
+    from scipy.optimize import nnls
+
+    dynamics = Dynamics(load("wang-flying"))
+    turn = motion.circle(1.0)
+    tensions = motion.steady_tensions(dynamics, turn)
+    row = tensions.min(axis=1).argmin()
+    scale = np.r_[np.ones(3), np.full(3, 1 / dynamics.robot.length)]
+    A = dynamics.relative.wrench_matrix(turn.pose[row]) * scale[:, None]
+    w = dynamics.relative.required_wrench(*(part[row] for part in turn)) * scale
+    _, missing = nnls(A, w)
+    (told_so,) = re.findall(r"([\d.]+) N short", claims["fig-7-positive"].why)
+    assert float(told_so) == pytest.approx(missing, abs=0.01)
+
+
+def test_largest_radius_by_the_tensions_themselves():
+    """Six cables have one solution each: its smallest tension is zero at the radius that bisection found."""
+    dynamics = Dynamics(load("wang-flying"))
+    for floor in (0.0, 0.5):
+        largest = radius.largest_radius(dynamics, floor)
+        smallest = motion.steady_tensions(dynamics, motion.circle(largest)).min()
+        assert smallest == pytest.approx(floor, abs=2e-3)
+    assert radius.largest_radius(dynamics) == pytest.approx(0.234, abs=0.001)
+    assert not radius.feasible(dynamics, 1.0, 0.0)
+
+
+def test_the_printed_ratio_falls_where_it_is_said_to():
+    robot = load("wang-flying")
+    amplitude = vibration.amplitude_of(robot, vibration.RATIO)
+    found = vibration.forces(robot, amplitude)
+    # T is what the platform needs less what the vibration adds
+    steady = motion.steady_tensions(Dynamics(robot), motion.circle(motion.FEASIBLE))
+    np.testing.assert_allclose(found.T + found.dT, steady, atol=1e-9)
+    assert np.abs(found.dT[:, 0] / (steady - found.dT)[:, 0]).max() == pytest.approx(0.1247, rel=1e-3)
+    assert amplitude == pytest.approx(1.9e-6, rel=0.05)
+
+
+def test_a_pitching_quadrotor_by_newton_and_euler(claims):
+    """Relative error of cable 1 again, from the form in {G}."""
+    dynamics = Dynamics(load("wang-flying"))
+    body, base = motion.circle(motion.FEASIBLE), disturbance.flown(plans.PITCH)
+    world = dynamics.relative.motion_in_world(*body, *base)
+    A = dynamics.wrench_matrix(world[0], base.pose[:, None])
+    felt = np.linalg.solve(A, dynamics.required_wrench(*world)[..., None])[:, 0, 0]
+    still = motion.steady_tensions(dynamics, body)[:, 0]
+    worst = 100 * np.abs((still - felt) / felt).max()
+    assert claims["fig-15"].computed == pytest.approx(worst, rel=1e-6)
+
+
+# --- what a user sees
+
+
+def test_the_command_reproduces_the_paper(tmp_path):
+    """Through its real entry point, in less than two minutes."""
+    towline = Path(sys.executable).with_name("towline")
+    command = [str(towline), "reproduce", "flying", "--out", str(tmp_path / "out"), "--json"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    told_so = json.loads(done.stdout)
+    assert told_so["complete"]
+    assert {"id", "printed", "computed", "verdict"} <= set(told_so["claims"][0])
+    names = [claim["id"] for claim in told_so["claims"]]
+    assert len(names) == len(set(names)) > 50
+    by_name = {claim["id"]: claim for claim in told_so["claims"]}
+    assert by_name["circle"]["verdict"] == "impossible"
+    assert by_name["circle-repair"]["verdict"] == "reproduced"
+    assert by_name["helix-repair"]["verdict"] == "reproduced"
+    assert by_name["fig-11"]["verdict"] == "not determined"
+    assert by_name["fig-10-tension"]["computed"] < -0.9
+    assert all(Path(file).stat().st_size > 0 for file in told_so["files"])
+    drawn = {Path(file).stem for file in told_so["files"] if file.endswith(".png")}
+    assert {claim["figure"] for claim in told_so["claims"]} - {None} <= drawn
+    page = (tmp_path / "out" / "flying.html").read_text()
+    assert page.count("<h3>") == len(names)
+    assert page.count("data:image/svg+xml") == len(drawn)
+    assert not re.search(r'(src|href)="(?!data:)', page)
+    errata = (tmp_path / "out" / "flying-errata.md").read_text()
+    assert all((f"| {name} |" in errata) == (by_name[name]["verdict"] != "reproduced") for name in names)
+    assert study.PAPER.source in errata
+
+
+def test_an_unknown_paper_is_one_line(tmp_path):
+    towline = Path(sys.executable).with_name("towline")
+    done = subprocess.run(
+        [str(towline), "reproduce", "walking"], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("towline: PAPER: 'walking'; accepted: flying, ctmrts")
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
