@@ -7,14 +7,19 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_json
+from .options import JsonOption, print_json, robot_names
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def view(
     target: Annotated[
-        str, typer.Argument(metavar="TARGET", help="A robot (name or YAML file), or a plan or workspace file (NetCDF).")
+        str,
+        typer.Argument(
+            metavar="TARGET",
+            help="A robot (name or YAML file), or a plan or workspace file (NetCDF).",
+            autocompletion=robot_names,
+        ),
     ],
     html: Annotated[
         Path | None, typer.Option("--html", help="HTML file to write instead: it plays anywhere, without a server.")

@@ -68,6 +68,13 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
 
     A plan plays; a robot stands at home with the tensions that hold it there, in a workspace's points if it has some.
 
+    Parameters
+    ----------
+    subject
+        From `read`.
+    file
+        Where to write it.
+
     Raises
     ------
     InputError
