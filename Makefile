@@ -34,5 +34,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,cluster,dev,mesh,mujoco,timing]"
+	$(INSTALL) ".[bench,cluster,dev,mesh,mujoco,timing,viewer]"
 	touch $@
