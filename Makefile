@@ -4,7 +4,7 @@ BIN := .venv/bin
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
-.PHONY: demo test setup lint types unit clean
+.PHONY: demo test setup lint types unit pictures clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
@@ -23,6 +23,11 @@ types: .venv/dev.stamp
 
 unit: .venv/dev.stamp
 	$(BIN)/python -m pytest -n 2
+
+# Runs every example where the README's pictures are; the plans that they save there are ignored by git.
+pictures: .venv/core.stamp
+	mkdir -p docs/pictures
+	cd docs/pictures && for example in ../../examples/*.py; do ../../$(BIN)/python $$example || exit 1; done
 
 clean:
 	rm -rf .venv towline-demo build *.egg-info
