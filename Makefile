@@ -4,7 +4,7 @@ BIN := .venv/bin
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
-.PHONY: demo test setup lint types unit docs errata clean
+.PHONY: demo test setup lint types unit docs errata pictures clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
@@ -35,6 +35,11 @@ errata: .venv/core.stamp
 	  cp build/$$paper/$$paper-errata.md docs/errata/$$paper.md || exit 1; \
 	done
 
+# Runs every example where the README's pictures are; the plans that they save there are ignored by git.
+pictures: .venv/core.stamp
+	mkdir -p docs/pictures
+	cd docs/pictures && for example in ../../examples/*.py; do ../../$(BIN)/python $$example || exit 1; done
+
 clean:
 	rm -rf .venv towline-demo build site *.egg-info
 
@@ -45,5 +50,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,timing]"
+	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,timing,viewer]"
 	touch $@

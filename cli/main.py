@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TowlineError
-from . import bench, demo, export, import_, plan, reproduce, robots, tension, time, workspace
+from . import bench, demo, export, import_, plan, reproduce, robots, tension, time, view, workspace
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -26,6 +26,7 @@ app.command("tension")(tension.tension)
 app.command("plan")(plan.plan)
 app.command("time")(time.time)
 app.command("workspace")(workspace.workspace)
+app.command("view")(view.view)
 app.add_typer(import_.app, name="import")
 app.command("reproduce")(reproduce.reproduce)
 app.command("export")(export.export)

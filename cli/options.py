@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-def _robots(incomplete: str) -> list[str]:
+def robot_names(incomplete: str) -> list[str]:
     """What a shell completes a robot's name to: those of the library, and files that shells know by themselves."""
     from ..models import available
 
@@ -21,7 +21,7 @@ def _robots(incomplete: str) -> list[str]:
 
 RobotArgument = Annotated[
     str,
-    typer.Argument(metavar="ROBOT", help="A robot of the library, or a robot file (YAML).", autocompletion=_robots),
+    typer.Argument(metavar="ROBOT", help="A robot of the library, or a robot file (YAML).", autocompletion=robot_names),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 

@@ -229,7 +229,7 @@ class _Body:
     def __init__(self, ax: Any, points: np.ndarray, face: str, edge: str):
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-        self._faces = _faces(points)
+        self._faces = faces(points)
         (self._dots,) = ax.plot(*points.T, "o", color=edge, markersize=3.5, animated=True)
         self.artists: list[Any] = [self._dots]
         if self._faces:
@@ -256,7 +256,7 @@ def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndar
     return found
 
 
-def _faces(points: np.ndarray) -> list[np.ndarray]:
+def faces(points: np.ndarray) -> list[np.ndarray]:
     """Indices of the corners of each face of the hull of `points` (k, 3); none if they lie on a line."""
     from scipy.spatial import ConvexHull
 

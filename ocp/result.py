@@ -18,6 +18,7 @@ from .reports.trajectory import trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 __all__ = ["Plan", "PlanStatus"]
 
@@ -48,8 +49,14 @@ class Plan(Finding):
 
         What there is nothing of has no figure: no convergence where no solver ran, no base where all is ground.
         """
-        drawn = drawings(self, self.trajectory)
-        return [style.save(drawing.figure, Path(folder) / f"{name}.png") for name, drawing in drawn.items()]
+        return [style.save(drawn, Path(folder) / f"{name}.png") for name, drawn in self.figures().items()]
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook or save another way.
+
+        A name is missing where there is nothing to draw, as for `plot`.
+        """
+        return {name: drawing.figure for name, drawing in drawings(self, self.trajectory).items()}
 
     def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
         """Draw the robot in motion as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.

@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 
 # From the ground up: a room may import the rooms below its floor, and itself. Rooms of one floor stand apart.
-FLOORS = [{"models", "solvers", "figures"}, {"workspace"}, {"ocp"}, {"studies"}, {"benchmarks"}, {"cli"}]
+FLOORS = [{"models", "solvers", "figures"}, {"workspace"}, {"ocp"}, {"studies"}, {"benchmarks"}, {"viewer"}, {"cli"}]
 COMMON = {"errors", "processors", "writing"}
 CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
 

@@ -150,7 +150,7 @@ def test_errata_are_current(study):
             assert section.startswith(titles[claim.verdict]), claim.id
 
 
-@pytest.mark.parametrize("room", ["models", "solvers", "workspace", "ocp", "errors"])
+@pytest.mark.parametrize("room", ["models", "solvers", "workspace", "ocp", "viewer", "errors"])
 def test_every_public_name_is_in_the_reference(room):
     page = PAGES[f"docs/api/{room}.md"]
     for name in importlib.import_module(f"towline.{room}").__all__:

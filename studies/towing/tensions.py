@@ -100,8 +100,8 @@ def _freedom() -> Claim:
         tuple(float(size) for size in left),
         holds=all(size > 0 for size in left[1:]),
         agrees="There is a null space for m = 4, 5 and 6.",
-        differs="The null space has the computed sizes for m = 3, 4, 5, 6: independent columns leave no choice, and six "
-        "are dependent only where the robot is singular, as regular hexagons make it. Of the three rows of force alone "
+        differs="The null space has the computed sizes for m = 3, 4, 5, 6: independent columns leave no choice, and "
+        "six are dependent only where the robot is singular, as regular hexagons make it. Of the rows of force alone "
         f"it has {', '.join(str(int(size)) for size in of_forces)}.",
     )
 

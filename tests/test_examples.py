@@ -1,0 +1,99 @@
+"""Each script in `examples/` does what it says, run as a user runs it: in a folder of its own."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
+MOST_LINES, MOST_BYTES = 60, 60_000
+
+
+def circles(found):
+    arm = found.pose.values[:, :2] - [50, 50]
+    np.testing.assert_allclose(np.linalg.norm(arm, axis=1), 1, atol=1e-9)
+    np.testing.assert_allclose(found.pose.values[:, 2], 99, atol=1e-9)
+    carrier = found.carrier_pose.values[:, 0]
+    np.testing.assert_allclose(carrier[0], carrier[-1], atol=1e-6)  # one round after the other
+    assert found.tensions.min() > 0.5
+
+
+def carries(found):
+    np.testing.assert_allclose(found.pose.values[[0, -1], :3], [[1.1, 0.9, 0.2], [1.45, 1.05, 0.3]], atol=1e-9)
+    np.testing.assert_allclose(found.velocity.values[[0, -1]], 0, atol=1e-9)
+    np.testing.assert_allclose(found.pose.values[:, 3:], 0, atol=1e-9)
+    # Newton's second law of the load, from cable directions that are computed here.
+    corners = np.array([[0.05, -0.028867513459, 0], [0, 0.057735026919, 0], [-0.05, -0.028867513459, 0]])
+    along = found.carrier_pose.values[:, :, :3] - (found.pose.values[:, None, :3] + corners)
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    pull = np.einsum("nm,nmi->ni", found.tensions.values, along)
+    np.testing.assert_allclose(pull, 10 * (found.acceleration.values[:, :3] + [0, 0, 9.81]), atol=0.1)
+
+
+def passes(found):
+    quads, load = found.carrier_pose.values, found.pose.values
+    np.testing.assert_allclose(load[[0, -1], :3], [[-2.5, 0, 0], [2.5, 0, 0]], atol=1e-9)
+    between = np.abs(quads[..., 0]) < 0.2  # the walls' thickness
+    assert between.any(axis=0).all()  # each of them
+    assert (np.abs(quads[..., 1][between]) <= 0.4 + 1e-6).all()  # the slot less 0.1 m
+    apart = np.linalg.norm(quads[:, :, None, :3] - quads[:, None, :, :3], axis=3) + 9 * np.eye(4)
+    assert apart.min() >= 0.6 - 1e-6
+    assert np.ptp(quads[0, :, 1]) > 1.6  # and wide again, before and after
+    assert np.ptp(quads[-1, :, 1]) > 1.6
+
+
+def picks_and_places(found):
+    place = found.pose.values[:, :3]
+    np.testing.assert_allclose(place[[0, -1]], [[-3, -2, 1], [3, 2, 1]], atol=1e-6)
+    assert 2 < found.time.values[-1] < 8
+    assert np.linalg.norm(place[:, :2], axis=1).min() > 0.3  # round the column
+    np.testing.assert_allclose(found.tensions, found.tensions.clip(120, 4980), atol=1e-4)
+
+
+def tracks(found):
+    """The receiver is opposite to a source that moves at the sky's pace, seen from the dish's centre."""
+    towards = np.array([0, 0, 300]) - found.pose.values[:, :3]
+    np.testing.assert_allclose(np.linalg.norm(towards, axis=1), 160, atol=1e-4)
+    towards /= 160
+    pole = np.array([0, np.cos(np.radians(25.65)), np.sin(np.radians(25.65))])
+    np.testing.assert_allclose(towards @ pole, np.sin(np.radians(40)), atol=1e-6)  # its declination
+    turned = np.cross(pole, towards[0]) @ towards[-1], (towards[0] @ towards[-1]) - np.sin(np.radians(40)) ** 2
+    assert np.arctan2(-turned[0], turned[1]) == pytest.approx(4 / 23.9345 * 2 * np.pi, rel=1e-4)  # westward
+    assert found.tensions.min() > 100e3
+
+
+SHOWN = {
+    "cogiro_pick_and_place": picks_and_places,
+    "fast_tracks_a_source": tracks,
+    "flying_circle": circles,
+    "four_quadrotors_slot": passes,
+    "three_robots_carry": carries,
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_does_what_it_says(name, tmp_path):
+    script = ROOT / "examples" / f"{name}.py"
+    assert len(script.read_text().splitlines()) <= MOST_LINES
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert re.search(rf"{name.replace('_', '-')}: FEASIBLE", done.stdout), done.stdout
+    if name == "flying_circle":
+        assert "INFEASIBLE, short by 7.627 N" in done.stdout  # under a hovering quadrotor, as the demo proves
+    assert {file.name for file in tmp_path.iterdir()} == {f"{name}.nc", f"{name}.png"}
+    with xr.open_dataset(tmp_path / f"{name}.nc") as found:
+        assert found.attrs["status"] == "feasible"
+        SHOWN[name](found)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_readme_shows_it(name):
+    assert f"docs/pictures/{name}.png" in (ROOT / "README.md").read_text()
+    picture = (ROOT / "docs" / "pictures" / f"{name}.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) <= MOST_BYTES

@@ -1,0 +1,289 @@
+"""What the viewer shows, without a browser: geometry, tensions, certificates, colours, plans, workspaces, the page."""
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+from towline.errors import InputError
+from towline.models import Dynamics, load
+from towline.ocp import plan
+from towline.viewer import read, save_page, serve
+from towline.viewer.cloud import cloud
+from towline.viewer.colours import place, rgb, shades
+from towline.viewer.geometry import Geometry
+from towline.viewer.instant import arrow, at_rest
+from towline.viewer.sliders import poses, sliders
+from towline.viewer.words import readout
+from towline.workspace import StaticEquilibrium, sample, save
+
+TOWLINE = Path(sys.executable).with_name("towline")
+CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}
+
+
+def rest(robot, pose=None, carriers=None):
+    pose = robot.home if pose is None else np.asarray(pose, dtype=float)
+    carriers = robot.carrier_home if carriers is None else carriers
+    return at_rest(Dynamics(robot), Geometry(robot), pose, carriers)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A plan that cannot be, one that can, and a workspace."""
+    place = tmp_path_factory.mktemp("viewer")
+    robot = load("wang-flying")
+    hover = plan(robot, {"path": CIRCLE, "base": {"kind": "hold"}, "output_rate": 20})
+    hover.save(place / "hover.nc")
+    line = {"kind": "line", "start": [0, 0, -1], "end": [0.05, 0, -0.9]}
+    found = plan(robot, {"path": line, "duration": 2, "base": {"kind": "hold"}, "output_rate": 20})
+    assert found.feasible
+    found.save(place / "line.nc")
+    region = {"position": {"min": [-0.6, -0.6, -1.2], "max": [0.6, 0.6, 0]}}
+    for keep in ("accepted", "all", "none"):
+        save(sample(robot, StaticEquilibrium(), region, samples=3000, keep=keep), place / f"{keep}.nc")
+    return place
+
+
+@pytest.mark.parametrize("name", ["wang-flying", "caroca-pulleys", "planar-4", "cogiro"])
+def test_cables_are_drawn_along_the_pull_of_the_wrench_matrix(name):
+    robot = load(name)
+    pose = robot.home + robot.dof_mask * [0.05, -0.04, 0.03, 0.1, -0.05, 0.2]
+    carriers = robot.carrier_home + np.array([0.02, 0.01, 0, 0, 0.03, 0])
+    points = Geometry(robot)(pose, carriers)
+    along = points.exits - points.attachments
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    np.testing.assert_allclose(along.T, Dynamics(robot).wrench_matrix(pose, carriers)[:3], atol=1e-9)
+    turned = Rotation.from_euler("ZYX", pose[:2:-1])
+    np.testing.assert_allclose(points.attachments, turned.apply(robot.attachments) + pose[:3], atol=1e-12)
+    np.testing.assert_allclose(points.com, turned.apply(robot.platform.com) + pose[:3], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["wang-flying", "cogiro", "flycrane", "caroca-pulleys"])
+def test_what_is_shown_at_rest_carries_the_weight(name):
+    """By the points and tensions of the picture alone: forces and moments about the CoM balance."""
+    robot = load(name)
+    seen = rest(robot)
+    assert seen.status == "optimal"
+    pull = seen.points.exits - seen.points.attachments
+    pull *= (seen.tensions / np.linalg.norm(pull, axis=1))[:, None]
+    np.testing.assert_allclose(pull.sum(axis=0), [0, 0, robot.weight], atol=1e-6 * robot.weight)
+    moments = np.cross(seen.points.attachments - seen.points.com, pull).sum(axis=0)
+    np.testing.assert_allclose(moments, 0, atol=1e-6 * robot.weight * robot.length)
+    slack = min((seen.tensions - robot.t_min).min(), (robot.t_max - seen.tensions).min())
+    assert seen.margin == slack > 0
+    assert seen.reserve > 0
+    assert seen.certificate is None
+    assert arrow(seen, 1.0) is None
+
+
+def test_above_its_anchors_a_load_lacks_a_force_upwards():
+    """Cables only pull: up there they pull down, so all of the weight is missing, and more."""
+    robot = load("point-mass-3")
+    above = np.array([*robot.home_anchors.mean(axis=0)[:2], robot.home_anchors[:, 2].max() + 1, 0, 0, 0])
+    seen = rest(robot, above)
+    assert seen.status == "infeasible"
+    assert np.isnan(seen.tensions).all()
+    start, tip = arrow(seen, size=10.0)
+    np.testing.assert_allclose(start, seen.points.com)
+    np.testing.assert_allclose((tip - start) / np.linalg.norm(tip - start), [0, 0, 1], atol=1e-6)
+    assert seen.certificate.shortfall > robot.weight
+    assert -seen.reserve == pytest.approx(seen.certificate.shortfall)
+    told = readout(seen, robot)
+    assert f"short by {seen.certificate.shortfall:.4g} N" in told
+    assert told.count("none") == robot.m
+
+
+def test_a_missing_moment_alone_is_no_arrow():
+    """The arrow is as long as the share of force in the direction, and is left out where there is none."""
+    robot = load("wang-flying")
+    seen = rest(robot, robot.home + np.array([0.4, 0, 0, 0, 0, 0]))
+    force = seen.certificate.direction[:3]
+    assert np.linalg.norm(arrow(seen, 1.0)[1] - seen.points.com) == pytest.approx(0.3 * np.linalg.norm(force))
+    seen.certificate.direction[:3] = 0
+    assert arrow(seen, 1.0) is None
+
+
+def test_colours_are_ordered_between_the_limits_and_tell_none_apart():
+    t_min, t_max = np.array([0.5, 0.0, 5.0]), np.array([60.0, 100.0, 5.0])
+    np.testing.assert_allclose(place(t_min, t_min, t_max), [0, 0, 1])
+    np.testing.assert_allclose(place(t_max, t_min, t_max), [1, 1, 1])
+    np.testing.assert_allclose(place(np.array([-1.0, 200.0, np.nan]), t_min, t_max), [0, 1, np.nan])
+    places = place(np.linspace(0.5, 60, 50)[:, None], t_min[:1], t_max[:1])[:, 0]
+    assert (np.diff(places) > 0).all()
+    # By lightness alone, so that any kind of colour vision sees it; and against white.
+    light = (shades(np.linspace(0, 1, 50)) / 255) ** 2.2 @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(light) < 0).all()
+    assert light[0] < 0.8
+    assert len(set(shades(np.array([np.nan]))[0])) == 1  # grey
+    assert rgb("#0072B2") == (0, 114, 178)
+
+
+def test_a_plan_is_shown_as_it_was_saved(folder):
+    subject = read(str(folder / "line.nc"))
+    saved, replay = xr.load_dataset(folder / "line.nc"), subject.replay
+    assert subject.kind == "plan"
+    dynamics = Dynamics(subject.robot)
+    for index in (0, 7, len(replay.times) - 1):
+        seen, row = replay.at(index), saved.isel(time=index)
+        assert seen.time == float(row["time"])
+        A = dynamics.wrench_matrix(seen.pose, seen.carriers)
+        w = dynamics.required_wrench(*(row[name].to_numpy() for name in ("pose", "velocity", "acceleration")))
+        np.testing.assert_allclose(A @ seen.tensions, w, atol=1e-5)
+        assert seen.status == "feasible"
+    assert replay.index_at(replay.times[5] + 0.4 * (replay.times[6] - replay.times[5])) == 5
+    frames = replay.frames(5.0)
+    assert (frames[0], frames[-1]) == (0, len(replay.times) - 1)
+    assert np.diff(replay.times[frames]).max() == pytest.approx(0.2, abs=0.051)
+    for points in (replay.path, seen.points.anchors):
+        assert (points > replay.room.low - 0.2).all()
+        assert (points < replay.room.high + 0.2).all()
+
+
+def test_where_a_plan_has_no_tensions_its_audit_and_the_certificate_agree(folder):
+    saved = xr.load_dataset(folder / "hover.nc")
+    replay = read(str(folder / "hover.nc")).replay
+    for index in (0, 50, 111):
+        seen = replay.at(index)
+        assert seen.status == "infeasible"
+        assert seen.certificate.shortfall == pytest.approx(float(saved["violation"][index]), rel=1e-6)
+
+
+def test_sliders_stay_where_the_robot_can_be_put():
+    robot = load("wang-ctmrts")
+    found = sliders(robot, Geometry(robot))
+    assert [s.coordinate for s in found if s.carrier is None] == list(range(6))
+    for slider in found:
+        assert slider.low <= slider.home <= slider.high
+        if slider.carrier is not None:
+            reach = robot.carriers[slider.carrier].reach
+            assert reach.min[slider.coordinate] <= slider.low
+            assert slider.high <= reach.max[slider.coordinate]
+    pose, carriers = poses(robot, found, [slider.home for slider in found])
+    np.testing.assert_array_equal(pose, robot.home)
+    np.testing.assert_array_equal(carriers, robot.carrier_home)
+    last = found[-1]
+    _, carriers = poses(robot, [last], [last.high])
+    assert carriers[last.carrier, last.coordinate] == last.high
+    planar = load("planar-4")
+    assert [s.label for s in sliders(planar, Geometry(planar))] == ["x [m]", "z [m]", "pitch [rad]"]
+    kept = robot.model_copy(update={"drive": "variable-length"})
+    assert all(slider.carrier is None for slider in sliders(kept, Geometry(kept)))
+
+
+def test_a_workspace_is_points_or_cells(folder):
+    whole, accepted, none = (
+        cloud(xr.load_dataset(folder / f"{keep}.nc"), keep) for keep in ("all", "accepted", "none")
+    )
+    assert len(whole.positions) == 3000
+    green = (whole.colours == rgb(whole.legend[0][1])).all(axis=1)
+    assert green.sum() == len(accepted.positions) > 0
+    np.testing.assert_array_equal(whole.positions[green], accepted.positions)
+    # Each accepted point lies in a cell that is shown; cells are a 32nd of the box.
+    near = np.abs(accepted.positions[:, None] - none.positions[None]) <= np.array([1.2, 1.2, 1.2]) / 64 + 1e-9
+    assert near.all(axis=2).any(axis=1).all()
+    subject = read(str(folder / "all.nc"))
+    assert (subject.kind, subject.robot.name) == ("workspace", "wang-flying")
+
+
+def test_what_cannot_be_shown_is_one_line(folder):
+    saved = xr.load_dataset(folder / "line.nc")
+    (folder / "text.nc").write_text("no file of numbers")
+    (folder / "cut.nc").write_bytes((folder / "line.nc").read_bytes()[:5000])
+    saved.drop_vars("tensions").to_netcdf(folder / "half.nc", engine="h5netcdf")
+    saved.isel(cable=slice(3)).to_netcdf(folder / "few.nc", engine="h5netcdf")
+    saved[["status"] if "status" in saved else ["t_min"]].to_netcdf(folder / "other.nc", engine="h5netcdf")
+    hostile = xr.load_dataset(folder / "none.nc")
+    hostile.attrs["robot"] = "mine"
+    hostile.to_netcdf(folder / "mine.nc", engine="h5netcdf")
+    wanted = {
+        "text.nc": "cannot be read",
+        "cut.nc": "cannot be read",
+        "gone.nc": "is not there",
+        "half.nc": "has no 'tensions'",
+        "few.nc": "tensions: has the shape",
+        "other.nc": "neither a plan nor a workspace",
+        "mine.nc": "--robot",
+    }
+    for name, words in wanted.items():
+        with pytest.raises(InputError, match=words) as error:
+            read(str(folder / name))
+        assert "\n" not in str(error.value)
+    assert read(str(folder / "mine.nc"), robot="wang-flying").kind == "workspace"
+    for target in ("wang-flying", str(folder / "line.nc")):
+        with pytest.raises(InputError, match="--robot"):
+            read(target, robot="cogiro")
+    with pytest.raises(InputError, match="did you mean 'cogiro'"):
+        read("cogir")
+    for host, port, words in (
+        ("127.0.0.1", 70000, "--port"),
+        ("192.0.2.1", 0, "--host"),
+        ("no.such.host.", 0, "--host"),
+    ):
+        with pytest.raises(InputError, match=words), serve(read("planar-4"), host, port):
+            pass
+
+
+def test_nobody_can_have_it_open_a_tunnel():
+    from towline.viewer import server
+
+    started = server._start("127.0.0.1", 0)
+    try:
+        assert started.request_share_url() is None
+    finally:
+        server._stop(started)
+
+
+def test_names_from_files_cannot_be_code(folder, tmp_path):
+    saved = xr.load_dataset(folder / "line.nc").isel(time=slice(3))
+    saved.attrs["status"] = "</title><script>alert(1)</script>"
+    saved.to_netcdf(tmp_path / "hostile.nc", engine="h5netcdf")
+    page = save_page(read(str(tmp_path / "hostile.nc")), tmp_path / "page.html").read_text()
+    assert "alert(1)" in page
+    assert "<script>alert(1)" not in page
+
+
+def run(*arguments, cwd):
+    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
+    command = [str(TOWLINE), "view", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=60, check=False)
+
+
+def test_the_command_writes_a_page_and_nothing_else(folder, tmp_path):
+    done = run(folder / "hover.nc", "--html", "page.html", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {"kind": "plan", "robot": "wang-flying", "file": "page.html"}
+    page = (tmp_path / "page.html").read_text()
+    assert not re.search(r"""(src|href)\s*=\s*["']https?:""", page)
+    assert "t_max = 60 N" in page
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+    done = run("wang-flyin", "--html", "other.html", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "other.html").exists()
+
+
+def test_viser_is_imported_in_one_place_and_when_it_is_used():
+    room = Path(__file__).parent.parent / "viewer"
+    importing = []
+    for file in room.glob("*.py"):
+        tree = ast.parse(file.read_text())
+        typing_only = {
+            id(node)
+            for block in ast.walk(tree)
+            if isinstance(block, ast.If) and getattr(block.test, "id", "") == "TYPE_CHECKING"
+            for node in ast.walk(block)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import) and id(node) not in typing_only:
+                importing += [file.name for alias in node.names if alias.name.split(".")[0] == "viser"]
+    assert importing == ["server.py"]
+    code = "import sys, towline.viewer; print('viser' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

@@ -1,0 +1,100 @@
+"""`Instant`: a robot as it is at one time: where its points are, its tensions, or the proof that there are none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..models import Dynamics
+from ..solvers import Certificate, capacity_margin, solve
+from ..workspace import pose_problem
+from .geometry import Geometry, Points
+
+ARROW = 0.3  # of the robot's size, for a certificate that is all force
+FORCELESS = 0.05  # shorter force parts are no arrow: the certificate is about moments
+
+
+@dataclass(frozen=True)
+class Instant:
+    """One instant.
+
+    Attributes
+    ----------
+    pose, carriers
+        In {G}, (6,) and (c, 6) [m, rad].
+    points
+        See `Points`.
+    tensions
+        (m,) [N], nan where there are none.
+    status
+        Of the tensions, a word.
+    margin
+        Smallest distance of a tension from its limits [N], and the index of that cable; nan and -1 without tensions.
+    reserve
+        Capacity margin at rest [N]: how far the wrench is from the boundary of what the cables can give, negative
+        outside; nan where it was not asked for.
+    certificate
+        Why there are no tensions; None if there are.
+    time
+        [s]; None at rest.
+    """
+
+    pose: np.ndarray
+    carriers: np.ndarray
+    points: Points
+    tensions: np.ndarray
+    status: str
+    margin: float
+    nearest: int
+    reserve: float = float("nan")
+    certificate: Certificate | None = None
+    time: float | None = None
+
+
+def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Instant:
+    """The robot at rest at `pose` (6,) with its carriers at (c, 6), and the tensions of least norm that hold it there.
+
+    Raises
+    ------
+    InputError
+        If a cable has no length there, or no way over its pulley.
+    """
+    robot = dynamics.robot
+    problem = pose_problem(dynamics, pose, carrier_pose=carriers)
+    answer = solve(problem)
+    tensions = np.full(robot.m, np.nan) if answer.tensions is None else answer.tensions
+    margin, nearest = least_distance(tensions, robot.t_min, robot.t_max)
+    return Instant(
+        pose=pose,
+        carriers=carriers,
+        points=geometry(pose, carriers),
+        tensions=tensions,
+        status=answer.status.value,
+        margin=margin,
+        nearest=nearest,
+        reserve=capacity_margin(problem).value,
+        certificate=answer.certificate,
+    )
+
+
+def least_distance(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> tuple[float, int]:
+    """Smallest distance of tensions (m,) from their limits [N], and whose; nan and -1 if one is nan."""
+    inside = np.minimum(tensions - t_min, t_max - tensions)
+    if not np.isfinite(inside).all():
+        return float("nan"), -1
+    return float(inside.min()), int(inside.argmin())
+
+
+def arrow(instant: Instant, size: float) -> np.ndarray | None:
+    """The force part of the certificate's direction as an arrow from the CoM, start and tip (2, 3) in {G} [m].
+
+    Its length is `ARROW` of `size` [m] times the share of force in the direction; None if there is no certificate, or
+    hardly any force in it.
+    """
+    if instant.certificate is None:
+        return None
+    force = instant.certificate.direction[:3]
+    if np.linalg.norm(force) < FORCELESS:
+        return None
+    return np.stack([instant.points.com, instant.points.com + ARROW * size * force])

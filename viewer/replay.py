@@ -1,0 +1,151 @@
+"""`Replay`: a saved plan, instant by instant. Nothing is interpolated: what is shown was audited."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError
+from ..models import Robot
+from ..models.parsing import parse_yaml
+from ..ocp import Task
+from ..ocp.reports.scene import outline
+from ..ocp.tasks.scenario import Scenario, lay_out
+from ..solvers import Certificate, certify
+from ..workspace.pose import masked_problem
+from .geometry import Geometry, Room
+from .instant import Instant, least_distance
+
+NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
+MOST_FRAMES = 1500  # of a page
+
+
+class Replay:
+    """A plan that `Plan.save` wrote.
+
+    Parameters
+    ----------
+    found
+        The dataset.
+    where
+        The file, for errors.
+
+    Attributes
+    ----------
+    robot, title, times
+        Times of the saved instants (n,) [s].
+
+    Raises
+    ------
+    InputError
+        If what a plan has is not there, or is not of its robot.
+    """
+
+    def __init__(self, found: xr.Dataset, where: str):
+        for name in (*NEEDED, "time"):
+            if name not in found.variables:
+                raise InputError(f"{where}: has no {name!r}; accepted: a plan as `towline plan` saves it")
+        for name in ("robot", "task"):
+            if not isinstance(found.attrs.get(name), str):
+                raise InputError(f"{where}: does not tell its {name}; accepted: a plan as `towline plan` saves it")
+        self.robot = parse_yaml(found.attrs["robot"], Robot, f"{where}, robot")
+        self._task = parse_yaml(found.attrs["task"], Task, f"{where}, task")
+        self.title = f"{self.robot.name}, {self._task.name}: {found.attrs.get('status', 'a plan')}"
+        self.geometry = Geometry(self.robot)
+        self.times = _array(found, "time", (-1,), where)
+        n, c = len(self.times), len(self.robot.carriers)
+        self._pose, self._velocity, self._acceleration = (
+            _array(found, name, (n, 6), where) for name in ("pose", "velocity", "acceleration")
+        )
+        self._carriers = _array(found, "carrier_pose", (n, c, 6), where)
+        self._tensions = _array(found, "tensions", (n, self.robot.m), where, gaps=True)
+        if n == 0 or not (np.diff(self.times) > 0).all():
+            raise InputError(f"{where}: time: has {n} instants, not one after another; accepted: times that rise")
+        self._points = self.geometry(self._pose, self._carriers)
+
+    @property
+    def room(self) -> Room:
+        """What the robot passes through."""
+        return Room.of(self._points.anchors, self._points.attachments, self._carriers[..., :3])
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last instant [s]."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def path(self) -> np.ndarray:
+        """Origin of the platform's frame at each instant, (n, 3) in {G} [m]."""
+        return self._pose[:, :3]
+
+    @property
+    def carrier_paths(self) -> list[np.ndarray]:
+        """Those of the carriers' frames that move, (n, 3) each."""
+        paths = np.moveaxis(self._carriers[:, :, :3], 1, 0)
+        return [path for path in paths if np.ptp(path, axis=0).max() > 1e-9]
+
+    @property
+    def obstacles(self) -> list[np.ndarray]:
+        """Lines (k, 3) in {G} [m] that outline the places to keep out of."""
+        return [line for place in self._task.limits.keep_out if place.frame == "world" for line in outline(place)]
+
+    def index_at(self, time: float) -> int:
+        """The instant nearest to `time` [s]."""
+        return int(np.abs(self.times - time).argmin())
+
+    def frames(self, rate: float) -> np.ndarray:
+        """The instants nearest to equal times, `rate` a second, fewer if that were more than `MOST_FRAMES`."""
+        count = min(int(self.duration * rate) + 1, MOST_FRAMES, len(self.times))
+        wanted = np.linspace(self.times[0], self.times[-1], count)
+        return np.unique([self.index_at(time) for time in wanted])
+
+    def at(self, index: int) -> Instant:
+        """The `index`-th instant: its audited tensions, or where there are none the certificate of that instant."""
+        tensions = self._tensions[index]
+        there = bool(np.isfinite(tensions).all())
+        margin, nearest = least_distance(tensions, self.robot.t_min, self.robot.t_max)
+        certificate = None if there else self._certificate(index)
+        return Instant(
+            pose=self._pose[index],
+            carriers=self._carriers[index],
+            points=type(self._points)(*(part[index] for part in self._points)),
+            tensions=tensions,
+            status="feasible" if there else "no tensions" if certificate is None else "infeasible",
+            margin=margin,
+            nearest=nearest,
+            certificate=certificate,
+            time=float(self.times[index]),
+        )
+
+    def _certificate(self, index: int) -> Certificate | None:
+        """Of the winds in which tensions have to exist, the certificate with the largest shortfall."""
+        scenario, pose, velocity = self._scenario, self._pose[index], self._velocity[index]
+        t_min, t_max = scenario.bounds()
+        A = scenario.dynamics.wrench_matrix(pose, self._carriers[index])
+        proofs = []
+        for wind in scenario.winds_at(pose, velocity):
+            w = scenario.dynamics.required_wrench(pose, velocity, self._acceleration[index], wind=wind)
+            proofs.append(certify(masked_problem(scenario.dynamics, A, w, t_min, t_max)))
+        return max((proof for proof in proofs if proof), key=lambda proof: proof.shortfall, default=None)
+
+    @cached_property
+    def _scenario(self) -> Scenario:
+        return lay_out(self.robot, self._task)
+
+
+def _array(found: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False) -> np.ndarray:
+    """A variable as numbers of the expected shape, -1 for any length; `gaps`: nan is one of them."""
+    try:
+        values = found[name].to_numpy().astype(float)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: {name}: is {found[name].dtype}; accepted: numbers") from None
+    fits = len(values.shape) == len(shape) and all(
+        want in (-1, have) for want, have in zip(shape, values.shape, strict=True)
+    )
+    if not fits:
+        raise InputError(f"{where}: {name}: has the shape {values.shape}; accepted: {shape}, as its robot has")
+    if not gaps and not np.isfinite(values).all():
+        raise InputError(f"{where}: {name}: has numbers that are not finite; accepted: finite ones")
+    return values

@@ -1,0 +1,160 @@
+"""The one place that knows viser: a live server, and a recording as one HTML page that needs none."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import socket
+from collections.abc import Iterator
+from html import escape
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from ..models import Dynamics
+from ..writing import whole_file
+from . import words
+from .geometry import Geometry
+from .instant import at_rest
+from .panel import Panel
+from .stage import Stage
+
+if TYPE_CHECKING:
+    import viser
+
+    from .subject import Subject
+
+LOOPBACK = "127.0.0.1"
+PORT = 8080
+FRAME_RATE = 25.0  # [1/s] of a page
+
+
+@contextlib.contextmanager
+def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[str]:
+    """Show a subject in the browser for as long as the block lasts; the address comes out.
+
+    Parameters
+    ----------
+    subject
+        From `read`.
+    host
+        Who can look: 127.0.0.1 this machine only. There is no password; beyond this machine that is everybody.
+    port
+        Where; if it is taken, one of those that follow. 0: any that is free.
+
+    Raises
+    ------
+    InputError
+        If viser is not installed, or host or port are none that can be.
+    """
+    _check_address(host, port)
+    server = _start(host, port)
+    try:
+        geometry = Geometry(subject.robot)
+        stage = Stage(server, subject, geometry, captioned=False)
+        panel = Panel(server, subject, geometry, stage)
+        try:
+            yield f"http://{host}:{server.get_port()}"
+        finally:
+            panel.close()
+    finally:
+        _stop(server)
+
+
+def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
+    """Write a subject as one HTML file that loads nothing and plays without a server, whole or not at all.
+
+    A plan plays; a robot stands at home with the tensions that hold it there, in a workspace's points if it has some.
+
+    Parameters
+    ----------
+    subject
+        From `read`.
+    file
+        Where to write it.
+
+    Raises
+    ------
+    InputError
+        If viser is not installed, or the place cannot be written to.
+    """
+    path = Path(file)
+    with whole_file(path) as temporary:
+        temporary.write_text(_page(subject), encoding="utf-8")
+    return path
+
+
+def _page(subject: Subject) -> str:
+    # viser records what a server is told, so there is one, on a port that nobody is told.
+    server = _start(LOOPBACK, 0)
+    try:
+        geometry = Geometry(subject.robot)
+        stage = Stage(server, subject, geometry, captioned=True)
+        replay = subject.replay
+        if replay is None:
+            robot = subject.robot
+            stage.show(at_rest(Dynamics(robot), geometry, robot.home, robot.carrier_home))
+            document = server.get_scene_serializer().as_html()
+        else:
+            frames = replay.frames(FRAME_RATE)
+            stage.show(replay.at(int(frames[0])))
+            recording = server.get_scene_serializer()
+            for before, index in pairwise(frames):
+                recording.insert_sleep(float(replay.times[index] - replay.times[before]))
+                stage.show(replay.at(int(index)))
+            document = recording.as_html()
+    finally:
+        _stop(server)
+    title = escape(subject.title)
+    # Above the picture, but the mouse goes through to it.
+    aside = (
+        '<aside style="position:fixed;left:8px;bottom:52px;max-width:260px;z-index:1;pointer-events:none;color:#222;'
+        f'background:#ffffffcc;font-family:system-ui,sans-serif"><div style="padding:4px 12px;font-weight:600">{title}'
+        f"</div>{words.legend(subject, stage.cell)}</aside>"
+    )
+    head, _, rest = document.partition("<head>")
+    body, end, tail = rest.rpartition("</body>")
+    return f"{head}<head><title>{title}</title>{body}{aside}{end}{tail}"
+
+
+def _check_address(host: str, port: int) -> None:
+    """Refuse where no server could ever be: viser would wait for ever."""
+    if not 0 <= port <= 65535:
+        raise InputError(f"--port: {port}; accepted: 0 to 65535")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as trial:
+            trial.bind(address)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"--host: {host!r} cannot be listened on ({reason}); accepted: {LOOPBACK}, or an address of this machine"
+        ) from None
+
+
+def _start(host: str, port: int) -> viser.ViserServer:
+    try:
+        import viser
+    except ImportError:
+        raise InputError("viewer: viser is not installed; accepted: pip install 'towline[viewer]'") from None
+
+    class Unshared(viser.ViserServer):
+        """No client can have it open a tunnel through a server of somebody else."""
+
+        def request_share_url(self, verbose: bool = True) -> str | None:
+            return None
+
+    with _quiet():
+        return Unshared(host=host, port=port, verbose=False)
+
+
+def _stop(server: viser.ViserServer) -> None:
+    with _quiet():
+        server.stop()
+
+
+def _quiet() -> contextlib.AbstractContextManager[object]:
+    """Nothing is printed: viser does when it starts and stops, and --json may not have that."""
+    return contextlib.redirect_stdout(io.StringIO())

@@ -1,0 +1,89 @@
+"""Which poses sliders can reach: a range for each coordinate of platform and carriers that can move."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..models import Robot
+from ..models.robot import COORDINATES, MobileCarrier, QuadrotorCarrier
+from .geometry import Geometry
+
+TURN = 1.0  # [rad] to each side of home
+BEYOND = 0.25  # of the robot's room, to each side: also where it cannot be is worth seeing
+TILT = 0.6  # [rad] of carriers that have no limit of their own
+
+
+class Slider(NamedTuple):
+    """One coordinate that can be set.
+
+    Attributes
+    ----------
+    carrier
+        Index of the carrier that it belongs to; None: the platform.
+    coordinate
+        Index in (x, y, z, roll, pitch, yaw).
+    low, high, home, step
+        [m] or [rad].
+    """
+
+    carrier: int | None
+    coordinate: int
+    low: float
+    high: float
+    home: float
+    step: float
+
+    @property
+    def label(self) -> str:
+        """Name and unit."""
+        return f"{COORDINATES[self.coordinate]} [{'m' if self.coordinate < 3 else 'rad'}]"
+
+
+def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
+    """First those of the platform, then carrier by carrier.
+
+    The platform goes through the robot's room and a little beyond; mobile carriers go through their reach boxes, unless
+    the drive keeps them; what flies goes half the robot's size to each side, and tilts as far as its file allows.
+    """
+    home = robot.home
+    found = []
+    for coordinate, name in enumerate(COORDINATES):
+        if name in robot.platform.dof:
+            at, room = home[coordinate], geometry.room
+            low, high = at - TURN, at + TURN
+            if coordinate < 3:
+                beyond = BEYOND * (room.high - room.low)[coordinate]
+                low, high = room.low[coordinate] - beyond, room.high[coordinate] + beyond
+            found.append(_slider(None, coordinate, low, high, at))
+    for index, carrier in enumerate(robot.carriers):
+        if isinstance(carrier, MobileCarrier):
+            if robot.drive != "variable-length":
+                ends = zip(carrier.reach.min, carrier.reach.max, strict=True)
+                found += [_slider(index, k, low, high, carrier.home[k]) for k, (low, high) in enumerate(ends)]
+        elif carrier.kind != "ground":
+            tilt = carrier.tilt_max if isinstance(carrier, QuadrotorCarrier) else TILT
+            spans = [geometry.room.size / 2] * 3 + [tilt, tilt, TURN]
+            found += [_slider(index, k, at - spans[k], at + spans[k], at) for k, at in enumerate(carrier.home)]
+    return [slider for slider in found if slider.high > slider.low]
+
+
+def poses(robot: Robot, settings: list[Slider], values: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Platform (6,) and carriers (c, 6) in {G} with `values` for the sliders and the rest at home [m, rad]."""
+    pose, carriers = robot.home.copy(), robot.carrier_home.copy()
+    for slider, value in zip(settings, values, strict=True):
+        owner = pose if slider.carrier is None else carriers[slider.carrier]
+        owner[slider.coordinate] = value
+    return pose, carriers
+
+
+def _slider(carrier: int | None, coordinate: int, low: float, high: float, home: float) -> Slider:
+    """With ends on whole steps inside of the range, so that they read well."""
+    if not high > low:
+        return Slider(carrier, coordinate, float(home), float(home), float(home), 1.0)
+    digits = int(np.ceil(-np.log10((high - low) / 200)))
+    step = 10.0**-digits
+    inner_low = round(float(np.ceil(low / step - 1e-6)) * step, max(digits, 0))
+    inner_high = round(float(np.floor(high / step + 1e-6)) * step, max(digits, 0))
+    return Slider(carrier, coordinate, min(inner_low, float(home)), max(inner_high, float(home)), float(home), step)

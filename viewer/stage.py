@@ -1,0 +1,254 @@
+"""`Stage`: a robot as a viser scene: what stands still is drawn once, `show` moves the rest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..figures import style
+from ..figures.animation import faces
+from ..figures.robot import box_edges
+from ..models.robot import MobileCarrier
+from . import words
+from .colours import place, rgb, shades
+from .geometry import Geometry
+from .instant import Instant, arrow
+
+if TYPE_CHECKING:
+    import viser
+
+    from .subject import Subject
+
+FIELD_OF_VIEW = 0.75  # [rad]
+CABLE_WIDTH = 4.0  # [pixels]
+THIN = 1.5
+BLACK, GREY = (0, 0, 0), (150, 150, 150)
+HEAD = 0.25  # of an arrow's length
+BARBS = 12
+CELLS = 10  # of the grid along the robot's size, about
+
+
+class Stage:
+    """A subject's robot on a viser server.
+
+    Parameters
+    ----------
+    server
+        Of which only scene and camera are used.
+    subject
+        What is shown.
+    geometry
+        Of its robot.
+    captioned
+        Whether time, status and margin stand in the picture: for a page, which has no panel.
+    """
+
+    def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
+        self._scene = server.scene
+        self._robot = subject.robot
+        self._room = room = subject.replay.room if subject.replay else geometry.room
+        self._size, self._centre = room.size, (room.low + room.high) / 2
+        self._look(server)
+        self._draw_surroundings(subject)
+        self._make_actors(captioned)
+
+    @property
+    def cell(self) -> float:
+        """Edge of the grid's cells [m]: 1, 2 or 5 times a power of ten."""
+        wanted = self._size / CELLS
+        power = 10.0 ** np.floor(np.log10(wanted))
+        return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+
+    def show(self, instant: Instant) -> None:
+        """Draw an instant."""
+        points = instant.points
+        colours = shades(place(instant.tensions, self._robot.t_min, self._robot.t_max))
+        exits = np.where(np.isfinite(points.exits), points.exits, points.anchors)
+        ways = np.stack([points.anchors, exits, exits, points.attachments], axis=1).reshape(-1, 2, 2, 3)
+        for cable, way, colour in zip(self._cables, ways.astype(np.float32), colours, strict=True):
+            cable.points = way
+            cable.colors = colour
+        self._ends.points = np.concatenate([points.anchors, points.attachments]).astype(np.float32)
+        _place(self._platform, instant.pose)
+        for handle, pose in zip(self._carriers, instant.carriers, strict=True):
+            if handle is not None:
+                _place(handle, pose)
+        # Not all at one height, for cables that run close to each other.
+        along = (np.arange(self._robot.m) % 2 * 0.2 + 0.3)[:, None]
+        middles = (1 - along) * exits + along * points.attachments
+        for index, (label, tension) in enumerate(zip(self._numbers, instant.tensions, strict=True)):
+            label.position = middles[index]
+            _write(
+                label,
+                f"{index + 1}: {words.newtons(round(float(tension), 3))}" if np.isfinite(tension) else f"{index + 1}",
+            )
+        self._point(instant)
+        if self._caption is not None:
+            _write(self._caption, words.caption(instant))
+
+    def show_cloud(self, shown: bool) -> None:
+        """Whether the points of a workspace are there."""
+        if self._cloud is not None:
+            self._cloud.visible = shown
+
+    def show_numbers(self, shown: bool) -> None:
+        """Whether number and tension stand at the cables."""
+        for label in self._numbers:
+            label.visible = shown
+
+    def _point(self, instant: Instant) -> None:
+        """The certificate's arrow."""
+        ends = arrow(instant, self._size)
+        self._arrow.visible = self._short.visible = ends is not None
+        if ends is not None:
+            self._arrow.points = _strokes(*ends).astype(np.float32)
+            self._short.position = ends[1]
+            _write(self._short, words.shortfall(instant))
+
+    def _look(self, server: viser.ViserServer) -> None:
+        """The camera sees the whole robot from the front, a little from the side and above."""
+        camera = server.initial_camera
+        along = np.array([0.45, -1.0, 0.45])
+        away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2)
+        camera.position = self._centre + away * along / np.linalg.norm(along)
+        camera.look_at = self._centre
+        camera.fov = FIELD_OF_VIEW
+        camera.near, camera.far = 1e-3 * self._size, 50 * self._size
+
+    def _draw_surroundings(self, subject: Subject) -> None:
+        scene, cell = self._scene, self.cell
+        # Shadows tell little here, and their shaders keep a machine without a GPU busy for seconds.
+        scene.configure_default_lights(cast_shadow=False)
+        width = 2 * cell * np.ceil(self._size / cell)
+        # A little below, where no platform lies in it.
+        floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._room.low[2] - 0.03 * self._size])
+        scene.add_grid(
+            "/grid",
+            width=width,
+            height=width,
+            cell_size=cell,
+            section_size=5 * cell,
+            cell_color=(225, 225, 225),
+            section_color=(200, 200, 200),
+            fade_distance=100 * self._size,
+            shadow_opacity=0.0,
+            position=floor,
+        )
+        scene.add_frame("/G", axes_length=0.08 * self._size, axes_radius=0.004 * self._size, origin_radius=0.0)
+        boxes = [carrier.reach for carrier in self._robot.carriers if isinstance(carrier, MobileCarrier)]
+        edges = [edge for box in boxes for edge in box_edges(np.array(box.min), np.array(box.max))]
+        self._lines("/reach", edges, rgb(style.colour(3)))
+        if subject.replay is not None:
+            self._lines("/path", [subject.replay.path], rgb(style.colour(0)), 2 * THIN)
+            self._lines("/carrier_paths", subject.replay.carrier_paths, GREY)
+            self._lines("/keep_out", subject.replay.obstacles, rgb(style.colour(5)))
+        self._cloud = None
+        if subject.cloud is not None and len(subject.cloud.positions):
+            self._cloud = scene.add_point_cloud(
+                "/workspace",
+                subject.cloud.positions.astype(np.float32),
+                subject.cloud.colours,
+                point_size=0.004 * self._size,
+                point_shape="circle",
+                precision="float32",
+            )
+
+    def _lines(self, name: str, lines: list[np.ndarray], colour: tuple[int, int, int], width: float = THIN) -> None:
+        """Lines (k, 3) each, [m]."""
+        parts = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
+        if parts:
+            points = np.concatenate(parts).astype(np.float32)
+            self._scene.add_line_segments(name, points, colour, thickness=width, thickness_units="screen")
+
+    def _make_actors(self, captioned: bool) -> None:
+        scene, robot, size = self._scene, self._robot, self._size
+        # An object each: viser shows one colour as it is, but colours of single segments too pale.
+        nowhere = np.zeros((2, 2, 3), np.float32)
+        self._cables = [
+            scene.add_line_segments(
+                f"/cables/{index + 1}", nowhere, BLACK, thickness=CABLE_WIDTH, thickness_units="screen"
+            )
+            for index in range(robot.m)
+        ]
+        ends = np.zeros((2 * robot.m, 3), np.float32)
+        self._ends = scene.add_point_cloud(
+            "/ends", ends, BLACK, point_size=0.008 * size, point_shape="circle", precision="float32"
+        )
+        self._platform = scene.add_frame("/platform", show_axes=False)
+        self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
+        com = np.array([robot.platform.com], np.float32)
+        scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=0.012 * size, point_shape="circle")
+        self._carriers: list[viser.FrameHandle | None] = []
+        for index, carrier in enumerate(robot.carriers):
+            if carrier.kind == "ground":
+                self._carriers.append(None)
+                continue
+            name = f"/carriers/{carrier.name}"
+            turns = carrier.kind != "mobile"
+            self._carriers.append(
+                scene.add_frame(
+                    name, turns, axes_length=0.05 * size, axes_radius=0.003 * size, origin_radius=0.008 * size
+                )
+            )
+            self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)
+            scene.add_label(f"{name}/name", carrier.name, anchor="bottom-center", font_screen_scale=0.8)
+        self._numbers = [
+            scene.add_label(f"/tensions/{index + 1}", "", anchor="center-center", font_screen_scale=0.8)
+            for index in range(robot.m)
+        ]
+        self._arrow = scene.add_line_segments(
+            "/missing",
+            np.zeros((1 + BARBS, 2, 3), np.float32),
+            rgb(style.colour(1)),
+            thickness=1.5 * CABLE_WIDTH,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._short = scene.add_label("/shortfall", "", anchor="bottom-center", visible=False)
+        above = np.array([*self._centre[:2], self._room.high[2] + 0.12 * size])
+        self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
+
+    def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
+        """The hull of corners (k, 3) [m] in the frame above `name`, if they have one."""
+        triangles = [[face[0], *pair] for face in _hull(corners) for pair in pairwise(face[1:])]
+        if triangles:
+            self._scene.add_mesh_simple(
+                name,
+                corners.astype(np.float32),
+                np.array(triangles, np.uint32),
+                color=colour,
+                opacity=0.7,
+                material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
+                flat_shading=True,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+
+
+def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """An arrow as line segments (1 + BARBS, 2, 3): its shaft, and a head of lines around it."""
+    along = tip - start
+    _, _, axes = np.linalg.svd(along[None])
+    angles = np.linspace(0.0, 2 * np.pi, BARBS, endpoint=False)[:, None]
+    around = np.cos(angles) * axes[1] + np.sin(angles) * axes[2]
+    ends = tip - HEAD * along + HEAD / 3 * np.linalg.norm(along) * around
+    return np.concatenate([[[start, tip]], np.stack([np.tile(tip, (BARBS, 1)), ends], axis=1)])
+
+
+def _hull(corners: np.ndarray) -> list[np.ndarray]:
+    return faces(corners) if len(corners) > 2 else []
+
+
+def _place(handle: viser.FrameHandle, pose: np.ndarray) -> None:
+    """Move a frame to a pose (6,) in {G}."""
+    handle.position = pose[:3]
+    handle.wxyz = Rotation.from_euler("ZYX", pose[:2:-1]).as_quat(scalar_first=True)
+
+
+def _write(label: viser.LabelHandle, text: str) -> None:
+    if label.text != text:
+        label.text = text

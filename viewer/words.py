@@ -1,0 +1,130 @@
+"""What is told beside the picture: readouts of an instant and the legend, as HTML, and a caption as plain text.
+
+Names come from files: whatever is not a number passes `html.escape`.
+"""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from ..figures import style
+from ..models import Robot
+from ..models.robot import COORDINATES
+from .colours import NO_TENSION, place, shades
+from .instant import Instant, arrow
+from .subject import Subject
+
+MUTED = "#595959"
+STOPS = 9  # of the legend's gradient
+COLUMNS = (("cable", "left", 0), ("tension", "right", 10), ("", "left", 0), ("limits [N]", "left", 10))
+BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums"
+
+
+def readout(instant: Instant, robot: Robot) -> str:
+    """Status, margins, the proof if there are no tensions, and a row for each cable."""
+    feasible = instant.certificate is None and np.isfinite(instant.tensions).all()
+    colour = style.colour(0) if feasible else style.colour(1)
+    facts = [f'<b style="color:{colour}">{escape(instant.status)}</b>']
+    if instant.time is not None:
+        facts.append(f"t = {instant.time:.2f} s")
+    facts += _margins(instant)
+    lines = [f"<div>{fact}</div>" for fact in facts]
+    if instant.certificate is not None:
+        words = escape(instant.certificate.in_words()).replace("\n", "<br>")
+        lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
+        if arrow(instant, 1.0) is None:
+            lines.append(f'<div style="color:{MUTED}">There is hardly any force in it, so it has no arrow.</div>')
+    pose = ", ".join(f"{value:.3f}" for value in instant.pose + 0.0)
+    lines.append(f'<div style="color:{MUTED}">({", ".join(COORDINATES)}) = ({pose}) m, rad</div>')
+    return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{_table(instant, robot)}</div>'
+
+
+def _margins(instant: Instant) -> list[str]:
+    """How far the tensions are from their limits and the wrench from the boundary."""
+    told = []
+    if np.isfinite(instant.margin):
+        told.append(f"smallest margin {instant.margin:.4g} N, of cable {instant.nearest + 1}")
+    if np.isfinite(instant.reserve):
+        told.append(f"capacity margin {instant.reserve:.4g} N")
+    return told
+
+
+def _table(instant: Instant, robot: Robot) -> str:
+    """For each cable its colour, its tension, and where that is between its limits."""
+    places = place(instant.tensions, robot.t_min, robot.t_max)
+    rows = []
+    for index, (tension, at, shade) in enumerate(zip(instant.tensions, places, shades(places), strict=True)):
+        there = bool(np.isfinite(tension))
+        hue = f"rgb({', '.join(str(part) for part in shade)})"
+        bar = (
+            f'<div style="width:64px;height:8px;background:#e8e8e8">'
+            f'<div style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}"></div></div>'
+        )
+        told = f"{tension:.2f} N" if there else "none"
+        limits = f"{robot.t_min[index]:g} to {robot.t_max[index]:g}"
+        rows.append(
+            f'<tr><td>{index + 1}</td><td style="text-align:right;padding:0 10px" '
+            f'class="towline-tension">{told}</td><td>{bar}</td>'
+            f'<td style="color:{MUTED};padding-left:10px">{limits}</td></tr>'
+        )
+    heads = "".join(
+        f'<th style="font-weight:600;text-align:{side};padding:0 {pad}px">{name}</th>' for name, side, pad in COLUMNS
+    )
+    return f'<table style="border-collapse:collapse;margin-top:6px"><tr>{heads}</tr>{"".join(rows)}</table>'
+
+
+def caption(instant: Instant) -> str:
+    """Time, status, margin or shortfall in two or three short lines of plain text, for the picture itself."""
+    lines = [instant.status if instant.time is None else f"t = {instant.time:.2f} s, {instant.status}"]
+    if np.isfinite(instant.margin):
+        lines.append(f"smallest margin {newtons(instant.margin)}, of cable {instant.nearest + 1}")
+    if instant.certificate is not None:
+        lines.append(shortfall(instant))
+    return "\n".join(lines)
+
+
+def shortfall(instant: Instant) -> str:
+    """What stands at the certificate's arrow; empty if there is none."""
+    return "" if instant.certificate is None else f"short by {newtons(instant.certificate.shortfall)}"
+
+
+def legend(subject: Subject, cell: float) -> str:
+    """What colours and marks mean, as HTML; `cell` is the edge of the grid's cells [m]."""
+    robot = subject.robot
+    stops = ", ".join(f"rgb({r},{g},{b})" for r, g, b in shades(np.linspace(0.0, 1.0, STOPS)))
+    bar = f'<div style="height:10px;background:linear-gradient(to right, {stops})"></div>'
+    ends = (
+        f'<div style="display:flex;justify-content:space-between"><span>{_limit("t_min", robot.t_min)}</span>'
+        f"<span>{_limit('t_max', robot.t_max)}</span></div>"
+    )
+    marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
+    marks += [("path of the platform", style.colour(0))] if subject.replay else []
+    marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
+    marks += [("reach of a carrier", style.colour(3))] if any(c.kind == "mobile" for c in robot.carriers) else []
+    marks += [("direction of the wrench that is missing (its force)", style.colour(1))]
+    marks += subject.cloud.legend if subject.cloud else []
+    rows = [f'<div><span style="color:{hue}">&#9632;</span> {escape(name)}</div>' for name, hue in marks]
+    told = f'<div style="color:{MUTED}">{escape(subject.cloud.told)}</div>' if subject.cloud else ""
+    return (
+        f'<div class="towline-legend" style="{BODY}">'
+        f"<div>cable tension between its limits, logarithmic</div>{bar}{ends}"
+        f'{"".join(rows)}{told}<div style="color:{MUTED}">cells of the grid: {cell:g} m</div></div>'
+    )
+
+
+def _limit(name: str, limits: np.ndarray) -> str:
+    """A limit, or from where to where if the cables' differ."""
+    low, high = float(limits.min()), float(limits.max())
+    return f"{name} = {newtons(low, 6)}" if low == high else f"{name} = {newtons(low, 6)} to {newtons(high, 6)}"
+
+
+def newtons(force: float, digits: int = 3) -> str:
+    """A force in N, or in kN where it has five figures and more."""
+    return f"{force:.{digits}g} N" if abs(force) < 1e4 else f"{force / 1e3:.{digits}g} kN"
+
+
+def refusal(message: str) -> str:
+    """Why there is nothing to show where the sliders are."""
+    return f'<div class="towline-readout" style="{BODY};color:{style.colour(1)}">{escape(message)}</div>'
