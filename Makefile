@@ -35,9 +35,10 @@ errata: .venv/core.stamp
 	  cp build/$$paper/$$paper-errata.md docs/errata/$$paper.md || exit 1; \
 	done
 
-# Runs every example where the README's pictures are; the plans that they save there are ignored by git.
+# Runs the demo, and every example where the README's pictures are; the plans saved there are ignored by git.
 pictures: .venv/core.stamp
-	mkdir -p docs/pictures
+	mkdir -p docs/pictures build
+	cd build && ../$(BIN)/towline demo && cp towline-demo/tensions.png ../docs/pictures/circle.png
 	cd docs/pictures && for example in ../../examples/*.py; do ../../$(BIN)/python $$example || exit 1; done
 
 clean:
