@@ -38,5 +38,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,cluster,dev,mesh,mujoco,timing]"
+	$(INSTALL) ".[bench,cluster,dev,mesh,mujoco,notebooks,timing]"
 	touch $@
