@@ -44,9 +44,7 @@ def test_a_notebook_runs_and_says_the_same(path, tmp_path):
     assert {out.output_type for out in shown} <= {"stream", "display_data", "execute_result"}
     assert any("image/png" in out.get("data", {}) for out in shown)
     place = {"metadata": {"path": str(tmp_path)}}
-    with (
-        TemporaryDirectory() as folder
-    ):  # sockets instead of ports; their paths have to be short
+    with TemporaryDirectory() as folder:  # sockets instead of ports; their paths have to be short
         sockets = Config({"KernelManager": {"transport": "ipc", "ip": str(Path(folder) / "kernel")}})
         NotebookClient(fresh, kernel_name="python3", config=sockets, timeout=MOST_SECONDS, resources=place).execute()
     words, numbers = verdicts(stored)
