@@ -12,7 +12,6 @@ demo: .venv/core.stamp
 test: lint types docs unit
 
 setup: .venv/dev.stamp
-	$(INSTALL) ".[viewer,cluster,mujoco,timing,mesh,bench,notebooks,docs,dev]"
 
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
@@ -51,5 +50,5 @@ clean:
 	touch $@
 
 .venv/dev.stamp: .venv/core.stamp
-	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,timing,viewer]"
+	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,notebooks,timing,viewer]"
 	touch $@

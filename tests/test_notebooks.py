@@ -1,0 +1,62 @@
+"""Each notebook runs from top to bottom, is stored with its outputs, and says today what it said when it was stored."""
+
+import re
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+from traitlets.config import Config
+
+NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
+MOST_BYTES, MOST_SECONDS = 600_000, 60
+VERDICT = re.compile(r"\b(FEASIBLE|INFEASIBLE|NOT-FOUND|optimal|infeasible|accepted)\b")
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+def code(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def verdicts(notebook):
+    """Printed lines that hold a verdict: their words, and their numbers. No such line has a timing."""
+    text = "".join(out.text for cell in code(notebook) for out in cell.outputs if out.output_type == "stream")
+    lines = [line for line in text.splitlines() if VERDICT.search(line)]
+    return [NUMBER.sub("#", " ".join(line.split())) for line in lines], [
+        float(number) for line in lines for number in NUMBER.findall(line)
+    ]
+
+
+def test_they_are_all_there():
+    names = ["quickstart", "flying_cdpr", "ctmrts", "tension_distribution", "trajectory_planning", "qp_benchmark"]
+    wanted = [f"{index:02d}_{name}" for index, name in enumerate([*names, "multi_quadrotor"], start=1)]
+    assert [path.stem for path in NOTEBOOKS] == wanted
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_and_says_the_same(path, tmp_path):
+    assert path.stat().st_size < MOST_BYTES
+    stored, fresh = (nbformat.read(path, as_version=4) for _ in range(2))
+    assert 8 <= len(stored.cells) <= 17
+    assert [cell.execution_count for cell in code(stored)] == list(range(1, len(code(stored)) + 1))
+    shown = [out for cell in code(stored) for out in cell.outputs]
+    assert {out.output_type for out in shown} <= {"stream", "display_data", "execute_result"}
+    assert any("image/png" in out.get("data", {}) for out in shown)
+    place = {"metadata": {"path": str(tmp_path)}}
+    with TemporaryDirectory() as folder:  # sockets instead of ports; their paths have to be short
+        sockets = Config({"KernelManager": {"transport": "ipc", "ip": str(Path(folder) / "kernel")}})
+        NotebookClient(fresh, kernel_name="python3", config=sockets, timeout=MOST_SECONDS, resources=place).execute()
+    words, numbers = verdicts(stored)
+    assert words
+    assert verdicts(fresh)[0] == words
+    assert verdicts(fresh)[1] == pytest.approx(numbers, rel=0.01, abs=0.02)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_uses_the_public_interface(path):
+    """Of towline only rooms, and modules that the README names; nothing of this machine in what is stored."""
+    allowed = {"towline.models", "towline.models.statics", "towline.ocp", "towline.solvers", "towline.workspace"}
+    text = path.read_text()
+    assert set(re.findall(r"from (towline[\w.]*) import", text)) <= allowed
+    assert not re.search(r"/home/|/tmp/|site-packages|Traceback", text)
