@@ -151,7 +151,9 @@ class Task(Part):
     )
     objective: Objective = Objective()
     time_limit: Positive = Field(
-        default=600.0, description="of all runs of the solver together [s]; then the best motion so far is taken"
+        default=600.0,
+        description="of all runs of the solver together [s]; then the best motion so far is taken. fatrop cannot be "
+        "stopped in a run, only between its runs",
     )
     output_rate: Positive = Field(
         default=100.0, description="samples of the saved trajectory, each of them audited [1/s]"
