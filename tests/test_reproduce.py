@@ -106,6 +106,8 @@ def test_an_account_is_written_from_the_same_claims(tmp_path):
     assert "(figures/plot.png)" in report
     assert "good" not in errata
     assert "| bad | Eq. 2 | a \\| b <script> | – | c d |" in errata
+    assert "text recognised from its pages" in errata
+    assert "text recognised from its pages" in page
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
     assert page.count("data:image/svg+xml;base64,") == 1

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from .account import Account
 
 FIGURES = "figures"  # the folder beside the report
+READ = (
+    "The paper was read as text recognised from its pages: a single symbol that is wrong may be that reading's, not "
+    "the authors'."
+)
 
 
 def report(account: Account) -> str:
@@ -45,8 +49,7 @@ def errata(account: Account) -> str:
     lines = [
         f"# Errata of {account.paper.source}",
         "",
-        "Computed, not argued: each line is a claim of the report. The paper was read as text recognised from its "
-        "pages: a single symbol that is wrong may be that reading's, not the authors'.",
+        f"Computed, not argued: each line is a claim of the report. {READ}",
     ]
     titles = {
         Verdict.DIFFERS: "What is printed and what holds",
