@@ -4,9 +4,11 @@ import ast
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -234,6 +236,19 @@ def test_what_cannot_be_shown_is_one_line(folder):
         ("no.such.host.", 0, "--host"),
     ):
         with pytest.raises(InputError, match=words), serve(read("planar-4"), host, port):
+            pass
+
+
+def test_an_address_of_ipv6_is_one_that_a_browser_takes():
+    try:
+        with socket.socket(socket.AF_INET6) as trial:
+            trial.bind(("::1", 0))
+    except OSError:
+        pytest.skip("this machine has no IPv6")
+    with serve(read("planar-4"), "::1", 0) as url:
+        told = urlsplit(url)
+        assert told.hostname == "::1"
+        with socket.create_connection((told.hostname, told.port), timeout=10):
             pass
 
 
