@@ -17,6 +17,7 @@ from . import bench, demo, export, import_, plan, reproduce, robots, tension, ti
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
     no_args_is_help=True,
+    rich_markup_mode="markdown",  # Rich's own markup takes units, [m], for its tags
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

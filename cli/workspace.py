@@ -79,6 +79,8 @@ def workspace(
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh: {mesh} of a region whose attitude or carriers vary; accepted: positions that vary")
     taken = {kept.resolve(): "the checkpoint" for kept in (checkpoint, resume) if kept is not None}
+    if target.suffix == ".zarr" and target.exists():
+        raise InputError(f"--out: {target} is there already; accepted: a new .zarr folder, or a NetCDF file")
     for what, file in (("--out", target), ("--figure", figure), ("--mesh", mesh)):
         place = None if file is None else check_writable(file)
         if place in taken:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import film, style
-from .plan import equal_scales, few_ticks
+from .plan import equal_scales, name_axes
 from .robot import box_edges
 
 if TYPE_CHECKING:
@@ -183,9 +183,7 @@ class _Stage:
         if edges:
             reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
             named.append(ax.add_collection3d(reach))
-        for axis in "xyz":
-            getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7)
-            getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+        name_axes(ax)
         corners = [corner for box in scene.boxes for corner in box]
         seen = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
         equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in seen]))

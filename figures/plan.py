@@ -35,9 +35,7 @@ def path(trajectory: xr.Dataset) -> Figure:
         for row in np.linspace(0, len(position) - 1, 9).astype(int):
             ax.plot(*np.stack([position[row], carriers[row, index]]).T, color="#bbbbbb", linewidth=0.6)
     ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
-    for axis in "xyz":
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
-        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    name_axes(ax)
     moving = trajectory["carrier_kind"].values != "ground"
     equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
     ax.legend(fontsize="small", loc="upper left")
@@ -125,6 +123,14 @@ def equal_scales(ax: Any, points: np.ndarray) -> None:
     for axis, centre in zip("xyz", (low + high) / 2, strict=True):
         getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
     ax.set_box_aspect((1, 1, 1))
+
+
+def name_axes(ax: Any) -> None:
+    """Coordinates with their unit on axes in space, and few ticks."""
+    for axis in "xyz":
+        # Numbers run across the label of z: it stands off. Below, the others' labels would leave the figure.
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7 if axis == "z" else 4)
+        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
 
 
 def few_ticks() -> MaxNLocator:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import style
-from .plan import equal_scales, few_ticks
+from .plan import equal_scales, name_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,9 +69,7 @@ def draw(sketch: RobotSketch) -> Figure:
             ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
     for position, name in zip(sketch.carriers, sketch.names, strict=True):
         ax.text(*position, name, fontsize=7)
-    for axis in "xyz":
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
-        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    name_axes(ax)
     equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
     ax.set_title(sketch.title, fontsize=9)
     ax.legend(fontsize="x-small", loc="upper left")

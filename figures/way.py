@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import style
-from .plan import equal_scales, few_ticks
+from .plan import equal_scales, name_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,9 +24,7 @@ def way(ways: Mapping[str, np.ndarray]) -> Figure:
         look = {"color": style.colour(index), "linestyle": style.line_style(index)}
         ax.plot(*points.T, **look, label=name)
         ax.plot(*points[0], "o", color=style.colour(index), markersize=4)
-    for axis in "xyz":
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
-        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    name_axes(ax)
     equal_scales(ax, np.concatenate(list(ways.values())))
     ax.legend(fontsize="small", loc="upper left")
     return canvas

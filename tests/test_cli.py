@@ -308,6 +308,9 @@ def test_version_and_help():
     assert run("--version").stdout.strip() == "towline 0.1.0"
     for command in ("demo", "robots", "tension", "plan", "export"):
         assert run(command, "--help").returncode == 0
+    # Units are in brackets, which a mark-up may take for its own.
+    for command, unit in (("workspace", "[rad]"), ("tension", "[m/s]"), ("time", "[m/s^2]")):
+        assert unit in run(command, "--help").stdout
 
 
 def test_shells_complete_commands_and_robots(monkeypatch):

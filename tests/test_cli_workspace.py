@@ -78,6 +78,11 @@ def test_the_boundary_and_a_zarr_folder(folder):
     a, b, c = np.moveaxis(corners.copy().view("<f4").reshape(-1, 3, 3).astype(float), 1, 0)
     assert np.einsum("ni,ni->", a, np.cross(b, c)) / 6 == pytest.approx(3 * 1.9, rel=0.03)
     assert xr.open_zarr(folder / "w.zarr").sizes["point"] == json.loads(done.stdout)["accepted"]
+    again = run("mass.yaml", "--out", "w.zarr", cwd=folder)
+    assert (again.returncode, again.stderr) == (
+        2,
+        "towline: --out: w.zarr is there already; accepted: a new .zarr folder, or a NetCDF file\n",
+    )
 
 
 def test_nowhere_is_exit_code_1(folder):

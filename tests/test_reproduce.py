@@ -105,7 +105,9 @@ def test_an_account_is_written_from_the_same_claims(tmp_path):
     assert "a \\| b" in report
     assert "(figures/plot.png)" in report
     assert "good" not in errata
-    assert "| bad |" in errata
+    assert "| bad | Eq. 2 | a \\| b <script> | – | c d |" in errata
+    assert "text recognised from its pages" in errata
+    assert "text recognised from its pages" in page
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
     assert page.count("data:image/svg+xml;base64,") == 1
@@ -154,6 +156,13 @@ def test_known_errata_are_found(claims):
     for wanted, names in expected.items():
         for name in names.split():
             assert claims[name].verdict is wanted, name
+
+
+def test_what_the_pulley_feels_is_beside_what_eq_16_lets_it_feel(claims):
+    """Printed is what the rule gives, nothing; computed the whole cable's spring, E A / l times the stretch."""
+    stretch, length = 1e-5, np.linalg.norm(load("wang-flying").anchors[0] - load("wang-flying").home_attachments[0])
+    assert claims["eq-16"].printed == 0
+    assert claims["eq-16"].computed == pytest.approx(13000 / length * stretch, rel=1e-6)
 
 
 def test_table_1_is_read_back_and_a_misprint_is_seen(monkeypatch):

@@ -88,6 +88,14 @@ def test_a_verdict_follows_what_is_printed(monkeypatch):
     assert (rest.verdict, towing_ranges._least_height().verdict) == (Verdict.DIFFERS, Verdict.REPRODUCED)
 
 
+@pytest.mark.parametrize(
+    ("computed", "told"),
+    [((0, 3), "wider"), ((1.2, 1.8), "narrower"), ((0, 1.8), "lower"), ((1.2, 3), "higher")],
+)
+def test_how_a_range_lies_beside_the_printed_one(computed, told):
+    assert towing_ranges._beside(np.array(computed), (1.0, 2.0)).startswith(f"{told} than printed")
+
+
 def test_shapes_of_sections():
     """A triangle fills half of the smallest rectangle about it, turned or not; a rectangle all of it."""
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])

@@ -4,9 +4,11 @@ import ast
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -202,11 +204,15 @@ def test_what_cannot_be_shown_is_one_line(folder):
     saved[["status"] if "status" in saved else ["t_min"]].to_netcdf(folder / "other.nc", engine="h5netcdf")
     hostile = xr.load_dataset(folder / "none.nc")
     hostile.attrs["robot"] = "mine"
+    (folder / "folder.nc").mkdir()
+    other = load("wang-flying").model_dump(mode="json") | {"name": "mine"}
+    (folder / "mine.yaml").write_text(json.dumps(other))
     hostile.to_netcdf(folder / "mine.nc", engine="h5netcdf")
     wanted = {
         "text.nc": "cannot be read",
         "cut.nc": "cannot be read",
         "gone.nc": "is not there",
+        "folder.nc": "is a folder",
         "half.nc": "has no 'tensions'",
         "few.nc": "tensions: has the shape",
         "other.nc": "neither a plan nor a workspace",
@@ -216,7 +222,9 @@ def test_what_cannot_be_shown_is_one_line(folder):
         with pytest.raises(InputError, match=words) as error:
             read(str(folder / name))
         assert "\n" not in str(error.value)
-    assert read(str(folder / "mine.nc"), robot="wang-flying").kind == "workspace"
+    assert read(str(folder / "mine.nc"), robot=str(folder / "mine.yaml")).kind == "workspace"
+    with pytest.raises(InputError, match="'cogiro'; accepted: the file of 'mine'"):
+        read(str(folder / "mine.nc"), robot="cogiro")
     for target in ("wang-flying", str(folder / "line.nc")):
         with pytest.raises(InputError, match="--robot"):
             read(target, robot="cogiro")
@@ -228,6 +236,19 @@ def test_what_cannot_be_shown_is_one_line(folder):
         ("no.such.host.", 0, "--host"),
     ):
         with pytest.raises(InputError, match=words), serve(read("planar-4"), host, port):
+            pass
+
+
+def test_an_address_of_ipv6_is_one_that_a_browser_takes():
+    try:
+        with socket.socket(socket.AF_INET6) as trial:
+            trial.bind(("::1", 0))
+    except OSError:
+        pytest.skip("this machine has no IPv6")
+    with serve(read("planar-4"), "::1", 0) as url:
+        told = urlsplit(url)
+        assert told.hostname == "::1"
+        with socket.create_connection((told.hostname, told.port), timeout=10):
             pass
 
 

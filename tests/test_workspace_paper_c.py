@@ -71,9 +71,16 @@ def test_fixed_lengths_do_not_lie_inside_variable_ones():
 
 
 def test_the_printed_least_height_of_fixed_lengths_is_not_the_least():
-    """With the robot-ends in the middle of their boxes, whatever the boxes: 1.2 m hold the load below 0.6 m."""
-    rest = equilibria(robot("wang-ctmrts", "fixed-length"), np.full(3, 1.2))[0]
-    assert rest.pose[2] < study.PRINTED["fixed-length"][2][0] - 0.02
+    """With the robot-ends at the printed x, y and least z, whatever the boxes: 1.2 m hold the load far below 0.6 m."""
+    system = robot("wang-ctmrts", "fixed-length")
+    lowest = system.carrier_home.copy()
+    lowest[:, 2] = 1.0
+    rest = equilibria(system, np.full(3, 1.2), lowest)[0]
+    # A level load: three cables of 1.2 m to points at one height, from attachments 0.058 m inward.
+    ends = lowest[:, :2] - system.attachments[:, :2]
+    middle = np.linalg.solve(2 * (ends[1:] - ends[0]), (ends[1:] ** 2).sum(axis=1) - (ends[0] ** 2).sum())
+    level = 1.0 - np.sqrt(1.2**2 - ((ends[0] - middle) ** 2).sum())
+    assert rest.pose[2] < level + 1e-9 < study.PRINTED["fixed-length"][2][0] - 0.05
 
 
 def test_ranges_are_beside_the_printed_ones(found):
@@ -127,14 +134,3 @@ def test_postures_in_balance_agree_with_the_prism(found):
         A = Dynamics(system.robot).wrench_matrix(pose[solved], places.carriers[solved])
         left = np.einsum("nij,nj->ni", A, tensions[solved]) - [0, 0, system.robot.weight, 0, 0, 0]
         assert np.abs(left).max() < 1e-6 * system.robot.weight
-
-
-def test_the_figures_are_drawn(found, tmp_path):
-    files = study.draw(found, tmp_path)
-    assert [file.name for file in files] == [
-        "figure-3-fixed-length.png",
-        "figure-5-variable-length.png",
-        "figure-6-both.png",
-        "figure-4-sections.png",
-    ]
-    assert all(file.stat().st_size > 10_000 for file in files)

@@ -56,7 +56,8 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
         stage = Stage(server, subject, geometry, captioned=False)
         panel = Panel(server, subject, geometry, stage)
         try:
-            yield f"http://{host}:{server.get_port()}"
+            # An address of IPv6 has colons of its own.
+            yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
         finally:
             panel.close()
     finally:

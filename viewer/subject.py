@@ -59,7 +59,7 @@ def read(target: str, robot: str | None = None) -> Subject:
     Raises
     ------
     InputError
-        If it is none of these, or does not fit its robot: one line.
+        If it is none of these, or is of another robot: one line.
     """
     path = Path(target)
     if path.suffix == ".zarr" or _is_netcdf(path):
@@ -82,13 +82,17 @@ def _of_dataset(found: xr.Dataset, where: str, robot: str | None) -> Subject:
         raise InputError(f"{where}: is neither a plan nor a workspace; accepted: {ACCEPTED}")
     from .cloud import cloud
 
-    name = found.attrs.get("robot")
+    name = str(found.attrs.get("robot"))
     try:
-        loaded = load(robot if robot is not None else str(name))
+        loaded = load(robot if robot is not None else name)
     except InputError:
         if robot is not None:
             raise
         raise InputError(f"{where}: is of robot {name!r}, not of the library; accepted: --robot FILE with it") from None
+    if loaded.name != name:
+        raise InputError(
+            f"--robot: {robot!r} is {loaded.name!r}; accepted: the file of {name!r}, whose workspace this is"
+        )
     return Subject(f"{loaded.name}, workspace", loaded, cloud=cloud(found, where))
 
 
@@ -107,6 +111,8 @@ def _open(path: Path) -> xr.Dataset:
 
     if not path.exists():
         raise InputError(f"{path}: is not there; accepted: {ACCEPTED}")
+    if path.is_dir() and path.suffix != ".zarr":
+        raise InputError(f"{path}: is a folder; accepted: {ACCEPTED}")
     try:
         if path.suffix == ".zarr":
             return xr.open_zarr(path).load()
@@ -114,5 +120,6 @@ def _open(path: Path) -> xr.Dataset:
     except ImportError:
         raise InputError(f"{path}: zarr is not installed; accepted: pip install 'towline[cluster]'") from None
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        reason = getattr(error, "strerror", None) or str(error).splitlines()[0] if str(error) else "empty"
+        # HDF5 puts its own account of the matter, of several lines, where others have a few words.
+        reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
         raise InputError(f"{path}: cannot be read ({reason}); accepted: {ACCEPTED}") from None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from ...figures import page as html
 from ...figures import style
 from .claim import Claim, told
+from .text import READ
 
 if TYPE_CHECKING:
     from .account import Account, Chapter
@@ -34,7 +35,7 @@ def _overview(account: Account) -> str:
 
 def _errata(account: Account) -> str:
     rows = [(claim.id, claim.place, claim.verdict.value, claim.why) for claim in account.errata]
-    return html.columns("Errata", ("claim", "where", "verdict", "why"), rows)
+    return html.columns("Errata", ("claim", "where", "verdict", "why"), rows) + html.paragraph(READ)
 
 
 def _chapter(chapter: Chapter) -> list[str]:

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from .account import Account
 
 FIGURES = "figures"  # the folder beside the report
+READ = (
+    "The paper was read as text recognised from its pages: a single symbol that is wrong may be that reading's, not "
+    "the authors'."
+)
 
 
 def report(account: Account) -> str:
@@ -42,7 +46,11 @@ def report(account: Account) -> str:
 
 def errata(account: Account) -> str:
     """The claims that were not reproduced, by verdict, with why."""
-    lines = [f"# Errata of {account.paper.source}", "", "Computed, not argued: each line is a claim of the report."]
+    lines = [
+        f"# Errata of {account.paper.source}",
+        "",
+        f"Computed, not argued: each line is a claim of the report. {READ}",
+    ]
     titles = {
         Verdict.DIFFERS: "What is printed and what holds",
         Verdict.IMPOSSIBLE: "What cannot be",
@@ -51,13 +59,18 @@ def errata(account: Account) -> str:
     for verdict, title in titles.items():
         rows = [_row(claim) for claim in account.errata if claim.verdict is verdict]
         if rows:
-            lines += ["", f"## {title}", "", *_table(("claim", "where", "printed", "computed", "why"), rows)]
+            lines += [
+                "",
+                f"## {title}",
+                "",
+                *_table(("claim", "where", "the paper says", "printed", "computed", "why"), rows),
+            ]
     return "\n".join([*lines, ""])
 
 
 def _row(claim: Claim) -> tuple[str, ...]:
-    printed = claim.says if claim.printed is None else told(claim.printed, claim.unit)
-    return claim.id, claim.place, printed, told(claim.computed, claim.unit), claim.why
+    printed, computed = told(claim.printed, claim.unit), told(claim.computed, claim.unit)
+    return claim.id, claim.place, claim.says, printed, computed, claim.why
 
 
 def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:

@@ -150,12 +150,12 @@ def _switch(robot: Robot) -> Claim:
         "eq-16",
         "Eq. 16",
         "sgn(j) = 1 if both nodes of element j move away from the pulley: what a stretched cable does to the pulley.",
-        float(true[-1]),
         float(abs(forces[0])),
+        float(abs(true[0])),
         within=1e-9,
-        agrees="Both ends of the stretched cable feel the same.",
-        differs="Node 0 is held at the pulley, so element 1 never pulls by this rule and the pulley feels "
-        "nothing; an element pulls while it, with the tension that it had, is longer than at rest.",
+        agrees="The pulley feels what the stretched cable carries.",
+        differs="Node 0 is held at the pulley, so element 1 never pulls by this rule and the pulley feels nothing, the "
+        "printed value; an element pulls while it, with the tension that it had, is longer than at rest.",
         unit="N",
     )
 

@@ -16,7 +16,8 @@ ROWS = 6  # of J, whose inverse step 7 of section V takes
 
 def chapter() -> Chapter:
     """The rank of J by the printed pairing, and by the crossed one that the other chapters use."""
-    printed, crossed = diagnose(load("wang-flying-printed")), diagnose(load("wang-flying"))
+    robot = load("wang-flying")
+    printed, crossed = diagnose(load("wang-flying-printed")), diagnose(robot)
     values = ", ".join(f"{value:.3g}" for value in crossed.singular_values)
     claim = stated(
         "pairing",
@@ -28,8 +29,8 @@ def chapter() -> Chapter:
         otherwise=Verdict.IMPOSSIBLE,
         agrees="J has full rank at level poses.",
         differs=f"The rank at every level pose tried is the computed one, because {printed.reason}. Crossed pairs of "
-        f"the same points (A1-B2, A2-B1, ...) have rank {crossed.rank}, singular values {values}: all else is computed "
-        "with these.",
+        f"the same points (A1-B2, A2-B1, ...) have rank {crossed.rank}, singular values {values} (moments over "
+        f"{robot.length:.3g} m): all else is computed with these.",
         figure="pairing",
     )
     pairs = {

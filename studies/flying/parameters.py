@@ -138,7 +138,7 @@ def _height(robot: Robot) -> Claim:
     return compared(
         "eq-2-height",
         "Eq. 2, VI.A, VI.B",
-        "a_i has z = +H_1 and the circle's centre z = +1 in {A}, whose z axis points up.",
+        "a_i has z = +H_1 and the circle's centre z = +1 in {A}, which at zero angles is turned as {G}, with z up.",
         (PRINTED["H_1"], CENTRE),
         (float(np.sign(centre)) * PRINTED["H_1"], centre),
         within=1e-9,

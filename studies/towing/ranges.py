@@ -79,8 +79,8 @@ def _ranges(drive: str, found: Loops) -> list[Claim]:
                 tuple(computed.tolist()),
                 within=READ,
                 agrees=f"To {READ:g} m, what the boxes and 60 000 points leave open.",
-                differs="Robot-ends anywhere in boxes that section 5.3 needs give the computed range"
-                + (", wider than printed." if drive == "fixed-length" else "."),
+                differs="Loops with robot-ends anywhere in boxes that section 5.3 needs give the computed range, "
+                f"{_beside(computed, printed)}.",
                 unit="m",
                 figure=FIGURES[drive],
             )
@@ -88,9 +88,20 @@ def _ranges(drive: str, found: Loops) -> list[Claim]:
     return claims
 
 
+def _beside(computed: np.ndarray, printed: tuple[float, float]) -> str:
+    """How a range (2,) lies beside the printed one."""
+    below, above = computed[0] < printed[0], computed[1] > printed[1]
+    if below == above:
+        return "wider than printed" if below else "narrower than printed"
+    return "lower than printed at both ends" if below else "higher than printed at both ends"
+
+
 def _least_height() -> Claim:
-    """With the robot-ends at the centres that are printed, nothing is inferred."""
-    rest = equilibria(robot("wang-ctmrts", "fixed-length"), np.full(3, FIXED))[0].pose[2]
+    """With the robot-ends below the printed centres, at the least printed height, nothing is inferred."""
+    system = robot("wang-ctmrts", "fixed-length")
+    lowest, least = system.carrier_home.copy(), reach(system)[0][:, 2]
+    lowest[:, 2] = least
+    rest = equilibria(system, np.full(3, FIXED), lowest)[0].pose[2]
     printed = PRINTED["fixed-length"][2][0]
     return stated(
         "range-W1-least-height",
@@ -99,8 +110,9 @@ def _least_height() -> Claim:
         printed,
         float(rest),
         holds=bool(rest >= printed - 0.01),
-        agrees="At the printed centres it hangs no lower.",
-        differs="With the robot-ends at the printed centres it hangs at the computed height, whatever the boxes.",
+        agrees="With the robot-ends as low as is printed it hangs no lower.",
+        differs=f"With the robot-ends at the printed x and y and at z = {least.min():g} m, the least that is printed, "
+        "it hangs at the computed height, whatever the widths of the boxes.",
         unit="m",
     )
 

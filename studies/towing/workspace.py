@@ -15,20 +15,18 @@ positions found, and rises with the tries. From 96 to 1536 of them the volume of
 whose robot-ends have to be at 1.2 m too, by a quarter.
 
 The paper's own figures contradict each other in two ways, whatever the sizes of the boxes, which it does not print.
-It says that W1 lies inside W2, but W1 reaches up to 1.38 m by its ranges and W2 to 1.18 m. And with the robot-ends in
-the middle of their boxes, cables of 1.2 m hold the load at 0.54 m, while W1's least height is printed as 0.6 m.
+It says that W1 lies inside W2, but W1 reaches up to 1.38 m by its ranges and W2 to 1.18 m. And with the robot-ends at
+the printed x and y and at 1 m, their least height, cables of 1.2 m hold the load at 0.37 m, while W1's least height is
+printed as 0.6 m.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from ...figures import style
-from ...figures import workspace as figures
 from ...models import Robot
 from ...models.robot import Box, MobileCarrier
 from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
@@ -36,7 +34,7 @@ from ...workspace.hanging import hanging
 from ...workspace.volume import Volume, volume
 from .plans import DRIVES, Drive, robot
 
-__all__ = ["PRINTED", "Loops", "draw", "in_prism", "loops", "placed_as_both", "reach", "volume_of"]
+__all__ = ["PRINTED", "Loops", "in_prism", "loops", "placed_as_both", "reach", "volume_of"]
 
 LOOPS = 60_000
 POSTURE = 1.0  # [rad], the most of each angle
@@ -127,20 +125,6 @@ def in_prism(system: Robot, points: np.ndarray) -> np.ndarray:
     corners = np.vstack([ends[:, :2].T, np.ones(3)])
     shares = np.linalg.solve(corners, np.vstack([points[:, :2].T, np.ones(len(points))]))  # (3, n)
     return (shares >= 0).all(axis=0) & (points[:, 2] < shares.T @ ends[:, 2])
-
-
-def draw(found: dict[str, Loops], folder: Path) -> list[Path]:
-    """Save the projections of figures 3, 5 and 6 and the cross sections of figure 4 as PNG; `found` by drive."""
-    names = {"fixed-length": "figure-3", "variable-length": "figure-5", "both": "figure-6"}
-    files = []
-    for drive, system in found.items():
-        canvas = figures.projections({drive: system.points}, system.robot.home_anchors)
-        files.append(style.save(canvas, folder / f"{names[drive]}-{drive}.png"))
-    if "fixed-length" in found:
-        fixed = found["fixed-length"]
-        canvas = figures.cross_sections(fixed.points, SECTIONS, 0.02)
-        files.append(style.save(canvas, folder / "figure-4-sections.png"))
-    return files
 
 
 def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
