@@ -135,8 +135,9 @@ def _sections(fixed: Loops) -> list[Claim]:
                 ideal,
                 filled,
                 holds=nearer,
+                otherwise=Verdict.NOT_DETERMINED,
                 agrees=f"Nearer to {shape} than to the other.",
-                differs="Nearer to the other shape, with the boxes that were inferred.",
+                differs="The boxes are not printed; with those that section 5.3 needs it is nearer to the other shape.",
                 figure="figure-4",
             )
         )
