@@ -254,6 +254,16 @@ def test_a_search_that_goes_downhill_finds_more_than_points_alone():
     assert (found & truth).sum() > 0.97 * truth.sum()
     assert 0.1 < truth.mean() < 0.9
 
+    class Flat(ForceBalance):
+        """The same without a slope."""
+
+        def lacks(self, robot, places):
+            return np.where(self.holds(robot, places), 0.0, 1.0)
+
+    few = {type(one): ExistsPlacement(condition=one, tries=64).holds(robot, places) for one in (ForceBalance(), Flat())}
+    missed = {kind: (truth & ~held).sum() for kind, held in few.items()}
+    assert missed[ForceBalance] < 0.5 * missed[Flat]
+
 
 def held_by_corners(robot, position):
     corners = [
