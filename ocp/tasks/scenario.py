@@ -16,6 +16,7 @@ import numpy as np
 from ...errors import InputError
 from ...models import Dynamics, Robot
 from ...models.robot import MobileCarrier, QuadrotorCarrier, Vector3
+from .carrier_paths import by_index
 from .clearance import point_outside
 from .path import AnyPath, Motion, RestPath
 from .scheme import LINEAR, SCHEMES, Scheme
@@ -375,17 +376,7 @@ def _carrier_paths(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
         field_name, paths = "paths", base.paths
     else:
         field_name, paths = "around", base.around
-    names = [carrier.name for carrier in robot.carriers]
-    found = {}
-    for name, path in paths.items():
-        if name not in names:
-            raise InputError(f"{where}: base.{field_name}: carrier {name!r} is unknown; accepted: {', '.join(names)}")
-        if robot.carriers[names.index(name)].kind == "ground":
-            raise InputError(f"{where}: base.{field_name}: carrier {name!r} is of kind ground and never moves")
-        if path.frame != "world":
-            raise InputError(f"{where}: base.{field_name}.{name}.frame: {path.frame!r}; accepted: world")
-        found[names.index(name)] = path
-    return found
+    return by_index(robot, paths, f"{where}: base.{field_name}")
 
 
 def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:

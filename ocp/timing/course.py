@@ -23,6 +23,7 @@ from ...errors import InputError
 from ...models import Dynamics, Robot
 from ...models.batch import call
 from ...models.robot import COORDINATES, MobileCarrier
+from ..tasks.carrier_paths import by_index
 from ..tasks.path import CirclePath, Curve, Motion, RestPath
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
@@ -90,21 +91,13 @@ class Course:
         self.robot, self.path, self.wind, self._until = robot, path, wind, until
         self.dynamics = Dynamics(robot)
         self.relative = self._frame()
-        names = [carrier.name for carrier in robot.carriers]
-        for name, its in carriers.items():
-            if name not in names:
-                raise InputError(f"time_along: carriers: {name!r} is unknown; accepted: {', '.join(names)}")
-            if robot.carriers[names.index(name)].kind == "ground":
-                raise InputError(f"time_along: carriers: {name!r} is of kind ground and never moves")
-            if its.frame != "world":
-                raise InputError(f"time_along: carriers.{name}.frame: {its.frame!r}; accepted: world")
+        self.carriers = by_index(robot, carriers, "time_along: carriers")
         for carrier in robot.carriers:
             if carrier.kind == "quadrotor":
                 raise InputError(
                     f"time_along: robot {robot.name!r} hangs from {carrier.name!r} of kind quadrotor, whose thrust no "
                     "given path tells; accepted: carriers of kind ground, prescribed, mobile"
                 )
-        self.carriers = {names.index(name): its for name, its in carriers.items()}
         self._check_geometry()
 
     @property
