@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..distribution import wrench_problem
 from ..errors import TowlineError
 from ..models import Dynamics, Robot, load
 from ..ocp import Plan, PlanStatus, Task, plan
 from ..solvers import solve
-from ..workspace.pose import masked_problem
 
 ROBOTS = ("wang-flying", "wang-ctmrts-6", "ipanema-1", "cogiro", "planar-4", "wang-flying-quadrotor")
 MOST_NOT_FOUND = 0.05
@@ -93,7 +93,7 @@ def wrong(found: Plan) -> str:
         motions = [part[row] for part in (*audit.motion, *audit.carriers)]
         wind = audit.certificate_wind or found.scenario.wind
         w = found.scenario.dynamics.required_wrench(*motions, wind=wind)
-        problem = masked_problem(found.scenario.dynamics, A, w, *found.scenario.bounds())
+        problem = wrench_problem(found.scenario.robot, A, w, *found.scenario.bounds())
         return "" if certificate.verify(problem) else "wrong: infeasible, but its certificate proves nothing"
     return ""
 
@@ -166,7 +166,7 @@ def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray) -> bool:
     robot = dynamics.robot
     A, w = dynamics.wrench_matrix(pose), dynamics.required_wrench(pose, rest, rest)
     spare = 0.05 * (robot.t_max - robot.t_min)
-    return solve(masked_problem(dynamics, A, w, robot.t_min + 0.1, robot.t_max - spare)).feasible
+    return solve(wrench_problem(dynamics.robot, A, w, robot.t_min + 0.1, robot.t_max - spare)).feasible
 
 
 def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:

@@ -82,7 +82,7 @@ class Report:
     count: int
     repeats: int
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain lists and numbers, ready for JSON."""
         rows = [asdict(row) for row in self.rows]
         return {"rows": rows, "machine": self.machine, "count": self.count, "repeats": self.repeats}

@@ -49,7 +49,7 @@ def tension(
         report = benchmark.run(count, repeats, cables, limit, progress)
     written = [str(path) for path in benchmark.write(report, out)] if out is not None else []
     if as_json:
-        print_json({**report.as_dict(), "files": written})
+        print_json({**report.to_dict(), "files": written})
     else:
         typer.echo(benchmark.markdown(report), nl=False)
         for name in written:

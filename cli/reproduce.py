@@ -38,7 +38,7 @@ def reproduce(
         account = PAPERS[paper](progress)
     files = [str(path) for path in write(account, folder)]
     if as_json:
-        print_json({**account.as_dict(), "files": files})
+        print_json({**account.to_dict(), "files": files})
     else:
         _show(account)
         typer.echo("  Written")

@@ -29,14 +29,14 @@ def robots(
     elif name is None:
         _list([load(known) for known in available()], as_json)
     else:
+        from ..distribution import pose_problem
         from ..models import Dynamics
         from ..models.diagnosis import diagnose
         from ..solvers import solve
-        from ..workspace import pose_problem
 
         robot = load(name)
         at_home = solve(pose_problem(Dynamics(robot), robot.home))
-        found = _as_dict(robot, diagnose(robot), at_home)
+        found = _to_dict(robot, diagnose(robot), at_home)
         if figure is not None:
             _draw(robot, at_home, figure)
             found["figure"] = str(figure)
@@ -74,7 +74,7 @@ def _kinds(robot: Robot) -> dict[str, int]:
     return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
 
 
-def _as_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> dict[str, Any]:
+def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> dict[str, Any]:
     return {
         "name": robot.name,
         "source": robot.source.strip(),
@@ -93,7 +93,7 @@ def _as_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> di
         "rank_tilted": diagnosis.rank_tilted,
         "reason": diagnosis.reason,
         "warnings": diagnosis.warnings,
-        "at_home": at_home.as_dict(),
+        "at_home": at_home.to_dict(),
     }
 
 
@@ -122,7 +122,7 @@ def _rest(at_home: TensionSolution) -> list[str]:
         return [f"  at rest at home: tensions {_range(at_home.tensions.tolist())} N ({at_home.status.value})"]
     lines = [f"  cannot rest at home ({at_home.status.value})"]
     if at_home.certificate is not None:
-        lines += [f"    {line}" for line in at_home.certificate.in_words().splitlines()]
+        lines += [f"    {line}" for line in at_home.certificate.describe().splitlines()]
     return lines
 
 

@@ -39,8 +39,8 @@ def tension(
     answer = solve(problem, method=method, backend=backend)
     others = {name: solve(problem, method=name) for name in methods() if name != method}
     if as_json:
-        beside = {name: other.as_dict() for name, other in {method: answer, **others}.items()}
-        print_json({"robot": loaded.name, **at, **answer.as_dict(), "methods": beside})
+        beside = {name: other.to_dict() for name, other in {method: answer, **others}.items()}
+        print_json({"robot": loaded.name, **at, **answer.to_dict(), "methods": beside})
     else:
         _show(loaded, at, answer, {method: answer, **others})
     if not answer.feasible:
@@ -58,8 +58,8 @@ def _problem(
     """The problem at the stated pose and motion, and those as lists."""
     import numpy as np
 
+    from ..distribution import pose_problem
     from ..models import Dynamics
-    from ..workspace import pose_problem
 
     at = robot.home if pose is None else numbers("--pose", pose, 6)
     rate = np.zeros(6) if velocity is None else numbers("--velocity", velocity, 6)
@@ -95,6 +95,6 @@ def _show(robot: Robot, at: dict[str, Any], answer: TensionSolution, methods: di
     if answer.tensions is not None:
         typer.echo(f"residual {answer.residual:.2e} N")
     if answer.certificate is not None:
-        typer.echo(answer.certificate.in_words())
+        typer.echo(answer.certificate.describe())
     if answer.detail:
         typer.echo(answer.detail)

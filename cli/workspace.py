@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from ..models import Robot
     from ..workspace import Condition
-    from ..workspace.boundary import Mesh
-    from ..workspace.sample import Progress
+    from ..workspace.boundary_mesh import Mesh
+    from ..workspace.run import Progress
 
 
 def workspace(

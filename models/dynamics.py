@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,17 @@ from .batch import call
 from .cables.pulley import Exit
 from .relative_dynamics import Array, RelativeDynamics
 from .robot import QuadrotorCarrier, Robot
+
+
+def dynamics_of(robot: Robot) -> Dynamics:
+    """Return the `Dynamics` of a robot, kept for the next call."""
+    key: Any = robot  # frozen, so it has a hash, which a type checker does not see
+    return _dynamics_of(key)
+
+
+@lru_cache(maxsize=16)
+def _dynamics_of(robot: Any) -> Dynamics:
+    return Dynamics(robot)
 
 
 class Dynamics:

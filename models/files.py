@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from ..errors import InputError
+from ..inputs import shown
 from .parsing import read_yaml
 from .robot import Robot
 
@@ -45,6 +46,21 @@ def load(name: str | os.PathLike[str]) -> Robot:
     raise InputError(
         f"robot: {text!r} is unknown{hint}; accepted: {', '.join(available())}, or the path of a YAML file"
     )
+
+
+def as_robot(robot: object) -> Robot:
+    """Return a robot as it is, or load it by its name or path.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or `load` refuses it.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    if isinstance(robot, str | os.PathLike):
+        return load(robot)
+    raise InputError(f"robot: must be a Robot, a name of the library or the path of a robot file, got {shown(robot)}")
 
 
 def _exists(path: Path) -> bool:

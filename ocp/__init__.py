@@ -1,6 +1,6 @@
 """Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; timing."""
 
-from .plan import Planner, plan
+from .planner import Planner, plan
 from .result import Plan, PlanStatus
 from .tasks.task import Task, read_task
 from .timing.timing import Timing, TimingStatus, time_along

@@ -1,4 +1,4 @@
-"""The first rung: whether the platform can rest along the path, and how far inside the available wrench set it is.
+"""The first stage: whether the platform can rest along the path, and how far inside the available wrench set it is.
 
 The capacity margin at rest costs little beside a nonlinear program and tells a lot: where it is negative the motion has
 to be quick, or the carriers elsewhere; where it is negative at an end that a fixed motion rests at, no duration helps.
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..distribution import wrench_problem
 from ..solvers import capacity_margin
-from ..workspace.pose import masked_problem
 from .nlp.guess import initial_guess
 from .tasks.scenario import Scenario
 
@@ -41,7 +41,7 @@ class RestMargin:
         """Row of the smallest margin."""
         return int(self.margin.argmin())
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         """One line for a person."""
         least, at = self.margin[self.worst], self.times[self.worst]
         if least >= 0:
@@ -60,6 +60,6 @@ def rest_margin(scenario: Scenario) -> RestMargin:
     margins = np.full(PLACES, np.inf)
     for wind in scenario.winds_at(platform.pose[0], still[0]):  # at rest they are the same everywhere
         w = scenario.dynamics.required_wrench(platform.pose, still, still, wind=wind)
-        problems = (masked_problem(scenario.dynamics, *both, *scenario.bounds()) for both in zip(A, w, strict=True))
+        problems = (wrench_problem(scenario.robot, *both, *scenario.bounds()) for both in zip(A, w, strict=True))
         margins = np.minimum(margins, [capacity_margin(problem).value for problem in problems])
     return RestMargin(times, margins)

@@ -11,7 +11,7 @@ from .nlp.program import build
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
 from .reports.finding import PlanStatus
-from .reports.rung import Rung
+from .reports.stage import Stage
 from .result import Plan
 from .tasks.scenario import Deviation, Scenario
 
@@ -19,26 +19,26 @@ __all__ = ["Search"]
 
 
 class Verdict:
-    """What a rung will have said; set while it runs."""
+    """What a stage will have said; set while it runs."""
 
     told = ""
 
 
 class Search:
-    """Solves one scenario's programs, and keeps the time that it took and what each rung said."""
+    """Solves one scenario's programs, and keeps the time that it took and what each stage said."""
 
     def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
         self.scenario, self._solvers, self._progress = scenario, solvers, progress
         self.build_s, self.solve_s = 0.0, 0.0
-        self.rungs: list[Rung] = []
+        self.stages: list[Stage] = []
         self._iterates: list[tuple[int, float, float]] = []
 
     @contextmanager
-    def rung(self, name: str) -> Iterator[Verdict]:
-        """Record what happens inside as a rung of the ladder."""
+    def stage(self, name: str) -> Iterator[Verdict]:
+        """Record what happens inside as a stage of the ladder."""
         start, verdict = time.perf_counter(), Verdict()
         yield verdict
-        self.rungs.append(Rung(name, verdict.told, time.perf_counter() - start))
+        self.stages.append(Stage(name, verdict.told, time.perf_counter() - start))
 
     def _seen(self, iteration: int, objective: float, infeasibility: float) -> None:
         """Keep what an iteration came to, and tell whoever asked."""
@@ -60,7 +60,7 @@ class Search:
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh.
         """
-        with self.rung(f"{name} of {mesh.steps} steps") as verdict:
+        with self.stage(f"{name} of {mesh.steps} steps") as verdict:
             start = time.perf_counter()
             if mesh not in self._solvers:
                 self._solvers[mesh] = Solver(build(self.scenario, mesh))
@@ -89,13 +89,13 @@ class Search:
 
     def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
         """What the audit says of any motion."""
-        with self.rung(name) as verdict:
+        with self.stage(name) as verdict:
             seen = audit(scenario, deviation)
-            verdict.told = "passed" if seen.passed else in_words(seen)
+            verdict.told = "passed" if seen.passed else describe(seen)
         return seen
 
 
-def in_words(seen: Audit) -> str:
+def describe(seen: Audit) -> str:
     """What the audit objects to, in short."""
     told = []
     if seen.violation.max() > seen.tolerance:

@@ -58,11 +58,11 @@ def _of_plan(scenario: Scenario, start: Finding) -> Deviation | None:
 
 
 def _of_timing(scenario: Scenario, start: Timing) -> Deviation | None:
-    robot = start.course.robot
+    robot = start.parametrised.robot
     if robot.name != scenario.robot.name or robot.m != scenario.robot.m:
         raise InputError(f"start: is a timing of robot {robot.name!r}; accepted: one of {scenario.robot.name!r}")
     carriers: dict[int, AnyPath] = {
-        index: start.timed(path) for index, path in start.course.carriers.items() if _moves(path)
+        index: start.timed(path) for index, path in start.parametrised.carriers.items() if _moves(path)
     }
     return _along(scenario, start.path, carriers, start.path.times[-1])
 

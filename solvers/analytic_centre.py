@@ -4,11 +4,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..tolerances import RANK
 from .barrier_newton import barrier_point
 from .log_barrier import start_in_form
 from .method import Method, Proposal
 from .standard_form import StandardForm
-from .tolerances import RANK
 
 __all__ = ["AnalyticCentre"]
 

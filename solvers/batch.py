@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import processors
 from ..errors import InputError
+from ..inputs import number, shown, whole_number
 from . import compiled
-from .inputs import number, shown, whole_number
 from .problem import TensionProblem
 from .registry import solve
 from .solution import Status, TensionSolution

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .inputs import shown, whole_number
+from ..inputs import shown, whole_number
 from .problem import TensionProblem
 from .registry import solve
 from .sensitivity import derivatives

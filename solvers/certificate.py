@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs import required
+from ..inputs import required
+from ..tolerances import NEGLIGIBLE, RANK
 from .problem import TensionProblem
 from .projection import project
-from .tolerances import NEGLIGIBLE, RANK
 
 __all__ = ["Certificate", "certificate_along", "certify"]
 
@@ -92,7 +92,7 @@ class Certificate:
             and np.array_equal(at_min, self.at_min)
         )
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         """Tell direction, demand, support and the cables at their limits (from 1), in two lines."""
         limits = {"t_max": self.at_max, "t_min": self.at_min}
         told = [f"{name} in {_numbers(indices + 1, 0)}" for name, indices in limits.items() if indices.size]
@@ -106,7 +106,7 @@ class Certificate:
             f"short by {self.shortfall:.4g} N; {cables}"
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON."""
         return {
             "direction": self.direction.tolist(),

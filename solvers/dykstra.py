@@ -15,10 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs import whole_number
+from ..inputs import whole_number
+from ..tolerances import RANK
 from .method import Method, Proposal
 from .standard_form import StandardForm
-from .tolerances import RANK
 
 __all__ = ["Dykstra"]
 

@@ -4,10 +4,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..tolerances import FEASIBILITY, RANK, ROUNDING
 from .closed_form import middle, outside
 from .method import Method, Proposal
 from .standard_form import StandardForm
-from .tolerances import FEASIBILITY, RANK, ROUNDING
 
 __all__ = ["ImprovedClosedForm"]
 

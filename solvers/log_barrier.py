@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import InputError
+from ..inputs import number, shown
 from .barrier_newton import barrier_point
-from .inputs import number, shown
 from .method import Method, Proposal
 from .standard_form import StandardForm
 

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs import required
+from ..inputs import required
+from ..tolerances import NEGLIGIBLE, RANK
 from .problem import TensionProblem
 from .projection import project
-from .tolerances import NEGLIGIBLE, RANK
 
 __all__ = ["Margin", "capacity_margin"]
 

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs import number
 from .direct_daqp import bounded_least_norm
-from .inputs import number
 from .method import Method, Proposal
 from .standard_form import StandardForm
 

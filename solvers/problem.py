@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 __all__ = ["TensionProblem"]
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import RANK
 from .box_least_squares import box_least_squares
 from .problem import TensionProblem
-from .tolerances import RANK
 
 __all__ = ["project"]
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .inputs import required
+from ..inputs import required
 from .problem import TensionProblem
 
 __all__ = ["limit_rate"]

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..inputs import required, shown
+from ..tolerances import DOUBTFUL
 from .active_set import ActiveSet
 from .analytic_centre import AnalyticCentre
 from .boundary import boundary_candidates, nearest_available
@@ -16,7 +18,6 @@ from .closed_form import ClosedForm
 from .direct_daqp import Daqp
 from .dykstra import Dykstra
 from .improved_closed_form import ImprovedClosedForm
-from .inputs import required, shown
 from .linear_programs import LargestMargin, LeastSum, MinMax
 from .log_barrier import LogBarrier
 from .margin import capacity_margin
@@ -29,7 +30,6 @@ from .qp import QuadraticProgram
 from .soft_wrench import SoftWrench
 from .solution import Status, TensionSolution
 from .standard_form import StandardForm, standard_form
-from .tolerances import DOUBTFUL
 
 __all__ = ["methods", "solve"]
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .inputs import required
+from ..inputs import required
 from .problem import TensionProblem
 from .solution import TensionSolution
 

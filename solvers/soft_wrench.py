@@ -14,9 +14,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inputs import number
 from .box_least_squares import box_least_squares
 from .direct_daqp import bounded_least_norm
-from .inputs import number
 from .method import Method, Proposal
 from .standard_form import StandardForm
 

@@ -161,7 +161,7 @@ class TensionSolution:
             return float("nan")
         return float(self.problem.weights @ (self.tensions - self.problem.t_ref) ** 2)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain lists, numbers and strings, ready for JSON; what does not exist is None."""
         given = self.tensions is not None
         return {
@@ -170,7 +170,7 @@ class TensionSolution:
             "tensions": self.tensions.tolist() if self.tensions is not None else None,
             "residual": self.residual if given else None,
             "cost": self.cost if given else None,
-            "certificate": self.certificate.as_dict() if self.certificate is not None else None,
+            "certificate": self.certificate.to_dict() if self.certificate is not None else None,
             "method": self.method,
             "backend": self.backend,
             "time": self.time,

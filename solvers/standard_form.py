@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import RANK
 from .problem import TensionProblem
-from .tolerances import RANK
 
 __all__ = ["StandardForm", "standard_form"]
 

@@ -179,7 +179,7 @@ def test_soft_limits_are_told_apart():
 def test_an_excess_is_a_sentence_and_data():
     excess = Excess("cable_speed", "cable 3", 0.25, 1.5, 1.0, "m/s")
     assert str(excess) == "cable_speed: cable 3 at t = 0.250 s: 1.5 m/s, accepted: at most 1 m/s"
-    told = json.loads(json.dumps(excess.as_dict()))
+    told = json.loads(json.dumps(excess.to_dict()))
     assert told["text"] == str(excess)
     assert (told["limit"], told["about"], told["time"], told["value"], told["bound"], told["unit"]) == (
         "cable_speed",
@@ -191,7 +191,7 @@ def test_an_excess_is_a_sentence_and_data():
     )
     nowhere = Excess("duration", "motion", None, np.nan, 1.0, "s", "at least", "why")
     assert str(nowhere) == "duration: motion: nan s, accepted: at least 1 s (why)"
-    assert nowhere.as_dict()["value"] is None
+    assert nowhere.to_dict()["value"] is None
     scenario, _ = on_the_path({"path": RIGHT, "limits": {"cable_speed": 0.01}})
     summary = json.loads(json.dumps(audit(scenario, None).summary()))
     assert summary["excess"][0]["limit"] == "cable_speed"

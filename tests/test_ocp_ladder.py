@@ -1,4 +1,4 @@
-"""The planner's ladder: what each rung claims, against closed forms and brute force; and where the planner starts."""
+"""The planner's ladder: what each stage claims, against closed forms and brute force; and where the planner starts."""
 
 import sys
 
@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from towline.distribution import pose_problem
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import Planner, PlanStatus, plan, time_along
 from towline.ocp.cost import cost
 from towline.ocp.durations import durations
-from towline.ocp.pace import fastest
 from towline.ocp.rest_margin import rest_margin
 from towline.ocp.start import deviation_from
 from towline.ocp.tasks.scenario import lay_out
 from towline.ocp.tasks.task import Task
+from towline.ocp.time_law import fastest
 from towline.solvers import capacity_margin
-from towline.workspace import pose_problem
 
 GRAVITY = 9.81
 LINE = {"kind": "line", "start": [0, 0, 2], "end": [1, 1, 2.5]}
@@ -43,7 +43,7 @@ def largest_acceleration(times):
 
 
 def names(found):
-    return [rung.name for rung in found.rungs]
+    return [stage.name for stage in found.stages]
 
 
 def scenario(robot, **task):
@@ -91,7 +91,7 @@ def test_rest_margin_is_that_of_each_pose():
     for row, pose in zip((0, -1), poses, strict=True):
         assert seen.margin[row] == pytest.approx(capacity_margin(pose_problem(Dynamics(robot), pose)).value, rel=1e-9)
     assert seen.margin[seen.worst] == seen.margin.min()
-    assert "possible everywhere" in seen.in_words()
+    assert "possible everywhere" in seen.describe()
 
 
 def test_what_cannot_rest_at_its_end_is_infeasible_at_once():
@@ -144,7 +144,7 @@ def test_missing_spans_are_those_in_which_the_acceleration_is_too_large():
 
 
 class TestTiming:
-    """The rung that needs toppra."""
+    """The stage that needs toppra."""
 
     @pytest.fixture(autouse=True)
     def _toppra(self):
@@ -211,7 +211,7 @@ class TestTiming:
             {"path": LINE, "duration": {"min": 0.1, "max": 4}, "objective": {"time": 0.001}, "steps": 30},
         )
         assert found.feasible
-        (told,) = [rung.verdict for rung in found.rungs if rung.name == "timing"]
+        (told,) = [stage.verdict for stage in found.stages if stage.name == "timing"]
         assert "toppra is not installed" in told
 
     def test_a_timing_is_a_start(self):
@@ -268,7 +268,7 @@ def test_every_rung_is_told_with_its_time():
     found = plan(load("cogiro"), {"path": LINE, "duration": 3, "tube": TUBE, "steps": 10})
     assert names(found)[:2] == ["rest along the path", "program of 10 steps"]
     assert names(found)[2] == "audit"
-    for rung in found.rungs:
-        assert rung.seconds >= 0
-        assert rung.verdict in found.report()
-    assert [rung["name"] for rung in found.summary()["rungs"]] == names(found)
+    for stage in found.stages:
+        assert stage.seconds >= 0
+        assert stage.verdict in found.report()
+    assert [stage["name"] for stage in found.summary()["stages"]] == names(found)

@@ -20,7 +20,7 @@ from towline.figures.convergence import convergence, runs
 from towline.models import Dynamics, load
 from towline.ocp import PlanStatus, plan
 from towline.ocp.audits.excess import Excess
-from towline.ocp.reports.report import direction_in_words, missing, sections, verdict
+from towline.ocp.reports.report import describe_direction, missing, sections, verdict
 from towline.ocp.reports.scene import outline, scene
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 from towline.solvers import TensionProblem, certify
@@ -134,7 +134,7 @@ def test_directions_in_words():
 
     def told(A, w):
         certificate = certify(TensionProblem(A, w, np.zeros(m), np.ones(m), length=length))
-        return direction_in_words(certificate, robot)
+        return describe_direction(certificate, robot)
 
     push = np.vstack([np.eye(6)])
     assert told(push, [0, 0, -5, 0, 0, 0]) == "100 % force along -z (down)"

@@ -62,7 +62,7 @@ def test_the_zoo_is_told_apart(name, method, backend):
     assert (solution.method, solution.backend) == (method, backend)
     assert solution.feasible is (status == "optimal")
     assert solution.time > 0
-    json.dumps(solution.as_dict(), allow_nan=False)
+    json.dumps(solution.to_dict(), allow_nan=False)
     if status == "optimal":
         assert solution.certificate is None
         assert np.isfinite(solution.tensions).all()

@@ -238,17 +238,17 @@ def test_a_blocked_arc_is_found_and_proven_for_every_speed():
     )
     timing = time_along(robot, path, speed_max=0.3)
     assert timing.status is TimingStatus.INFEASIBLE
-    platform, _ = timing.course.at(timing.blocked)
+    platform, _ = timing.parametrised.at(timing.blocked)
     radius = np.linalg.norm(platform.pose[:, :2], axis=1)
     assert radius.min() > 0.2
     certificate, problem = timing.certificate, timing.problem
     assert certificate.verify(problem)
-    place, _ = timing.course.at(np.array([timing.at]))
+    place, _ = timing.parametrised.at(np.array([timing.at]))
     top = 0.3 / np.linalg.norm(place.velocity[0, :3])
     rng = np.random.default_rng(1)
     for _ in range(300):
         motion = place.timed(np.array([rng.uniform(0, top)]), np.array([rng.normal() * 30]))
-        w = timing.course.dynamics.required_wrench(*(part[0] for part in motion))
+        w = timing.parametrised.dynamics.required_wrench(*(part[0] for part in motion))
         assert certificate.direction @ w - certificate.support >= certificate.shortfall - 1e-6
 
 

@@ -13,12 +13,12 @@ import pytest
 import xarray as xr
 from PIL import Image
 
+from towline.distribution import pose_problem
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.solvers import solve
 from towline.viewer import read, save_page, serve
 from towline.viewer.colours import place, shades
-from towline.workspace import pose_problem
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 if CHROMIUM is None:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from towline.distribution import pose_problem
 from towline.models import Dynamics, Robot, load
 from towline.solvers import solve
-from towline.workspace import hints, pose_problem
+from towline.workspace import hints
 
 
 def test_hints_of_a_suspended_robot_lie_inside_its_anchors():

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import linprog, lsq_linear
 from scipy.spatial.transform import Rotation
 
+from towline.distribution import pose_problem
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.statics import equilibria
@@ -27,7 +28,6 @@ from towline.workspace import (
     WrenchFeasible,
     WrenchWithTolerance,
     condition_from,
-    pose_problem,
 )
 from towline.workspace.conditions.interference import segment_distance
 

@@ -7,7 +7,7 @@ from towline.errors import InputError
 from towline.figures import workspace as figures
 from towline.models import Robot, load
 from towline.workspace import Places, StaticEquilibrium, WrenchClosure
-from towline.workspace.boundary import boundary, boundary_of_values
+from towline.workspace.boundary_mesh import boundary, boundary_of_values
 from towline.workspace.volume import volume
 
 TRIANGLE = 3 * np.sqrt(3.0)  # [m^2], under the anchors of point-mass-3, 2 m from their middle

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..distribution import pose_problem
 from ..models import Dynamics
 from ..solvers import Certificate, capacity_margin, solve
-from ..workspace import pose_problem
 from .geometry import Geometry, Points
 
 ARROW = 0.3  # of the robot's size, for a certificate that is all force

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
+from ..distribution import wrench_problem
 from ..errors import InputError
 from ..models import Robot
 from ..models.parsing import parse_yaml
@@ -14,7 +15,6 @@ from ..ocp import Task
 from ..ocp.reports.scene import outline
 from ..ocp.tasks.scenario import Scenario, lay_out
 from ..solvers import Certificate, certify
-from ..workspace.pose import masked_problem
 from .geometry import Geometry, Room
 from .instant import Instant, least_distance
 
@@ -127,7 +127,7 @@ class Replay:
         proofs = []
         for wind in scenario.winds_at(pose, velocity):
             w = scenario.dynamics.required_wrench(pose, velocity, self._acceleration[index], wind=wind)
-            proofs.append(certify(masked_problem(scenario.dynamics, A, w, t_min, t_max)))
+            proofs.append(certify(wrench_problem(scenario.robot, A, w, t_min, t_max)))
         return max((proof for proof in proofs if proof), key=lambda proof: proof.shortfall, default=None)
 
     @cached_property

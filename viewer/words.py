@@ -32,7 +32,7 @@ def readout(instant: Instant, robot: Robot) -> str:
     facts += _margins(instant)
     lines = [f"<div>{fact}</div>" for fact in facts]
     if instant.certificate is not None:
-        words = escape(instant.certificate.in_words()).replace("\n", "<br>")
+        words = escape(instant.certificate.describe()).replace("\n", "<br>")
         lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
         if arrow(instant, 1.0) is None:
             lines.append(f'<div style="color:{MUTED}">There is hardly any force in it, so it has no arrow.</div>')

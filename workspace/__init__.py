@@ -1,11 +1,10 @@
 """Which poses are reachable: conditions on places of platform and carriers, asked of 10^4 to 10^9 of them.
 
-Conditions stand alone or are joined by & and |; `sample` asks them. `pose_problem` is one pose as a tension problem,
-`hints` a first look.
+Conditions stand alone or are joined by & and |; `sample` asks them; `hints` is a first look.
 """
 
 from .balance import make_ready
-from .boundary import boundary
+from .boundary_mesh import boundary
 from .condition import AllOf, AnyOf, Condition, condition_from
 from .conditions import (
     Dynamic,
@@ -20,10 +19,10 @@ from .conditions import (
     WrenchFeasible,
     WrenchWithTolerance,
 )
+from .first_look import hints
 from .places import Places
-from .pose import hints, pose_problem
 from .region import Region
-from .sample import sample, save
+from .run import sample, save
 
 __all__ = [
     "AllOf",
@@ -46,7 +45,6 @@ __all__ = [
     "condition_from",
     "hints",
     "make_ready",
-    "pose_problem",
     "sample",
     "save",
 ]

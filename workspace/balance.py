@@ -7,13 +7,12 @@ newtons. A few thousand places are taken at a time: their matrices stay in the p
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from ..models import Dynamics, Robot
+from ..models import Robot
 from ..models.batch import compiled
+from ..models.dynamics import dynamics_of
 from ..solvers import solve_batch
 from .places import Places
 
@@ -21,7 +20,6 @@ __all__ = [
     "anchors",
     "attachments",
     "can_give",
-    "dynamics_of",
     "in_platform",
     "lacking",
     "make_ready",
@@ -31,17 +29,6 @@ __all__ = [
 ]
 
 PLACES_AT_ONCE = 8192
-
-
-def dynamics_of(robot: Robot) -> Dynamics:
-    """The `Dynamics` of a robot, kept for the next call."""
-    key: Any = robot  # frozen, so it has a hash, which a type checker does not see
-    return _dynamics(key)
-
-
-@lru_cache(maxsize=16)
-def _dynamics(robot: Any) -> Dynamics:
-    return Dynamics(robot)
 
 
 def make_ready(robot: Robot) -> None:

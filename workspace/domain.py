@@ -10,9 +10,9 @@ import numpy as np
 from ..errors import InputError
 from ..models import Robot
 from ..models.robot import COORDINATES, Box
-from .hanging import hanging
 from .places import Places
 from .region import AngleBox, Region, reach_boxes, surrounding_box
+from .three_cable_pose import three_cable_pose
 
 THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
 
@@ -94,12 +94,12 @@ class Domain:
         return self.low[:3], self.high[:3]
 
     @cached_property
-    def turns(self) -> bool:
+    def attitude_varies(self) -> bool:
         """Whether the attitude varies."""
         return bool((self.high - self.low)[3:6].max() > THINNEST)
 
     @cached_property
-    def drives(self) -> bool:
+    def carriers_vary(self) -> bool:
         """Whether carriers move."""
         return bool((self.high - self.low)[6 : 6 + 3 * len(self.robot.carriers)].max() > THINNEST)
 
@@ -132,12 +132,12 @@ class Domain:
         values[:, self.varying] += units * self.extent
         pose = values[:, :6].copy()
         where = np.broadcast_to(self.robot.carrier_home, (count, carriers, 6))
-        if self.drives:
+        if self.carriers_vary:
             where = where.copy()
             where[:, :, :3] = values[:, 6 : 6 + 3 * carriers].reshape(count, carriers, 3)
         if not self.hangs:
             return Places(pose, where), np.ones(count, dtype=bool)
-        pose[:, :3] = hanging(self.robot, pose[:, 3:], where, values[:, -3:])
+        pose[:, :3] = three_cable_pose(self.robot, pose[:, 3:], where, values[:, -3:])
         exists = np.isfinite(pose[:, 0])
         pose[~exists, :3] = self.robot.home[:3]
         return Places(pose, where), exists

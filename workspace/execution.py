@@ -17,13 +17,13 @@ from contextlib import contextmanager
 from typing import Any
 
 from ..errors import InputError, SolverError
-from .tally import Job, Tally, tally
+from .counts import Counts, Job, count
 
 AHEAD = 3  # jobs for each worker, one of which it works on
 CONNECT_WITHIN = 5.0  # [s]
 WORKERS_WITHIN = 30.0  # [s]
 
-Run = Callable[[Iterable[Job]], Iterator[Tally]]
+Run = Callable[[Iterable[Job]], Iterator[Counts]]
 
 
 @contextmanager
@@ -50,7 +50,7 @@ def executor(packed: bytes, workers: int, scheduler: str | None) -> Iterator[Run
         with _cluster(scheduler) as client:
             yield lambda jobs: _on_cluster(client, packed, jobs)
     elif workers == 1:
-        yield lambda jobs: (tally(packed, job) for job in jobs)
+        yield lambda jobs: (count(packed, job) for job in jobs)
     else:
         # Processes of their own, not copies of this one: its threads and locks are not theirs.
         context = multiprocessing.get_context("spawn")
@@ -90,9 +90,9 @@ def _begin_worker() -> None:
     threading.Thread(target=end_with, daemon=True).start()
 
 
-def _on_processes(pool: ProcessPoolExecutor, packed: bytes, jobs: Iterable[Job], most: int) -> Iterator[Tally]:
+def _on_processes(pool: ProcessPoolExecutor, packed: bytes, jobs: Iterable[Job], most: int) -> Iterator[Counts]:
     try:
-        yield from _in_order(lambda job: pool.submit(tally, packed, job), jobs, lambda: most)
+        yield from _in_order(lambda job: pool.submit(count, packed, job), jobs, lambda: most)
     except BrokenProcessPool:
         raise SolverError(
             "workers: a worker process ended before its work was done (killed, out of memory, or a script without "
@@ -125,7 +125,7 @@ def _cluster(address: str) -> Iterator[Any]:
         client.close(timeout=CONNECT_WITHIN)
 
 
-def _on_cluster(client: Any, packed: bytes, jobs: Iterable[Job]) -> Iterator[Tally]:
+def _on_cluster(client: Any, packed: bytes, jobs: Iterable[Job]) -> Iterator[Counts]:
     import distributed
     from distributed import CancelledError
 
@@ -135,7 +135,7 @@ def _on_cluster(client: Any, packed: bytes, jobs: Iterable[Job]) -> Iterator[Tal
 
     try:
         # Not pure: Dask would take a hash of the job instead of a name of its own.
-        yield from _in_order(lambda job: client.submit(tally, packed, job, pure=False), jobs, threads)
+        yield from _in_order(lambda job: client.submit(count, packed, job, pure=False), jobs, threads)
     except distributed.KilledWorker:
         raise SolverError(
             "scheduler: one job ended several workers (out of memory?); what a checkpoint has is safe"
@@ -146,7 +146,7 @@ def _on_cluster(client: Any, packed: bytes, jobs: Iterable[Job]) -> Iterator[Tal
         raise SolverError("scheduler: it ended before the work was done; what a checkpoint has is safe") from None
 
 
-def _in_order(submit: Callable[[Job], Any], jobs: Iterable[Job], most: Callable[[], int]) -> Iterator[Tally]:
+def _in_order(submit: Callable[[Job], Any], jobs: Iterable[Job], most: Callable[[], int]) -> Iterator[Counts]:
     """Tallies in the jobs' order, some jobs under way."""
     under_way: deque[Any] = deque()
     limit = most()

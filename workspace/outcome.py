@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .counts import Counts, cells_of_counts, width_of
 from .domain import Domain
 from .refinement import Refinement
-from .tally import Tally, cells_of_counts, width_of
 from .volume import LEVEL, share_interval
 
 if TYPE_CHECKING:
@@ -39,15 +39,15 @@ class Outcome:
         """Whether more samples are kept."""
         return self._room > 0
 
-    def add(self, tally: Tally) -> None:
-        """Take the tally of the next samples."""
-        self.tried += sum(tally.sizes)
-        self.accepted += int(tally.counts[1].sum())
-        self._low, self._high = np.minimum(self._low, tally.low), np.maximum(self._high, tally.high)
-        self._counts += tally.counts
-        if self._room > 0 and len(tally.samples):
-            self._samples.append(tally.samples[: self._room])
-            self._flags.append(tally.accepted[: self._room])
+    def add(self, count: Counts) -> None:
+        """Take the count of the next samples."""
+        self.tried += sum(count.sizes)
+        self.accepted += int(count.counts[1].sum())
+        self._low, self._high = np.minimum(self._low, count.low), np.maximum(self._high, count.high)
+        self._counts += count.counts
+        if self._room > 0 and len(count.samples):
+            self._samples.append(count.samples[: self._room])
+            self._flags.append(count.accepted[: self._room])
             self._room -= len(self._samples[-1])
 
     def dataset(self, keep: str, method: str, refinement: Refinement | None) -> xr.Dataset:
@@ -76,8 +76,9 @@ class Outcome:
         }
         if keep != "none":
             variables |= self._kept(keep)
-            coordinates |= {"angle": ANGLES} if domain.turns else {}
-            coordinates |= {"carrier": [carrier.name for carrier in domain.robot.carriers]} if domain.drives else {}
+            coordinates |= {"angle": ANGLES} if domain.attitude_varies else {}
+            names = [carrier.name for carrier in domain.robot.carriers]
+            coordinates |= {"carrier": names} if domain.carriers_vary else {}
         if refinement is not None:
             corners, _ = domain.places(refinement.cells)
             upper, _ = domain.places(refinement.cells + refinement.edges)
@@ -93,10 +94,10 @@ class Outcome:
         domain = self._domain
         rows = np.vstack(self._samples) if self._samples else np.empty((0, width_of(domain)))
         kept: dict[str, Any] = {"position": (("point", "axis"), rows[:, :3], {"units": "m"})}
-        if domain.turns:
+        if domain.attitude_varies:
             kept["attitude"] = (("point", "angle"), rows[:, 3:6], {"units": "rad"})
-        if domain.drives:
-            where = rows[:, 6 if domain.turns else 3 :].reshape(len(rows), len(domain.robot.carriers), 3)
+        if domain.carriers_vary:
+            where = rows[:, 6 if domain.attitude_varies else 3 :].reshape(len(rows), len(domain.robot.carriers), 3)
             kept["carrier_position"] = (("point", "carrier", "axis"), where, {"units": "m"})
         if keep == "all":
             flags = np.concatenate(self._flags) if self._flags else np.empty(0, dtype=bool)

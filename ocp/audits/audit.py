@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...distribution import wrench_problem
 from ...errors import InputError
 from ...models.robot import Vector3
 from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
-from ...workspace.pose import masked_problem
 from ..tasks.path import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Deviation, Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
@@ -93,8 +93,8 @@ class Audit:
             "worst_violation": float(self.violation.max()),
             "at_s": float(self.times[self.worst]),
             "tolerance": self.tolerance,
-            "excess": [excess.as_dict() for excess in self.excess],
-            "soft_excess": [excess.as_dict() for excess in self.soft_excess],
+            "excess": [excess.to_dict() for excess in self.excess],
+            "soft_excess": [excess.to_dict() for excess in self.soft_excess],
             "drift": None if self.drift is None else {k: _number(v) for k, v in self.drift._asdict().items()},
         }
 
@@ -224,7 +224,7 @@ class _Distribution:
                     beyond, short = float(in_range.max()), np.where(in_range > 0, in_range, short)
                 left.append(proofs[np.argmax(short)])
             for k in left:
-                problem = masked_problem(scenario.dynamics, A[k], w[k], low, high, wish[k])
+                problem = wrench_problem(scenario.robot, A[k], w[k], low, high, wish[k])
                 tensions[k], violation[k], certificate = self._alone(problem)
                 if certificate is not None and (worst is None or certificate.shortfall > worst.shortfall):
                     worst, at = certificate, int(k)
@@ -309,7 +309,7 @@ def at_rest(scenario: Scenario, seen: Audit) -> Audit | None:
         A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
         for wind in scenario.winds_at(*motions[:2]):
             w = scenario.dynamics.required_wrench(*motions, wind=wind)
-            certificate = certify(masked_problem(scenario.dynamics, A, w, low, high))
+            certificate = certify(wrench_problem(scenario.robot, A, w, low, high))
             if certificate is not None:
                 at = None if scenario.wind_box is None else wind
                 time = float(seen.times[row])

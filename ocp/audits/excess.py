@@ -47,7 +47,7 @@ class Excess:
         told = f"{self.limit}: {self.about}{at}: {self.value:.6g} {self.unit}"
         return f"{told}, accepted: {side}{self.bound:.6g} {self.unit}" + (f" ({self.why})" if self.why else "")
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Ready for JSON, with the sentence as "text"; numbers that do not exist are None."""
         return {
             "limit": self.limit,

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...distribution import wrench_problem
 from ...models.robot import Vector3
 from ...solvers import Certificate, certify
-from ...workspace.pose import masked_problem
 from ..tasks.scenario import Scenario
 from .audit import Audit
 
@@ -38,10 +38,10 @@ class Missing(NamedTuple):
     certificate: Certificate
     wind: Vector3 | None = None
 
-    def as_dict(self) -> dict[str, Any]:
-        """{"from", "to", "at" [s], and the keys of `Certificate.as_dict`} for JSON."""
+    def to_dict(self) -> dict[str, Any]:
+        """{"from", "to", "at" [s], and the keys of `Certificate.to_dict`} for JSON."""
         at = {"from": self.start, "to": self.end, "at": self.at}
-        return at | ({} if self.wind is None else {"wind": list(self.wind)}) | self.certificate.as_dict()
+        return at | ({} if self.wind is None else {"wind": list(self.wind)}) | self.certificate.to_dict()
 
 
 def missing(scenario: Scenario, seen: Audit) -> tuple[Missing, ...]:
@@ -66,7 +66,7 @@ def _certificate(scenario: Scenario, seen: Audit, row: int) -> tuple[Certificate
     proofs = []
     for wind in scenario.winds_at(*motions[:2]):
         w = scenario.dynamics.required_wrench(*motions, wind=wind)
-        certificate = certify(masked_problem(scenario.dynamics, A, w, *scenario.bounds()))
+        certificate = certify(wrench_problem(scenario.robot, A, w, *scenario.bounds()))
         if certificate is not None:
             proofs.append((certificate, None if scenario.wind_box is None else wind))
     return max(proofs, key=lambda proof: proof[0].shortfall, default=None)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..tasks import spline
+from ..tasks import bernstein
+from ..tasks.bernstein import Values
 from ..tasks.scenario import ATTITUDE, POSITION, CarrierLimits, Scenario
-from ..tasks.spline import Values
 from .layout import Layout
 from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, spread, stretch
 
@@ -54,8 +54,8 @@ def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, column
     first, last = columns[0], columns[-1]
     jerk = (first[layout.jerk] / h_given, last[layout.jerk] / h_given)
     acceleration = scenario.scheme.acceleration(h, [column[layout.a] for column in columns], jerk)
-    speed = spline.integral(h, first[layout.v], acceleration)
-    return Points(spline.integral(h, first[layout.q], speed), speed, acceleration)
+    speed = bernstein.integral(h, first[layout.v], acceleration)
+    return Points(bernstein.integral(h, first[layout.q], speed), speed, acceleration)
 
 
 def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
@@ -147,8 +147,8 @@ def _inner_rows(
     """Inner points lie on the polynomials and share what all share; where the acceleration jumps, it starts as told."""
     n = layout.n
     for share, column in zip(scenario.scheme.inner, columns[1:-1], strict=True):
-        values += [column[layout.q] - spline.value(own.position, share)]
-        values += [(column[layout.v] - spline.value(own.speed, share)) * h]
+        values += [column[layout.q] - bernstein.value(own.position, share)]
+        values += [(column[layout.v] - bernstein.value(own.speed, share)) * h]
         values.append(column[layout.shared] - columns[0][layout.shared])
         rows += [("position", 0.0, 0.0)] * n + [("velocity", 0.0, 0.0)] * n
         rows += [("shared", 0.0, 0.0)] * len(layout.carried)
@@ -167,8 +167,8 @@ def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points, a_end: ca.SX) 
     cost, took = ca.SX(0), 1.0
     if scenario.scheme.degree:
         took = JUMP
-        jerk = [point / scale for point in spline.derivative(h, own.acceleration)]
-        cost += spline.mean_square(jerk, ca.dot)
+        jerk = [point / scale for point in bernstein.derivative(h, own.acceleration)]
+        cost += bernstein.mean_square(jerk, ca.dot)
     if not scenario.scheme.continuous:
         cost += ca.sumsqr((a_end - own.acceleration[-1]) / h / scale) / took
     return cost
@@ -209,7 +209,7 @@ def _rate_rows(
 
 def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: list[ca.SX]) -> list[ca.SX]:
     first, last = columns[0], columns[-1]
-    return spline.joined(h, position, first[layout.v], last[layout.q], last[layout.v])
+    return bernstein.joined(h, position, first[layout.v], last[layout.q], last[layout.v])
 
 
 def _tube_rows(scenario: Scenario, position: list[ca.SX], values: list[ca.SX], rows: list[Row]) -> None:
@@ -236,8 +236,8 @@ def _total(
         rise = (total[-1] - offset[-1] - total[0] + offset[0]) / h
         slopes = (rise + jerk[0], rise + jerk[-1])
     acceleration = scenario.scheme.acceleration(h, total, slopes)
-    speed = spline.integral(h, velocity[0], acceleration)
-    position = spline.joined(h, spline.integral(h, pose[0], speed), velocity[0], pose[-1], velocity[-1])
+    speed = bernstein.integral(h, velocity[0], acceleration)
+    position = bernstein.joined(h, bernstein.integral(h, pose[0], speed), velocity[0], pose[-1], velocity[-1])
     return Points(position, [*speed[:-1], velocity[-1]], acceleration)
 
 

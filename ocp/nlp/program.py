@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..tasks import spline
+from ..tasks import bernstein
 from ..tasks.path import WaypointPath
 from ..tasks.scenario import ATTITUDE, Deviation, Scenario
 from .interval import Points, interval_of, points
@@ -228,7 +228,7 @@ def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, s
         k = min(int(share * steps), steps - 1)
         position = _polynomials(scenario, layout, X, X_end, steps, k).position
         rows: list[Row] = [("waypoint", 0.0, 0.0)] * len(platform)
-        found.append(Block(spline.value(position, share * steps - k)[platform], rows, np.array([k])))
+        found.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
     return found
 
 

@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
+from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
-from ..tasks.spline import Values
 from .layout import DURATION, Layout
 
 __all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "spread", "stretch"]

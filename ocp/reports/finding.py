@@ -12,7 +12,7 @@ import numpy as np
 from ..audits.audit import Audit
 from ..audits.missing import Missing, missing
 from ..tasks.scenario import Deviation, Scenario
-from .rung import Rung
+from .stage import Stage
 
 __all__ = ["Finding", "PlanStatus", "Relaxed"]
 
@@ -27,7 +27,7 @@ class PlanStatus(StrEnum):
     """The task fixes the motion, and it cannot be: at some time no tensions give the wrench that it needs, proven by
     the certificate, or it leaves a carrier's or drive's limits, told by the audit's `excess`. Or the task leaves the
     duration open, and no duration and time law that it leaves will do: then the certificate is that of the slowest
-    motion, and `rungs` tell what excludes the others."""
+    motion, and `stages` tell what excludes the others."""
 
     NOT_FOUND = "not-found"
     """The planner found no motion without violation. The certificate and the `excess` are those of the closest motion
@@ -55,7 +55,7 @@ class Finding:
     iterates
         Rows of (iteration, objective, infeasibility) of all runs of the solver, in order: where the iteration falls
         back to 0 another run begins.
-    rungs
+    stages
         The steps of the planner's ladder, in order: what each said, and how long it took.
     relaxed
         If not feasible: what would have been, if the planner knows.
@@ -70,7 +70,7 @@ class Finding:
     iterations: int = 0
     message: str = ""
     iterates: tuple[tuple[int, float, float], ...] = ()
-    rungs: tuple[Rung, ...] = ()
+    stages: tuple[Stage, ...] = ()
     relaxed: Relaxed | None = None
 
     @property
@@ -104,7 +104,7 @@ class Finding:
     def certificate(self) -> dict[str, Any] | None:
         """Why there is no feasible motion: where, when and by how much; None for a feasible plan.
 
-        The keys of `solvers.Certificate.as_dict`, `time` [s], and `wind` [m/s] of a task with a box of winds; the
+        The keys of `solvers.Certificate.to_dict`, `time` [s], and `wind` [m/s] of a task with a box of winds; the
         direction is in {G}.
         """
         if self.feasible or self.audit.certificate is None:
@@ -112,7 +112,7 @@ class Finding:
         at: dict[str, Any] = {"time": self.audit.certificate_time}
         if self.audit.certificate_wind is not None:
             at["wind"] = list(self.audit.certificate_wind)
-        return at | self.audit.certificate.as_dict()
+        return at | self.audit.certificate.to_dict()
 
     @cached_property
     def missing(self) -> tuple[Missing, ...]:
@@ -134,9 +134,9 @@ class Finding:
             "solver_message": self.message,
             "audit": self.audit.summary(),
             "certificate": self.certificate,
-            "missing": [each.as_dict() for each in self.missing],
-            "relaxed": None if self.relaxed is None else self.relaxed.as_dict(),
-            "rungs": [rung._asdict() for rung in self.rungs],
+            "missing": [each.to_dict() for each in self.missing],
+            "relaxed": None if self.relaxed is None else self.relaxed.to_dict(),
+            "stages": [stage._asdict() for stage in self.stages],
         }
 
 
@@ -160,6 +160,6 @@ class Relaxed:
     possible: float
     plan: Finding
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """{"name", "unit", "asked", "possible"} for JSON."""
         return {"name": self.name, "unit": self.unit, "asked": self.asked, "possible": self.possible}

@@ -47,7 +47,7 @@ def sections(plan: Finding) -> list[Section]:
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
-        Section("How it was found", [(rung.name, f"{rung.verdict} ({rung.seconds:.3f} s)") for rung in plan.rungs]),
+        Section("Stages", [(stage.name, f"{stage.verdict} ({stage.seconds:.3f} s)") for stage in plan.stages]),
         Section("Computation", _computation(plan)),
     ]
     return [section for section in found if section.facts]
@@ -61,7 +61,7 @@ def missing(plan: Finding) -> Table | None:
     rows = []
     for span in plan.missing:
         certificate = span.certificate
-        most = direction_in_words(certificate, plan.scenario.robot).partition(", ")[0]
+        most = describe_direction(certificate, plan.scenario.robot).partition(", ")[0]
         numbers = (certificate.demand, certificate.support, certificate.shortfall)
         times = (f"{time:.3f}" for time in (span.start, span.end, span.at))
         rows.append((*times, most, _binding(certificate), *(_short(number) for number in numbers)))
@@ -122,7 +122,7 @@ def _why(plan: Finding) -> list[Fact]:
             ("time", f"t = {plan.audit.certificate_time:.3f} s of {plan.scenario.duration:g} s"),
             *([("wind", _wind(wind))] if (wind := plan.audit.certificate_wind) is not None else []),
             ("constraint", _constraint(plan, certificate)),
-            ("wrench direction", direction_in_words(certificate, robot)),
+            ("wrench direction", describe_direction(certificate, robot)),
             ("as a vector", _vector(certificate)),
             ("needed", f"{_short(certificate.demand)} N along it"),
             ("available", f"{_short(certificate.support)} N at most" + pulled * (certificate.support < 0)),
@@ -149,7 +149,7 @@ def _constraint(plan: Finding, certificate: Certificate) -> str:
     return f"tension limits, {'; '.join(told)}" + (f", with the margin of {margin:g} N" if margin else "")
 
 
-def direction_in_words(certificate: Certificate, robot: Robot) -> str:
+def describe_direction(certificate: Certificate, robot: Robot) -> str:
     """Which way a certificate points: its parts of 5 % and more, the largest first, with their shares.
 
     A share is the square of a component of the direction, moments over `Robot.length`: they sum up to 100 %.
@@ -293,7 +293,7 @@ def _computation(plan: Finding) -> list[Fact]:
     facts = [("build", f"{plan.build_s:.3f} s"), ("solve", f"{plan.solve_s:.3f} s")]
     if plan.deviation is None:
         fixed = plan.scenario.is_fixed
-        why = "the task fixes the motion, the audit alone decides" if fixed else "a rung before it knew the answer"
+        why = "the task fixes the motion, the audit alone decides" if fixed else "a stage before it knew the answer"
         return [*facts, ("solver", f"none: {why}")]
     starts = sum(row[0] == 0 for row in plan.iterates)
     runs = f", run {starts} of {starts}" if starts > 1 else ""

@@ -23,8 +23,8 @@ from typing import Literal
 
 import numpy as np
 
-from . import spline
-from .spline import Values
+from . import bernstein
+from .bernstein import Values
 
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -92,7 +92,7 @@ class Scheme:
     def _to_points(self) -> np.ndarray:
         """From values where the balance is asked to Bernstein points of the polynomial through them."""
         places = (0.0, *self.inner, 1.0) if self.continuous else self.inner
-        found = np.linalg.inv(spline.basis(self.degree, places))
+        found = np.linalg.inv(bernstein.basis(self.degree, places))
         return np.where(np.abs(found) < 1e-12, 0.0, found)
 
     @property
@@ -137,14 +137,14 @@ class Scheme:
         h = np.diff(starts)[:, None]
         a = [values[2][i:-1:size] for i in range(size)] + [values[2][size::size]]
         acceleration = self.acceleration(h, a, None if jerk is None else (jerk[:-1], jerk[1:]))
-        speed = spline.integral(h, v, acceleration)
-        position = spline.integral(h, q, speed)
-        change = spline.derivative(h, acceleration) if self.degree else [np.zeros_like(v)]
+        speed = bernstein.integral(h, v, acceleration)
+        position = bernstein.integral(h, q, speed)
+        change = bernstein.derivative(h, acceleration) if self.degree else [np.zeros_like(v)]
         index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 2)
         shares = (times - starts[index]) / h[index, 0]
         found = []
         for points in (position, speed, acceleration, change):
-            weights = spline.basis(len(points) - 1, shares)
+            weights = bernstein.basis(len(points) - 1, shares)
             found.append(sum(weights[:, i : i + 1] * point[index] for i, point in enumerate(points)))
         return found
 

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...distribution import wrench_problem
 from ...solvers import TensionProblem, capacity_margin
-from ...workspace.pose import masked_problem
 from ..tasks.path import TimedPath
-from .course import Course, PathLimits
+from .parametrised_path import ParametrisedPath, PathLimits
 
 __all__ = ["Bottleneck", "bottlenecks"]
 
@@ -41,33 +41,33 @@ class Bottleneck(NamedTuple):
     seconds: float
     limit: str
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         """One line for a person."""
         return f"s = {self.start:.3f} to {self.end:.3f}, {self.seconds:.3f} s: {self.limit}"
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """{"from", "to", "seconds" [s], "limit"} for JSON."""
         return {"from": self.start, "to": self.end, "seconds": self.seconds, "limit": self.limit}
 
 
-def bottlenecks(course: Course, limits: PathLimits, margin: float, path: TimedPath) -> list[Bottleneck]:
-    """The stretches of a time law along a course, tensions `margin` [N] inside their limits."""
+def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: float, path: TimedPath) -> list[Bottleneck]:
+    """The stretches of a time law along a parametrised, tensions `margin` [N] inside their limits."""
     edges = np.linspace(0.0, path.times[-1], LOOKS + 1)
     s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
-    platform, carriers = (motion.timed(sd, sdd) for motion in course.at(s))
-    paces = course.paces(platform, carriers, limits)
+    platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
+    paces = parametrised.paces(platform, carriers, limits)
     names, values = [*paces.names], [*paces.values.T]
     for index, most in limits.carrier_acceleration.items():
-        names.append(f"acceleration of {course.robot.carriers[index].name}")
+        names.append(f"acceleration of {parametrised.robot.carriers[index].name}")
         values.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most)
-    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)
-    w = course.dynamics.required_wrench(*platform, wind=course.wind)
-    low, high = course.robot.t_min + margin, course.robot.t_max - margin
+    A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)
+    w = parametrised.dynamics.required_wrench(*platform, wind=parametrised.wind)
+    low, high = parametrised.robot.t_min + margin, parametrised.robot.t_max - margin
     told = []
     for k in range(LOOKS):
         fastest = int(np.argmax([value[k] for value in values]))
         reached = values[fastest][k] >= REACHED
-        told.append(names[fastest] if reached else _tensions(masked_problem(course.dynamics, A[k], w[k], low, high)))
+        told.append(names[fastest] if reached else _tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high)))
     at, found, first = path.law(edges)[0], [], 0
     for limit, run in groupby(told):
         after = first + len(list(run))

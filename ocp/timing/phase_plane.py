@@ -1,7 +1,7 @@
 """Limits of a motion along a path as half-planes in its phase plane, and the proof where they leave nothing.
 
-With u = d2s/dt2 and x = (ds/dt)^2 the needed wrench is a u + b x + c (`course`), so each facet of the available wrench
-set (`solvers.available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
+With u = d2s/dt2 and x = (ds/dt)^2 the needed wrench is a u + b x + c (`parametrised_path`), so each facet of the
+available wrench set (`solvers.available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...distribution import wrench_problem
 from ...errors import InputError, SolverError
 from ...solvers import Certificate, TensionProblem, certify
 from ...solvers.available_wrench import Facets, facets
 from ...solvers.certificate import certificate_along
-from ...workspace.pose import masked_problem
-from .course import Course, PathLimits, Wrench
+from .parametrised_path import ParametrisedPath, PathLimits, Wrench
 
 FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables lies in it
 
 
 @dataclass(frozen=True)
 class PhasePlane:
-    """All that a motion along the course has to keep, at N places of it.
+    """All that a motion along the parametrised has to keep, at N places of it.
 
     Wrenches are those of the coordinates that can move, moments over `Robot.length`, all in newtons.
 
@@ -84,7 +84,9 @@ class Proof:
     certificate: Certificate
 
 
-def phase_plane(course: Course, limits: PathLimits, s: np.ndarray, margin: float, shrink: float = 0.0) -> PhasePlane:
+def phase_plane(
+    parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, shrink: float = 0.0
+) -> PhasePlane:
     """The limits at the places s, (N,), tensions `margin` [N] inside theirs, the others lowered by a share `shrink`.
 
     Raises
@@ -92,32 +94,32 @@ def phase_plane(course: Course, limits: PathLimits, s: np.ndarray, margin: float
     InputError
         If motion along the path needs wrenches outside the span of the cables.
     """
-    robot = course.robot
-    platform, carriers = course.at(s)
+    robot = parametrised.robot
+    platform, carriers = parametrised.at(s)
     rows = np.flatnonzero(robot.dof_mask)
     scale = np.array([1.0, 1, 1, *[1 / robot.length] * 3])[rows]
-    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
-    wrench = Wrench(*(part[:, rows] * scale for part in course.wrench(platform)))
+    A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
+    wrench = Wrench(*(part[:, rows] * scale for part in parametrised.wrench(platform)))
     middle = (robot.t_min + robot.t_max) / 2
     # The distance that the audit asks for must not turn a cable's only tension into none.
     available = facets(A, np.minimum(robot.t_min + margin, middle), np.maximum(robot.t_max - margin, middle))
     _check_span(s, wrench, available)
-    x_max = (course.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
-    lowered = [(a, b, c * (1 - shrink)) for a, b, c in course.carrier_rows(carriers, limits)]
+    x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
+    lowered = [(a, b, c * (1 - shrink)) for a, b, c in parametrised.carrier_rows(carriers, limits)]
     return PhasePlane(wrench, available, x_max, lowered)
 
 
-def proofs(course: Course, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:
+def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:
     """Proofs for the places among s, (N,), at which nothing is allowed.
 
     At the first and the last that is rest, which lasts, so that the platform does not accelerate there either.
     """
-    robot, weight = course.robot, course.robot.force_scale
-    plane = phase_plane(course, limits, s, margin)
+    robot, weight = parametrised.robot, parametrised.robot.force_scale
+    plane = phase_plane(parametrised, limits, s, margin)
     low, high = robot.t_min + margin, robot.t_max - margin
-    platform, carriers = course.at(s)
-    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose)
-    whole = course.wrench(platform)
+    platform, carriers = parametrised.at(s)
+    A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)
+    whole = parametrised.wrench(platform)
     at_rest = plane.rows(weight)[2][:, -1] > 0  # beside the span of the cables whatever the speed
     at_rest[[0, -1]] = True
     rows = plane.tension_rows(weight)
@@ -125,12 +127,12 @@ def proofs(course: Course, limits: PathLimits, s: np.ndarray, margin: float) -> 
     found = []
     for k in np.flatnonzero(at_rest | (rows[2] > 0).any(axis=1)):  # at the others the platform can rest
         if at_rest[k]:
-            problem = masked_problem(course.dynamics, A[k], whole.c[k], low, high)
+            problem = wrench_problem(parametrised.robot, A[k], whole.c[k], low, high)
             certificate = certify(problem)
         else:
             (u, x), weights = _nearest(rows[0][k], rows[1][k], rows[2][k], plane.x_max[k])
             w = whole.a[k] * u + whole.b[k] * x + whole.c[k]
-            problem = masked_problem(course.dynamics, A[k], w, low, high)
+            problem = wrench_problem(parametrised.robot, A[k], w, low, high)
             direction = np.zeros(6)
             normals = plane.available.normals[k]
             direction[robot.dof_mask > 0] = weights @ np.concatenate([normals, -normals])

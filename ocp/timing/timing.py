@@ -1,9 +1,9 @@
 """`time_along`: the fastest time law along a given path that keeps every tension inside its limits.
 
 Along a path only s(t) is left to choose. The available wrench set at each s (`solvers.available_wrench`) and the wrench
-that the motion needs (`course`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds the fastest
-law inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the exact
-tension solver; what it misses between the grid points a finer grid and a little distance from the limits make good.
+that the motion needs (`parametrised_path`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds
+the fastest law inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the
+exact tension solver; what it misses between the grid points a finer grid and a little distance from the limits correct.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from ...distribution import wrench_problem
 from ...errors import InputError, SolverError
 from ...models import Robot
 from ...models.parsing import to_yaml, validate
 from ...models.robot import MobileCarrier, Name, NonNegative, Part, Positive, Vector3
 from ...solvers import Certificate, TensionProblem, certify, solve_batch
-from ...workspace.pose import masked_problem
 from ...writing import whole_file
 from ..tasks.path import AnyPath, Curve, LinePath, Motion, SamplePath, TimedPath, WaypointPath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from ..tasks.task import GivenBase, HoldBase, Task
 from .bottlenecks import Bottleneck, bottlenecks
-from .course import Course, PathLimits
+from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import phase_plane, proofs
 
 TOLERANCE = 1e-6  # [N], as the audit of plans has it
@@ -65,7 +65,7 @@ class Timing:
     ----------
     status
         See `TimingStatus`.
-    course
+    parametrised
         The robot and the geometry that was timed.
     limits
         What beside the tensions was limited.
@@ -91,7 +91,7 @@ class Timing:
     """
 
     status: TimingStatus
-    course: Course = field(repr=False)
+    parametrised: ParametrisedPath = field(repr=False)
     limits: PathLimits = field(repr=False)
     margin: float
     s: np.ndarray = field(repr=False)
@@ -122,7 +122,7 @@ class Timing:
         InputError
             If there is no law.
         """
-        return self.timed(self.course.path)
+        return self.timed(self.parametrised.path)
 
     def task(self, name: str = "timed") -> Task:
         """A task with this `name` that fixes this motion of platform and carriers: `plan` audits it.
@@ -132,15 +132,15 @@ class Timing:
         InputError
             If there is no law.
         """
-        course, carriers = self.course, self.course.robot.carriers
+        parametrised, carriers = self.parametrised, self.parametrised.robot.carriers
         base: HoldBase | GivenBase = HoldBase(kind="hold")
-        if course.carriers:
+        if parametrised.carriers:
             paths: dict[str, AnyPath] = {
-                carriers[index].name: self.timed(path) if index in course.moving else path
-                for index, path in course.carriers.items()
+                carriers[index].name: self.timed(path) if index in parametrised.moving else path
+                for index, path in parametrised.carriers.items()
             }
             base = GivenBase(kind="given", paths=paths)
-        wind = None if course.wind is None else (0.0, 0.0, 0.0)
+        wind = None if parametrised.wind is None else (0.0, 0.0, 0.0)
         return Task(name=name, path=self.path, base=base, margin=self.margin, wind=wind)
 
     def motion(self, times: np.ndarray) -> tuple[Motion, Motion]:
@@ -152,7 +152,7 @@ class Timing:
             If there is no law.
         """
         s, sd, sdd = self.path.law(np.asarray(times, dtype=float))
-        platform, carriers = self.course.at(s)
+        platform, carriers = self.parametrised.at(s)
         return platform.timed(sd, sdd), carriers.timed(sd, sdd)
 
     @cached_property
@@ -161,7 +161,7 @@ class Timing:
 
         Empty without a law.
         """
-        return bottlenecks(self.course, self.limits, self.margin, self.path) if self.feasible else []
+        return bottlenecks(self.parametrised, self.limits, self.margin, self.path) if self.feasible else []
 
     def summary(self) -> dict[str, Any]:
         """What `towline time --json` prints, ready for JSON; what does not exist is None."""
@@ -171,10 +171,10 @@ class Timing:
             "duration": self.duration,
             "margin": self.margin,
             "violation": self.violation,
-            "bottlenecks": [each.as_dict() for each in self.bottlenecks],
+            "bottlenecks": [each.to_dict() for each in self.bottlenecks],
             "at": self.at,
             "blocked": self.blocked.tolist(),
-            "certificate": None if self.certificate is None else self.certificate.as_dict(),
+            "certificate": None if self.certificate is None else self.certificate.to_dict(),
         }
 
     def save_task(self, file: str | os.PathLike[str], name: str = "timed") -> Path:
@@ -192,18 +192,18 @@ class Timing:
 
     def report(self) -> str:
         """What a person wants to know first, as text."""
-        head = f"{self.course.robot.name}: timing {self.status.value.upper()}"
+        head = f"{self.parametrised.robot.name}: timing {self.status.value.upper()}"
         if self.feasible:
             lines = [head, f"  {self.duration:.6g} s, audit: worst violation {self.violation:.3g} N"]
             lines += ["  What is at its limit, and for how long"]
-            return "\n".join(lines + [f"    {each.in_words()}" for each in self.bottlenecks])
+            return "\n".join(lines + [f"    {each.describe()}" for each in self.bottlenecks])
         told = [head, f"  at s = {self.at:.4g}"]
         if self.certificate is not None:
-            told += [f"  {line}" for line in self.certificate.in_words().splitlines()]
+            told += [f"  {line}" for line in self.certificate.describe().splitlines()]
         return "\n".join(told)
 
     def timed(self, path: Curve) -> TimedPath:
-        """A path of the course, the platform's or a carrier's, with the time law.
+        """A path of the parametrised, the platform's or a carrier's, with the time law.
 
         Raises
         ------
@@ -213,7 +213,7 @@ class Timing:
         if np.isnan(self.sd).any():
             raise InputError(f"timing: is {self.status.value} and has no motion; accepted: a feasible one")
         law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
-        return TimedPath(kind="timed", frame=path.frame, along=path, until=self.course.until(path), **law)
+        return TimedPath(kind="timed", frame=path.frame, along=path, until=self.parametrised.until(path), **law)
 
 
 def time_along(
@@ -297,8 +297,8 @@ def time_along(
     _check(robot, request)
     moving = {name: _curve(its, alone=False) for name, its in request.carriers.items()}
     still_air = None if request.wind is None else np.zeros(3)
-    course = Course(robot, _curve(request.path, alone=not moving), moving, request.until, still_air)
-    return _search(course, _limits(course, request), request.margin, request.grid)
+    parametrised = ParametrisedPath(robot, _curve(request.path, alone=not moving), moving, request.until, still_air)
+    return _search(parametrised, _limits(parametrised, request), request.margin, request.grid)
 
 
 class _Request(Part):
@@ -347,50 +347,50 @@ def _curve(path: AnyPath, *, alone: bool) -> Curve:
     return path
 
 
-def _limits(course: Course, request: _Request) -> PathLimits:
+def _limits(parametrised: ParametrisedPath, request: _Request) -> PathLimits:
     """The limits of the request and those of the mobile carriers that move."""
-    speed = {index: request.carrier_speed_max or np.inf for index in course.moving}
-    acceleration = {index: request.carrier_acceleration_max or np.inf for index in course.moving}
-    for index in course.moving:
-        carrier = course.robot.carriers[index]
+    speed = {index: request.carrier_speed_max or np.inf for index in parametrised.moving}
+    acceleration = {index: request.carrier_acceleration_max or np.inf for index in parametrised.moving}
+    for index in parametrised.moving:
+        carrier = parametrised.robot.carriers[index]
         if isinstance(carrier, MobileCarrier):
             speed[index] = min(speed[index], carrier.speed_max)
             acceleration[index] = min(acceleration[index], carrier.acceleration_max)
-    of_cables = np.full(course.robot.m, np.inf if request.cable_speed_max is None else request.cable_speed_max)
+    of_cables = np.full(parametrised.robot.m, np.inf if request.cable_speed_max is None else request.cable_speed_max)
     return PathLimits(request.speed_max or np.inf, of_cables, speed, acceleration)
 
 
-def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -> Timing:
+def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, intervals: int) -> Timing:
     """Solve, audit, and where the audit objects do so again on a finer grid or with more distance from the limits."""
     fastest, Rows = _toppra()
-    weight = course.robot.force_scale
+    weight = parametrised.robot.force_scale
     reserve, shrink, failures = RESERVE * weight, 0.0, 0
-    found = _without_law(TimingStatus.NOT_FOUND, course, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
+    found = _without_law(TimingStatus.NOT_FOUND, parametrised, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
     for _ in range(ATTEMPTS):
         s = np.linspace(0, 1, intervals + 1)
-        plane = phase_plane(course, limits, s, margin + reserve, shrink)
+        plane = phase_plane(parametrised, limits, s, margin + reserve, shrink)
         law = fastest(s, Rows(*plane.rows(weight), plane.x_max))
         if failures == 0 and (law.x is None or not plane.rests_at_ends(weight)):
-            proven = proofs(course, limits, s, margin)
+            proven = proofs(parametrised, limits, s, margin)
             if proven:
                 worst = max(proven, key=lambda proof: proof.certificate.shortfall)
                 told = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
                 blocked = np.array([proof.s for proof in proven])
-                return _without_law(TimingStatus.INFEASIBLE, course, limits, margin, s, blocked=blocked, **told)
+                return _without_law(TimingStatus.INFEASIBLE, parametrised, limits, margin, s, blocked=blocked, **told)
         if law.unlimited:
             raise InputError(
                 "time_along: nothing limits the speed along this path; accepted: a path on which the platform's "
                 "motion takes tension, or limits of speed"
             )
         if law.x is None:
-            found = _without_law(TimingStatus.NOT_FOUND, course, limits, margin, s, at=float(s[law.stuck or 0]))
+            found = _without_law(TimingStatus.NOT_FOUND, parametrised, limits, margin, s, at=float(s[law.stuck or 0]))
             failures += 1
             if failures > FINER_TRIES:
                 return found
             intervals = min(2 * intervals, MOST_INTERVALS)
             continue
         sd, sdd = np.sqrt(law.x), np.diff(law.x) / (2 * np.diff(s))
-        found = Timing(TimingStatus.FEASIBLE, course, limits, margin, s, sd, sdd)
+        found = Timing(TimingStatus.FEASIBLE, parametrised, limits, margin, s, sd, sdd)
         missing, excess, at = _audit(found, limits)
         if missing <= TOLERANCE and excess <= LIMIT_TOLERANCE:
             return replace(found, violation=missing)
@@ -403,14 +403,14 @@ def _search(course: Course, limits: PathLimits, margin: float, intervals: int) -
 
 
 def _without_law(
-    status: TimingStatus, course: Course, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
+    status: TimingStatus, parametrised: ParametrisedPath, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
 ) -> Timing:
-    return Timing(status, course, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
+    return Timing(status, parametrised, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
 
 
 def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
     """The largest missing wrench [N], the largest relative excess of another limit, and s of the worse of the two."""
-    course, robot, path = timing.course, timing.course.robot, timing.path
+    parametrised, robot, path = timing.parametrised, timing.parametrised.robot, timing.path
     duration = float(path.times[-1])
     if duration * AUDIT_RATE > MOST_SAMPLES:
         raise InputError(
@@ -419,19 +419,19 @@ def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
         )
     times = np.linspace(0, duration, max(int(np.ceil(duration * AUDIT_RATE)), LEAST_INTERVALS) + 1)
     s, sd, sdd = path.law(times)
-    by_s = course.at(s)
+    by_s = parametrised.at(s)
     platform, carriers = (motion.timed(sd, sdd) for motion in by_s)
     mask = robot.dof_mask
-    A = course.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
-    w = course.dynamics.required_wrench(*platform, wind=course.wind) * mask
+    A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
+    w = parametrised.dynamics.required_wrench(*platform, wind=parametrised.wind) * mask
     low, high = robot.t_min + timing.margin, robot.t_max - timing.margin
     batch = solve_batch(A, w, low, high, length=robot.length)
     missing = np.where(batch.feasible, batch.residual, np.inf)
     for k in np.flatnonzero(~batch.feasible):
-        proof = certify(masked_problem(course.dynamics, A[k], w[k], low, high))
+        proof = certify(wrench_problem(parametrised.robot, A[k], w[k], low, high))
         # Neither available nor proven not to be: so near to the boundary that rounding decides.
         missing[k] = 0.0 if proof is None else proof.shortfall
-    paces = [np.abs(sd) / course.speed_limit(*by_s, limits) - 1.0]
+    paces = [np.abs(sd) / parametrised.speed_limit(*by_s, limits) - 1.0]
     for index, most in limits.carrier_acceleration.items():
         paces.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most - 1.0)
     excess = np.max(paces, axis=0)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ...tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, INFEASIBLE, OPTIMAL, SLACK, UNSURE
 from .jit import jit
 from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..tolerances import FEASIBILITY, NEGLIGIBLE, ROUNDING
+from ...tolerances import FEASIBILITY, NEGLIGIBLE, ROUNDING
 from .codes import CLEAR
 from .jit import jit
 from .lanes import (

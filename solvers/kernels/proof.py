@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..tolerances import FEASIBILITY, NEGLIGIBLE, RANK, ROUNDING
+from ...tolerances import FEASIBILITY, NEGLIGIBLE, RANK, ROUNDING
 from .codes import CLEAR, INFEASIBLE, SINGULAR, UNSURE
 from .jit import jit
 

@@ -7,7 +7,7 @@ import math
 import numba
 import numpy as np
 
-from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ...tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, INFEASIBLE, INVALID, OPTIMAL, UNSURE
 from .jit import GIVEN, VECTOR, jit
 from .lanes import lane_size, prepare, report

@@ -24,7 +24,7 @@ import math
 import numba
 import numpy as np
 
-from ..tolerances import FEASIBILITY, ROUNDING
+from ...tolerances import FEASIBILITY, ROUNDING
 from .codes import INFEASIBLE, OPTIMAL, SINGULAR, SLACK, UNSURE
 from .dual_active_set import dual_active_set
 from .jit import GIVEN, VECTOR, jit

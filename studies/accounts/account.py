@@ -80,14 +80,14 @@ class Account:
         missing = [f"not computed: {', '.join(self.broken)}"] if self.broken else []
         return "; ".join([f"{len(self.claims)} claims: {', '.join(parts)}", *missing])
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """{"paper", "complete", "broken", "seconds", "claims"}, ready for JSON."""
         return {
             "paper": self.paper.name,
             "complete": self.complete,
             "broken": self.broken,
             "seconds": self.seconds,
-            "claims": [claim.as_dict() for claim in self.claims],
+            "claims": [claim.to_dict() for claim in self.claims],
         }
 
 

@@ -66,7 +66,7 @@ class Claim:
     unit: str = ""
     figure: str | None = None
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """All of it, ready for JSON."""
         return {
             "id": self.id,

@@ -28,7 +28,7 @@ def write(account: Account, folder: Path) -> list[Path]:
         f"{name}.md": text.report(account),
         f"{name}.html": page.page(account),
         f"{name}-errata.md": text.errata(account),
-        f"{name}.json": json.dumps(account.as_dict(), indent=2, allow_nan=False) + "\n",
+        f"{name}.json": json.dumps(account.to_dict(), indent=2, allow_nan=False) + "\n",
     }
     files = [_write(folder / file, text) for file, text in texts.items()]
     for chapter in account.chapters.values():

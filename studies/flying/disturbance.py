@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...figures.curve_in_space import curve_in_space
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
-from ...figures.way import way
 from ...models import Dynamics, load
 from ...ocp.tasks.path import Motion
 from ..accounts.account import Chapter
@@ -34,7 +34,7 @@ def chapter() -> Chapter:
     claims = [_motion(), _error(error, worse), _felt(error), _mobility(spans)]
     drawings = {
         "disturbance-flight": Drawing(
-            "Figure 12: the quadrotor's flight in {G}, assumed", way({"quadrotor": base.pose[:, :3]})
+            "Figure 12: the quadrotor's flight in {G}, assumed", curve_in_space({"quadrotor": base.pose[:, :3]})
         ),
         "disturbance": Drawing(
             "Figures 13 to 15: pitch, tension of cable 1 with and without D_B, and its relative error",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...figures.curve_in_space import curve_in_space
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
-from ...figures.way import way
 from ...models import Dynamics, load
 from ...ocp.tasks.path import LinePath, Motion
 from ...solvers import TensionProblem, solve
@@ -37,7 +37,7 @@ def chapter() -> Chapter:
     drawings = {
         "helix": Drawing(
             "Figure 6: the quadrotor's straight flight and the platform's helix in {G}",
-            way({"quadrotor": base.pose[:, :3], "platform": world.pose[:, :3]}),
+            curve_in_space({"quadrotor": base.pose[:, :3], "platform": world.pose[:, :3]}),
         ),
         "helix-arm": Drawing(
             "Figure 6, near: the platform's place from the quadrotor, along the axes of {G}",

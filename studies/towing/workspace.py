@@ -30,7 +30,7 @@ import numpy as np
 from ...models import Robot
 from ...models.robot import Box, MobileCarrier
 from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
-from ...workspace.hanging import hanging
+from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
 from .plans import DRIVES, Drive, robot
 
@@ -134,7 +134,7 @@ def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
         carriers[:, :, :3] = rng.uniform(*reach(system), carriers[:, :, :3].shape)
     angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
     if system.fixed_lengths is not None:
-        places = hanging(system, angles, carriers, system.fixed_lengths)
+        places = three_cable_pose(system, angles, carriers, system.fixed_lengths)
         return Places(np.concatenate([places, angles], axis=1), carriers)
     low, high = _box(system)
     return Places(np.concatenate([rng.uniform(low, high, (count, 3)), angles], axis=1), carriers)

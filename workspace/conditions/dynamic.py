@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
+from ...models.dynamics import dynamics_of
 from ...models.robot import Finite
-from ..balance import can_give, dynamics_of
+from ..balance import can_give
 from ..condition import Condition
 from ..places import Places
 

@@ -20,7 +20,8 @@ import numpy as np
 from ...errors import InputError
 from ...models import Robot
 from ...models.batch import call, compiled
-from ..balance import can_give, dynamics_of, rest_wrench
+from ...models.dynamics import dynamics_of
+from ..balance import can_give, rest_wrench
 from ..condition import Condition
 from ..places import Places
 

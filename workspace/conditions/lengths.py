@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from ...errors import InputError
 from ...models import Robot
+from ...models.dynamics import dynamics_of
 from ...models.robot import NonNegative, Positive
-from ..balance import dynamics_of
 from ..condition import Condition
 from ..places import Places
 

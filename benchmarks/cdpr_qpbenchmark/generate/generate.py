@@ -18,10 +18,9 @@ import qpbenchmark
 from qpbenchmark.problem_list import ProblemList
 
 from towline.benchmarks.qp_solver import as_qp
+from towline.distribution import pose_problem, wrench_problem
 from towline.models import Dynamics, available, load
 from towline.solvers import TensionProblem, certify, solve
-from towline.workspace import pose_problem
-from towline.workspace.pose import masked_problem
 
 DATA = Path(__file__).resolve().parent.parent / "data"
 
@@ -78,7 +77,7 @@ def degenerate(rng: np.random.Generator) -> Iterator[TensionProblem]:
             A = dynamics.wrench_matrix(_nearby(rng, dynamics)) * robot.dof_mask[:, None]
             direction = rng.normal(size=6) / np.repeat([1.0, robot.length], 3)
             corner = np.where(direction @ A > 0, robot.t_max, robot.t_min)
-            yield masked_problem(dynamics, A, A @ corner, robot.t_min, robot.t_max)
+            yield wrench_problem(dynamics.robot, A, A @ corner, robot.t_min, robot.t_max)
 
 
 def soft(rng: np.random.Generator) -> Iterator[TensionProblem]:
@@ -114,7 +113,7 @@ def _given(rng: np.random.Generator, name: str, offset: np.ndarray) -> TensionPr
     robot = dynamics.robot
     A = dynamics.wrench_matrix(robot.home + offset)
     tensions = robot.t_min + rng.uniform(0.02, 0.98, robot.m) * (robot.t_max - robot.t_min)
-    return masked_problem(dynamics, A, A @ tensions, robot.t_min, robot.t_max)
+    return wrench_problem(dynamics.robot, A, A @ tensions, robot.t_min, robot.t_max)
 
 
 def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
@@ -127,7 +126,7 @@ def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
     normal /= np.linalg.norm(normal)
     corner = np.where((scale * normal) @ A > 0, robot.t_max, robot.t_min)
     w = A @ corner + part * robot.t_max.max() * normal / np.where(scale > 0, scale, 1.0)
-    return masked_problem(dynamics, A, w, robot.t_min, robot.t_max)
+    return wrench_problem(dynamics.robot, A, w, robot.t_min, robot.t_max)
 
 
 SETS = {"STATIC": static_poses, "TRAJ": trajectories, "SINGULAR": near_singular, "DEGEN": degenerate, "SOFT": soft}

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def way(ways: Mapping[str, np.ndarray]) -> Figure:
+def curve_in_space(ways: Mapping[str, np.ndarray]) -> Figure:
     """Draw ways (n, 3) [m] under their names, one scale on all axes; a dot where each begins."""
     from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 

@@ -1,6 +1,6 @@
 """`plan`: from a robot and a task to a motion inside the tension limits, or to the reason why there is none.
 
-The planner climbs a ladder, and the first rung that knows the answer gives it:
+The planner climbs a ladder, and the first stage that knows the answer gives it:
 
 1. rest along the path (`rest_margin`): where a motion that the task fixes rests, no duration helps;
 2. durations (`durations`) and timing (`pace`), if the duration alone is free: which ones and which time laws can be;
@@ -21,7 +21,6 @@ from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
-from .pace import BOUND, fastest
 from .reports.finding import Relaxed
 from .rest_margin import rest_margin
 from .result import Plan, PlanStatus
@@ -30,6 +29,7 @@ from .start import deviation_from
 from .tasks.path import AnyPath
 from .tasks.scenario import Deviation, Scenario, lay_out
 from .tasks.task import Task, read_task
+from .time_law import BOUND, fastest
 from .timing.timing import Timing
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
@@ -75,7 +75,7 @@ def plan(
     Plan
         With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves it
         but its duration; or `not-found`, with the certificate at the worst time of the closest motion that was found,
-        or with the limits that it leaves. `Plan.rungs` tells how it came to that, `Plan.missing` what the motion
+        or with the limits that it leaves. `Plan.stages` tells how it came to that, `Plan.missing` what the motion
         lacks, `Plan.relaxed` a duration that would do.
 
     Raises
@@ -112,11 +112,11 @@ class Planner:
         """Plan; from `start`, else from the last solution, else from a guess."""
         search = Search(self.scenario, self._solvers, progress)
         guess = None if start is None else deviation_from(self.scenario, start)
-        return replace(_climb(search, guess), rungs=tuple(search.rungs))
+        return replace(_climb(search, guess), stages=tuple(search.stages))
 
 
 def _climb(search: Search, start: Deviation | None) -> Plan:
-    """One rung after the other."""
+    """One stage after the other."""
     scenario = search.scenario
     if scenario.is_fixed:
         return _fixed_motion(search)
@@ -153,7 +153,7 @@ def _fixed_motion(search: Search) -> Plan:
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
     """Which durations the path leaves; None: not known."""
-    with search.rung("durations") as verdict:
+    with search.stage("durations") as verdict:
         left = durations(scenario)
         verdict.told = _told(left)
     return left
@@ -185,9 +185,9 @@ def _told(left: Durations | None) -> str:
 
 def _rest_along_the_path(search: Search) -> Plan | None:
     """How far rest is from the tension limits; a proof if the motion rests at an end where nothing holds it."""
-    with search.rung("rest along the path") as verdict:
+    with search.stage("rest along the path") as verdict:
         margin = rest_margin(search.scenario)
-        verdict.told = margin.in_words()
+        verdict.told = margin.describe()
     span = search.scenario.duration_range
     if search.scenario.count or span is None or margin.margin[[0, -1]].min() >= 0:
         return None
@@ -208,7 +208,7 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
     own = left is None or left.leave(span.min, span.max)
     if own and scenario.task.objective.time is None:
         return None, own
-    with search.rung("timing") as verdict:
+    with search.stage("timing") as verdict:
         timing, verdict.told = fastest(scenario)
     if timing is None:
         return None, own

@@ -1,6 +1,6 @@
-"""What comes of some chunks of samples, computed wherever there is a processor: a `Job` in, a `Tally` out.
+"""What comes of some chunks of samples, computed wherever there is a processor: a `Job` in, a `Counts` out.
 
-A tally of the same samples is the same to the last bit whoever computes it, and one whose answers are known already
+A count of the same samples is the same to the last bit whoever computes it, and one whose answers are known already
 (from a checkpoint) is computed from them without asking the condition.
 """
 
@@ -62,7 +62,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Tally:
+class Counts:
     """What came of a job.
 
     Attributes
@@ -93,7 +93,7 @@ def cells_of_counts(domain: Domain) -> tuple[int, int, int]:
     return nx, ny, nz
 
 
-def tally(packed: bytes, job: Job) -> Tally:
+def count(packed: bytes, job: Job) -> Counts:
     """Work on a job, with one processor."""
     question = _question(packed)
     domain = question.domain
@@ -124,18 +124,18 @@ def tally(packed: bytes, job: Job) -> Tally:
             answers.append(np.packbits(held).tobytes())
     kept = np.vstack(samples) if samples else np.empty((0, width_of(domain)))
     marks = np.concatenate(flags) if flags else np.empty(0, dtype=bool)
-    return Tally(tuple(sizes), tuple(answers), low, high, counts.reshape(2, *cells), kept, marks)
+    return Counts(tuple(sizes), tuple(answers), low, high, counts.reshape(2, *cells), kept, marks)
 
 
 def width_of(domain: Domain) -> int:
     """How many numbers are kept of a sample: position, attitude if it varies, carriers' positions if they vary."""
-    return 3 + 3 * domain.turns + 3 * len(domain.robot.carriers) * domain.drives
+    return 3 + 3 * domain.attitude_varies + 3 * len(domain.robot.carriers) * domain.carriers_vary
 
 
 def _row(pose: np.ndarray, carriers: np.ndarray, domain: Domain) -> np.ndarray:
     """What is kept of each sample, (n, k)."""
-    parts = [pose if domain.turns else pose[:, :3]]
-    if domain.drives:
+    parts = [pose if domain.attitude_varies else pose[:, :3]]
+    if domain.carriers_vary:
         parts.append(carriers[:, :, :3].reshape(len(pose), 3 * carriers.shape[1]))
     return np.hstack(parts) if len(parts) > 1 else parts[0]
 

@@ -8,10 +8,10 @@ from ..models import Robot
 from .balance import anchors, attachments
 from .places import Places
 
-__all__ = ["hanging"]
+__all__ = ["three_cable_pose"]
 
 
-def hanging(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Positions of a platform on three cables of given lengths at given attitudes.
 
     |A_i - P - R b_i| = l_i: P lies on spheres about A_i - R b_i with the radii l_i. Of the two points that three

@@ -1,13 +1,13 @@
-"""`Rung`: one step of the planner's ladder, what it said and how long it took."""
+"""`Stage`: one step of the planner's ladder, what it said and how long it took."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Rung"]
+__all__ = ["Stage"]
 
 
-class Rung(NamedTuple):
+class Stage(NamedTuple):
     """One step of the ladder.
 
     Attributes

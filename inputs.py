@@ -4,7 +4,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..errors import InputError
+from .errors import InputError
 
 __all__ = ["number", "required", "shown", "whole_number"]
 

@@ -20,13 +20,13 @@ from ..models import Robot
 from ..writing import save_netcdf, whole_folder
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
+from .counts import Job, Question
 from .domain import Domain
 from .execution import Run, executor
 from .outcome import Outcome
 from .refinement import Refinement
 from .region import Region
 from .sampling import CHUNK, Sampler, check_sampling, whole
-from .tally import Job, Question
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -250,9 +250,9 @@ class _Work:
     def _answers(self, jobs: Iterator[Job], first: int) -> Iterator[np.ndarray]:
         """Flags (n,) of the samples, chunk after chunk."""
         chunk = first
-        for tally in self._run(jobs):
-            self._outcome.add(tally)
-            for size, answer in zip(tally.sizes, tally.answers, strict=True):
+        for count in self._run(jobs):
+            self._outcome.add(count)
+            for size, answer in zip(count.sizes, count.answers, strict=True):
                 if self._checkpoint:
                     self._checkpoint.append(chunk, size, answer)
                 chunk += 1

@@ -58,7 +58,7 @@ class Wrench(NamedTuple):
     c: np.ndarray
 
 
-class Course:
+class ParametrisedPath:
     """A robot, the path of its platform, and those of its carriers, by one s from 0 to 1.
 
     Parameters

@@ -1,4 +1,4 @@
-"""The fastest time law along a task's path, as a rung of planning: `fastest`.
+"""The fastest time law along a task's path, as a stage of planning: `fastest`.
 
 Where the path is followed exactly from rest to rest, `time_along` knows the least time of all time laws: what is
 shorter cannot be, and its law is a plan if it keeps the task's other limits too. Its minimum is that of a grid: it
