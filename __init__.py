@@ -1,8 +1,71 @@
 """Optimal control and tension distribution of cable robots.
 
-The rooms, from the ground up: `towline.models` (robots and their mechanics), `towline.solvers` (tension distribution on
-plain arrays), `towline.figures` (matplotlib), `towline.ocp` (planning), `towline.studies` (the papers), `towline.cli`.
-Nothing is imported here, so that `import towline` costs nothing.
+`import towline` costs nothing: each name below loads its package when it is first used (PEP 562). Packages, from the
+ground up: `towline.models` (robots and their mechanics), `towline.solvers` (tension distribution on plain arrays),
+`towline.figures` (matplotlib), `towline.distribution` (one instant of a robot as a tension problem),
+`towline.workspace` (reachable poses), `towline.ocp` (planning), `towline.studies` (the papers), `towline.cli`.
 """
 
-__version__ = "0.1.0"
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .distribution import tensions
+    from .errors import InputError, SolverError, TowlineError
+    from .models import Dynamics, Robot, available, load
+    from .ocp import Plan, Planner, Task, Timing, plan, read_task, time_along
+    from .solvers import Certificate, TensionProblem, TensionSolution, methods, solve, solve_batch
+    from .workspace import sample
+
+__version__ = "0.2.0"
+
+_HOMES = {
+    "models": ("Dynamics", "Robot", "available", "load"),
+    "solvers": ("Certificate", "TensionProblem", "TensionSolution", "methods", "solve", "solve_batch"),
+    "distribution": ("tensions",),
+    "ocp": ("Plan", "Planner", "Task", "Timing", "plan", "read_task", "time_along"),
+    "workspace": ("sample",),
+    "errors": ("InputError", "SolverError", "TowlineError"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Certificate",
+    "Dynamics",
+    "InputError",
+    "Plan",
+    "Planner",
+    "Robot",
+    "SolverError",
+    "Task",
+    "TensionProblem",
+    "TensionSolution",
+    "Timing",
+    "TowlineError",
+    "available",
+    "load",
+    "methods",
+    "plan",
+    "read_task",
+    "sample",
+    "solve",
+    "solve_batch",
+    "tensions",
+    "time_along",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name, or a package, when it is first used."""
+    if name in _HOME:
+        value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+        globals()[name] = value
+        return value
+    if name in _HOMES:
+        return import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted({*globals(), *_HOME, *_HOMES})

@@ -12,7 +12,7 @@ from .method import Method, Proposal
 from .problem import TensionProblem
 from .rate import limit_rate
 from .registry import methods, solve
-from .sensitivity import sensitivity
+from .derivatives import sensitivity
 from .solution import Status, TensionSolution
 from .standard_form import StandardForm
 

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..inputs import shown, whole_number
 from .problem import TensionProblem
 from .registry import solve
-from .sensitivity import derivatives
+from .derivatives import derivatives
 
 if TYPE_CHECKING:
     import casadi

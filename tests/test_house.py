@@ -92,3 +92,18 @@ def test_importing_is_cheap():
     for statement in ("import towline", "import towline.models", "import towline.solvers", "import towline.cli.main"):
         assert not heavy & imported_by(statement), statement
     assert "casadi" not in imported_by("import towline.cli.main")
+
+
+def test_no_name_hides_a_module():
+    """`towline.ocp.timing` is the package of that name, not something that `towline.ocp` happens to export."""
+    import importlib
+    import types
+
+    for package in CONFIGURATION["tool"]["setuptools"]["packages"]:
+        module = importlib.import_module(package)
+        folder = ROOT.joinpath(*package.split(".")[1:])
+        names = {path.stem for path in folder.glob("*.py")} | {
+            path.parent.name for path in folder.glob("*/__init__.py")
+        }
+        for name in names - {"__init__"}:
+            assert isinstance(getattr(module, name, module), types.ModuleType), f"{package}.{name} hides the module"

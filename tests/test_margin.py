@@ -6,7 +6,7 @@ import pytest
 
 from towline.errors import InputError
 from towline.solvers import TensionProblem, capacity_margin, casadi_function, sensitivity, solve
-from towline.solvers.sensitivity import derivatives
+from towline.solvers.derivatives import derivatives
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_infeasible
 from .references import distance_to_available
