@@ -1,0 +1,66 @@
+"""Numbers that people read."""
+
+import math
+
+import numpy as np
+import pytest
+
+from towline.text import column, quantity, quantity_range, quantity_row
+
+WRITTEN = [
+    (10337.2, "10 340"),
+    (1034.0, "1034"),
+    (9999.9, "10 000"),
+    (1_234_567.0, "1 235 000"),
+    (0.734112, "0.7341"),
+    (2.0, "2"),
+    (-12.50, "-12.5"),
+    (0.001, "0.001"),
+    (0.00123456, "0.001235"),
+    (0.0009999999, "0.001"),
+    (1.23e-5, "1.23e-5"),
+    (1.2e7, "1.2e7"),
+    (9_999_999.0, "1e7"),
+    (-1e-17, "0"),
+    (-0.0, "0"),
+    (100.0, "100"),
+    (math.nan, "-"),
+    (None, "-"),
+    (math.inf, "inf"),
+    (-math.inf, "-inf"),
+    (12_345_678, "12 345 678"),
+    (7, "7"),
+    (np.float32(0.5), "0.5"),
+    (np.int64(20000), "20 000"),
+    (np.array(3.25), "3.25"),
+]
+
+
+@pytest.mark.parametrize(("value", "text"), WRITTEN)
+def test_a_quantity_is_plain(value, text):
+    assert quantity(value) == text
+    assert quantity(value, "N") == (text if text == "-" else f"{text} N")
+
+
+def test_no_exponent_and_no_signed_zero_where_none_is_needed():
+    rng = np.random.default_rng(0)
+    values = rng.choice([-1, 1], 2000) * 10 ** rng.uniform(-3, 6.999, 2000)
+    for value in values:
+        text = quantity(value)
+        assert "e" not in text
+        assert float(text.replace(" ", "")) == pytest.approx(value, rel=5.1e-4)
+        assert all(float(cell.replace(" ", "")) != 0 or cell[0] != "-" for cell in column([value, -1e-5, -1e-9]))
+
+
+def test_rows_and_ranges_have_their_unit_once():
+    assert quantity_row([1, 2.5, 10337.2], "N") == "1, 2.5, 10 340 N"
+    assert quantity_row([], "N") == ""
+    assert quantity_range(np.array([30.0, 2.0, math.nan]), "N") == "2 to 30 N"
+    assert quantity_range([5.0, 5.0 + 1e-9], "N") == "5 N"
+    assert quantity_range([None, math.nan], "N") == "-"
+
+
+def test_a_column_has_equally_many_decimals():
+    assert column([1.0, 20.125, -1e-9]) == ["1.00", "20.12", "0.00"]
+    assert column([12345.6, 1.0, None, math.inf]) == ["12 346", "1", "-", "inf"]
+    assert column([0.0, 0.0]) == ["0", "0"]
