@@ -20,7 +20,7 @@ import numpy as np
 from ..distribution import wrench_problem
 from ..errors import TowlineError
 from ..models import Dynamics, Robot, load
-from ..ocp import Plan, PlanStatus, Task, plan
+from ..ocp import MotionStatus, Plan, Task, plan
 from ..solvers import solve
 
 ROBOTS = ("wang-flying", "wang-ctmrts-6", "ipanema-1", "cogiro", "planar-4", "wang-flying-quadrotor")
@@ -32,7 +32,7 @@ class Outcome(NamedTuple):
 
     seed: int
     robot: str
-    told: str  # a `PlanStatus`, or "wrong: ..." with why
+    told: str  # a `MotionStatus`, or "wrong: ..." with why
     seconds: float
 
 
@@ -47,14 +47,14 @@ def main() -> None:
     outcomes = []
     for seed in range(options.start, options.start + options.count):
         outcomes.append(attempt(seed))
-        if outcomes[-1].told not in (PlanStatus.FEASIBLE, PlanStatus.INFEASIBLE):
+        if outcomes[-1].told not in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE):
             print(f"seed {seed}, {outcomes[-1].robot}: {outcomes[-1].told}", flush=True)
     counts = Counter(outcome.told.split(":")[0] for outcome in outcomes)
     times = [outcome.seconds for outcome in outcomes]
     slowest = max(outcomes, key=lambda outcome: outcome.seconds)
     longest = f"longest {slowest.seconds:.1f} s (seed {slowest.seed}, {slowest.robot})"
     print(f"{dict(counts)}; median {np.median(times):.2f} s, {longest}")
-    sys.exit(counts["wrong"] > 0 or counts[PlanStatus.NOT_FOUND] > MOST_NOT_FOUND * len(outcomes))
+    sys.exit(counts["wrong"] > 0 or counts[MotionStatus.NOT_FOUND] > MOST_NOT_FOUND * len(outcomes))
 
 
 def attempt(seed: int) -> Outcome:
@@ -73,7 +73,7 @@ def wrong(found: Plan) -> str:
     """Return what a plan says of itself that is not so; empty if nothing."""
     audit, robot = found.audit, found.scenario.robot
     low, high = robot.t_min, robot.t_max
-    if found.status is PlanStatus.FEASIBLE:
+    if found.status is MotionStatus.FEASIBLE:
         tensions = audit.tensions
         if not ((tensions >= low) & (tensions <= high)).all():
             return "wrong: feasible, but a tension is beyond its limits"
@@ -83,7 +83,7 @@ def wrong(found: Plan) -> str:
         if np.linalg.norm(missing, axis=1).max() > max(audit.tolerance, 1e-6):
             return "wrong: feasible, but the tensions do not give the force"
         return "" if not audit.excess else "wrong: feasible, but a limit is left"
-    if found.status is PlanStatus.INFEASIBLE and not audit.excess:
+    if found.status is MotionStatus.INFEASIBLE and not audit.excess:
         certificate, at = audit.certificate, audit.certificate_time
         if certificate is None or at is None:
             return "wrong: infeasible, but nothing proves it"

@@ -1,13 +1,14 @@
 """Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; timing."""
 
 from .planner import Planner, plan
-from .result import Plan, PlanStatus
+from .result import Plan
+from .status import MotionStatus
 from .tasks.task import Task, read_task
 from .timing.timing import Timing, TimingStatus, time_along
 
 __all__ = [
+    "MotionStatus",
     "Plan",
-    "PlanStatus",
     "Planner",
     "Task",
     "Timing",

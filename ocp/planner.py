@@ -23,9 +23,10 @@ from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
 from .reports.finding import Relaxed
 from .rest_margin import rest_margin
-from .result import Plan, PlanStatus
+from .result import Plan
 from .search import Search
 from .start import deviation_from
+from .status import MotionStatus
 from .tasks.path import AnyPath
 from .tasks.scenario import Deviation, Scenario, lay_out
 from .tasks.task import Task, read_task
@@ -141,12 +142,12 @@ def _fixed_motion(search: Search) -> Plan:
     start = time.perf_counter()
     seen = search.audit_motion(search.scenario, None)
     spent = time.perf_counter() - start
-    status = PlanStatus.FEASIBLE if seen.passed else PlanStatus.INFEASIBLE
+    status = MotionStatus.FEASIBLE if seen.passed else MotionStatus.INFEASIBLE
     if not seen.passed and tensions_may_mend(search.scenario, seen):
         chosen = _free_motion(search, None)
         if chosen.feasible:
             return chosen
-        status = PlanStatus.NOT_FOUND
+        status = MotionStatus.NOT_FOUND
     relaxed = None if seen.passed else _longer(search, search.scenario, _durations(search, search.scenario))
     return Plan(search.scenario, status, None, seen, build_s=0.0, solve_s=spent, relaxed=relaxed)
 
@@ -171,7 +172,7 @@ def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relax
     seen = search.audit_motion(longer, None, f"audit of {near:.4g} s")
     if not seen.passed:
         return None
-    return Relaxed("duration", "s", asked, near, Plan(longer, PlanStatus.FEASIBLE, None, seen, 0.0, 0.0))
+    return Relaxed("duration", "s", asked, near, Plan(longer, MotionStatus.FEASIBLE, None, seen, 0.0, 0.0))
 
 
 def _told(left: Durations | None) -> str:
@@ -193,7 +194,7 @@ def _rest_along_the_path(search: Search) -> Plan | None:
         return None
     slowest = search.scenario.lasting(span.max)
     proven = at_rest(slowest, search.audit_motion(slowest, None, f"audit of {span.max:.4g} s"))
-    return None if proven is None else Plan(slowest, PlanStatus.INFEASIBLE, None, proven, 0.0, 0.0)
+    return None if proven is None else Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
 def _pace(search: Search) -> tuple[Plan | None, bool]:
@@ -215,7 +216,7 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
     if timing.duration is not None and span.min <= timing.duration <= span.max:
         chosen = scenario.along(timing.path, timing.duration)
         seen = search.audit_motion(chosen, None, "audit of that")
-        return (Plan(chosen, PlanStatus.FEASIBLE, None, seen, 0.0, 0.0) if seen.passed else None), own
+        return (Plan(chosen, MotionStatus.FEASIBLE, None, seen, 0.0, 0.0) if seen.passed else None), own
     too_slow = timing.duration is not None and BOUND * timing.duration > span.max
     if own or not (too_slow or timing.certificate is not None):
         return None, own
@@ -225,7 +226,7 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
     if seen.passed:
         return None, True
     relaxed = _longer(search, slowest, left)
-    return Plan(slowest, PlanStatus.INFEASIBLE, None, seen, 0.0, 0.0, relaxed=relaxed), own
+    return Plan(slowest, MotionStatus.INFEASIBLE, None, seen, 0.0, 0.0, relaxed=relaxed), own
 
 
 def _coarse(search: Search) -> Deviation | None:
@@ -266,10 +267,10 @@ def _refined(search: Search, outcome: Outcome, seen: Audit) -> Plan:
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
         outcome = search.solve("program", mesh, outcome.deviation)
         seen = search.audit(outcome)
-    return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, outcome, seen)
+    return search.plan(MotionStatus.FEASIBLE if seen.passed else MotionStatus.NOT_FOUND, outcome, seen)
 
 
 def _closest(search: Search, closest: Outcome) -> Plan:
     """What the elastic program says: all is well after all, or none was found."""
     seen = search.audit(closest)
-    return search.plan(PlanStatus.FEASIBLE if seen.passed else PlanStatus.NOT_FOUND, closest, seen)
+    return search.plan(MotionStatus.FEASIBLE if seen.passed else MotionStatus.NOT_FOUND, closest, seen)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..figures import animation, style
 from ..writing import save_netcdf, whole_file
 from .reports.drawings import drawings
-from .reports.finding import Finding, PlanStatus
+from .reports.finding import Finding
 from .reports.report import as_text
 from .reports.report_page import page
 from .reports.scene import scene
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Plan", "PlanStatus"]
+__all__ = ["Plan"]
 
 
 class Plan(Finding):

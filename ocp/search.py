@@ -10,9 +10,9 @@ from .audits.audit import Audit, audit
 from .nlp.program import build
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
-from .reports.finding import PlanStatus
 from .reports.stage import Stage
 from .result import Plan
+from .status import MotionStatus
 from .tasks.scenario import Deviation, Scenario
 
 __all__ = ["Search"]
@@ -76,7 +76,7 @@ class Search:
                 verdict.told += f", short by {outcome.slack:.3g} N"
         return outcome
 
-    def plan(self, status: PlanStatus, outcome: Outcome, seen: Audit) -> Plan:
+    def plan(self, status: MotionStatus, outcome: Outcome, seen: Audit) -> Plan:
         """What came of a program."""
         told = (outcome.iterations, outcome.message)
         scenario = self.scenario.lasting(outcome.duration)

@@ -11,7 +11,7 @@ from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.models.statics import equilibria
-from towline.ocp import PlanStatus, Task, plan, read_task
+from towline.ocp import MotionStatus, Task, plan, read_task
 from towline.ocp.audits.audit import audit
 from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
 from towline.ocp.tasks.scenario import Deviation, lay_out
@@ -94,7 +94,7 @@ def circle_free():
 def test_hovering_circle_is_infeasible_with_a_certificate():
     robot = load("wang-flying")
     found = plan(robot, {"path": CIRCLE, "base": {"kind": "hold", "poses": {"quad": HOVER}}})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     assert found.tension_min is None
     certificate = found.certificate
     angle = 0.2 * np.pi * certificate["time"]
@@ -193,7 +193,7 @@ def test_resting_mobile_robots_cannot_hold_the_load_level():
     """Three cables and six equations: with the robot-ends fixed the wrench is outside the range of A."""
     robot = load("wang-ctmrts")
     found = plan(robot, {"path": {"kind": "rest", "pose": list(robot.home)}, "duration": 1, "steps": 10})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     assert found.certificate["binding"] == []
 
 
@@ -205,7 +205,7 @@ def test_a_load_too_heavy_for_three_cables_is_not_feasible():
     robot = Robot.model_validate(data)
     rest = equilibria(robot, np.full(3, 1.25))[0].pose + np.array([0, 0, 1e-6, 0, 0, 0])
     found = plan(robot, {"path": {"kind": "rest", "pose": list(rest)}, "duration": 0.1})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     assert found.audit.summary()["worst_violation"] > 30
     assert found.certificate["shortfall"] > 30
     assert found.certificate["binding"] == [0, 1, 2]
@@ -255,7 +255,7 @@ def test_tilting_base_in_the_carriers_frame_stays_inside_its_tilt():
 def test_no_plan_is_told_with_the_worst_time_of_the_closest_motion():
     robot = load("wang-flying")
     found = plan(robot, {"path": CIRCLE, "base": {**FREE, "ends": "exact"}, "steps": 40})  # starts 1 m beside it
-    assert found.status is PlanStatus.NOT_FOUND
+    assert found.status is MotionStatus.NOT_FOUND
     motion, carriers = found.scenario.motion(np.array([found.certificate["time"]]), found.deviation)
     dynamics = Dynamics(robot)
     A = dynamics.wrench_matrix(motion.pose, carriers.pose)[0]
@@ -470,7 +470,7 @@ def test_audit_sees_between_the_nodes():
     outside = 0.9
     points = [[0, 0, -1]] + [[x, 0, -1] for x in (outside, 0, outside, 0, outside, 0, outside, 0)]
     task = {"path": {"kind": "waypoints", "points": points, "times": list(range(9))}, "steps": 4}
-    assert plan(robot, task).status is PlanStatus.INFEASIBLE
+    assert plan(robot, task).status is MotionStatus.INFEASIBLE
 
 
 def test_audit_sees_carriers_out_of_their_limits(circle_free):

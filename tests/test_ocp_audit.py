@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from towline.errors import InputError
 from towline.models import Dynamics, load
-from towline.ocp import PlanStatus, plan
+from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
 from towline.ocp.tasks.scenario import Deviation, lay_out
@@ -205,7 +205,7 @@ ACROSS = {"kind": "line", "start": [-0.3, 0, 0.6], "end": [0.3, 0, 0.9]}
 def test_a_motion_of_milliseconds_is_looked_at_inside_too(seconds):
     """At its ends and in its middle this line accelerates nowhere; between them it asks for what no cable gives."""
     found = plan(load("planar-4"), {"path": ACROSS, "duration": seconds})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     way = np.linalg.norm(np.subtract(ACROSS["end"], ACROSS["start"]))
     s = np.linspace(0, 1, 10_001)
     most = (420 * s**2 * (1 - s) ** 2 * np.abs(1 - 2 * s)).max() * way / seconds**2
@@ -242,7 +242,7 @@ def test_tensions_that_change_too_fast_prove_nothing_where_others_do_not():
     # The motion itself is still the task's, and what no choice keeps is not called proven.
     assert found.tracking_error_max == 0
     too_slow = plan(robot, task.model_copy(update={"limits": TaskLimits(tension_rate=0.5 * rate)}))
-    assert too_slow.status is PlanStatus.NOT_FOUND
+    assert too_slow.status is MotionStatus.NOT_FOUND
     assert [excess.limit for excess in too_slow.audit.excess] == ["tension_rate"]
 
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from towline.distribution import pose_problem
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
-from towline.ocp import Planner, PlanStatus, plan, time_along
+from towline.ocp import MotionStatus, Planner, plan, time_along
 from towline.ocp.cost import cost
 from towline.ocp.durations import durations
 from towline.ocp.rest_margin import rest_margin
@@ -97,7 +97,7 @@ def test_rest_margin_is_that_of_each_pose():
 def test_what_cannot_rest_at_its_end_is_infeasible_at_once():
     path = {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}
     found = plan(load("wang-flying"), {"path": path, "duration": {"min": 1, "max": 4}})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     assert found.certificate["time"] == pytest.approx(4.0)
     assert not any("program" in name for name in names(found))
     assert found.iterations == 0
@@ -111,7 +111,7 @@ def test_a_motion_that_is_too_fast_tells_a_duration_that_would_do():
     peak = largest_acceleration(np.linspace(0, 1, 100_001)).max()
     shortest = np.sqrt(peak / GRAVITY)
     found = plan(robot, {"path": LIFT, "duration": 0.5 * shortest})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     assert found.relaxed.name == "duration"
     assert found.relaxed.possible == pytest.approx(shortest, rel=5e-3)
     assert found.relaxed.plan.feasible
@@ -167,7 +167,7 @@ class TestTiming:
         robot = hoist(2.0)
         fastest_of_all = np.sqrt(4 / GRAVITY)
         found = plan(robot, {"path": LIFT, "duration": {"min": 0.1, "max": 0.95 * fastest_of_all}})
-        assert found.status is PlanStatus.INFEASIBLE
+        assert found.status is MotionStatus.INFEASIBLE
         assert found.certificate is not None
         assert not any("program" in name for name in names(found))
         assert found.scenario.duration == pytest.approx(0.95 * fastest_of_all)

@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
-from towline.ocp import PlanStatus, plan
+from towline.ocp import MotionStatus, plan
 from towline.ocp.tasks.scenario import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.wind_set import WindBox, decisive_winds_at, inner_winds
@@ -91,7 +91,7 @@ def test_what_still_air_allows_a_box_forbids_at_its_worst_wind():
     robot = load("wang-flying")
     assert plan(robot, {"path": CIRCLE, "wind": [0, 0, 0]}).feasible
     found = plan(robot, {"path": CIRCLE, "wind": {"min": [-6, -1, 0], "max": [0, 1, 0]}})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     assert np.isfinite(found.audit.tensions).all()  # of the box's middle, (-3, 0, 0)
     wind, certificate, seen = found.audit.certificate_wind, found.certificate, found.audit
     assert wind[0] == -6
@@ -172,7 +172,7 @@ def test_a_box_that_nothing_holds_is_told_with_the_closest_motion():
     task = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1, "steps": 10}
     tube = {"tube": {"position": 0.01}}
     found = plan(robot, {**task, **tube, "wind": {"min": [-15, 0, 0], "max": [15, 0, 0]}})
-    assert found.status is PlanStatus.NOT_FOUND
+    assert found.status is MotionStatus.NOT_FOUND
     assert abs(found.audit.certificate_wind[0]) == 15
     assert found.certificate["shortfall"] > 1
     # The least that is missed in a mean over winds and nodes is near the largest that rest amid them misses.

@@ -18,7 +18,7 @@ from towline.errors import InputError, TowlineError
 from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
 from towline.models import Dynamics, load
-from towline.ocp import PlanStatus, plan
+from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.excess import Excess
 from towline.ocp.reports.report import describe_direction, missing, sections, verdict
 from towline.ocp.reports.scene import outline, scene
@@ -42,7 +42,7 @@ def free():
 @pytest.fixture(scope="module")
 def impossible():
     found = plan(load("wang-flying"), {"name": "sideways", "path": SIDEWAYS, "duration": 1, "margin": 0.1})
-    assert found.status is PlanStatus.INFEASIBLE
+    assert found.status is MotionStatus.INFEASIBLE
     return found
 
 
@@ -112,7 +112,7 @@ def test_report_of_an_infeasible_plan_tells_the_certificate(impossible):
 
 
 def test_report_of_a_plan_that_was_not_found_does_not_claim_a_proof(impossible):
-    lost = replace(impossible, status=PlanStatus.NOT_FOUND)
+    lost = replace(impossible, status=MotionStatus.NOT_FOUND)
     lost = replace(lost, audit=replace(lost.audit, excess=[FAST]))
     assert "NOT-FOUND" in verdict(lost)
     assert "1 other limit broken" in verdict(lost)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
@@ -11,27 +10,11 @@ import numpy as np
 
 from ..audits.audit import Audit
 from ..audits.missing import Missing, missing
+from ..status import MotionStatus
 from ..tasks.scenario import Deviation, Scenario
 from .stage import Stage
 
-__all__ = ["Finding", "PlanStatus", "Relaxed"]
-
-
-class PlanStatus(StrEnum):
-    """What a plan is; its values are plain strings."""
-
-    FEASIBLE = "feasible"
-    """The audit saw no violation anywhere."""
-
-    INFEASIBLE = "infeasible"
-    """The task fixes the motion, and it cannot be: at some time no tensions give the wrench that it needs, proven by
-    the certificate, or it leaves a carrier's or drive's limits, told by the audit's `excess`. Or the task leaves the
-    duration open, and no duration and time law that it leaves will do: then the certificate is that of the slowest
-    motion, and `stages` tell what excludes the others."""
-
-    NOT_FOUND = "not-found"
-    """The planner found no motion without violation. The certificate and the `excess` are those of the closest motion
-    that it found, and prove no more."""
+__all__ = ["Finding", "Relaxed"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +26,7 @@ class Finding:
     scenario
         The robot and the task, laid out.
     status
-        See `PlanStatus`.
+        See `MotionStatus`.
     deviation
         What was chosen: the free coordinates and tensions at the nodes; None if the task fixes the motion.
     audit
@@ -62,7 +45,7 @@ class Finding:
     """
 
     scenario: Scenario
-    status: PlanStatus
+    status: MotionStatus
     deviation: Deviation | None
     audit: Audit
     build_s: float
@@ -76,7 +59,7 @@ class Finding:
     @property
     def feasible(self) -> bool:
         """Whether the audit saw every tension inside its limits, and all else that the task and the robot limit too."""
-        return self.status is PlanStatus.FEASIBLE
+        return self.status is MotionStatus.FEASIBLE
 
     @property
     def tension_min(self) -> float | None:

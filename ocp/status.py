@@ -1,0 +1,22 @@
+"""`MotionStatus`: the words for what a planned or timed motion is."""
+
+from enum import StrEnum
+
+__all__ = ["MotionStatus"]
+
+
+class MotionStatus(StrEnum):
+    """The status of a plan or of a timing; the values are plain strings."""
+
+    FEASIBLE = "feasible"
+    """The motion keeps every limit; of a plan, the audit confirms it on its dense grid."""
+
+    INFEASIBLE = "infeasible"
+    """No motion that the task allows is possible, and that is proven: by the certificate of an instant at which no
+    tensions give the required wrench, or by the limits that a fixed motion exceeds (`Audit.excess`). If the task leaves
+    the duration open, no duration and no time law that it allows are possible; the certificate is then that of the
+    slowest motion, and `Plan.stages` state what excludes the others."""
+
+    NOT_FOUND = "not-found"
+    """No motion without violation was found, and none is proven impossible. Certificate and `excess` are those of the
+    closest motion that was found."""
