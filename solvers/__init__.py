@@ -7,12 +7,12 @@ Plain NumPy arrays in and out; this room knows no robot. State a `TensionProblem
 from .batch import BatchSolution, solve_batch
 from .casadi_form import casadi_function
 from .certificate import Certificate, certify
+from .derivatives import sensitivity
 from .margin import Margin, capacity_margin
 from .method import Method, Proposal
 from .problem import TensionProblem
 from .rate import limit_rate
 from .registry import methods, solve
-from .derivatives import sensitivity
 from .solution import Status, TensionSolution
 from .standard_form import StandardForm
 

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..inputs import shown, whole_number
+from .derivatives import derivatives
 from .problem import TensionProblem
 from .registry import solve
-from .derivatives import derivatives
 
 if TYPE_CHECKING:
     import casadi
