@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import film, style
+from .hull import faces
 from .plan import equal_scales, name_axes
 from .robot import box_edges
 
@@ -231,9 +232,8 @@ class _Body:
         (self._dots,) = ax.plot(*points.T, "o", color=edge, markersize=3.5, animated=True)
         self.artists: list[Any] = [self._dots]
         if self._faces:
-            outline = edge if len(self._faces) == 1 else "none"  # triangles of one face would show their diagonals
             corners = [points[face_of] for face_of in self._faces]
-            self._hull = Poly3DCollection(corners, facecolor=face, edgecolor=outline, alpha=0.6, animated=True)
+            self._hull = Poly3DCollection(corners, facecolor=face, edgecolor=edge, alpha=0.6, animated=True)
             self.artists.insert(0, ax.add_collection3d(self._hull))
 
     def set_points(self, points: np.ndarray) -> None:
@@ -252,20 +252,6 @@ def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndar
         if (points.max(axis=0) > low).all() and (points.min(axis=0) < high).all():
             found += [np.clip(line, low, high) for line in lines]
     return found
-
-
-def faces(points: np.ndarray) -> list[np.ndarray]:
-    """Indices of the corners of each face of the hull of `points` (k, 3); none if they lie on a line."""
-    from scipy.spatial import ConvexHull
-
-    arms = points - points.mean(axis=0)
-    _, sizes, axes = np.linalg.svd(arms)
-    rank = int((sizes > 1e-6 * max(float(sizes[0]), 1e-9)).sum())
-    if rank < 2:
-        return []
-    if rank == 2:
-        return [ConvexHull(arms @ axes[:2].T).vertices]
-    return list(ConvexHull(points).simplices)
 
 
 def _tension_colours(scene: Scene) -> tuple[Colormap, Normalize]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import style
+from .hull import faces
 from .plan import equal_scales, name_axes
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def draw(sketch: RobotSketch) -> Figure:
         ax.plot(*np.stack([anchor, attachment]).T, color=shade, linewidth=1.2)
     ax.scatter(*sketch.anchors.T, s=12, color="#000000", label="anchors")
     ax.scatter(*sketch.com, s=24, color=style.colour(1), label="CoM")
-    ax.add_collection3d(_platform(sketch.attachments))
+    _draw_platform(ax, sketch.attachments)
     for low, high in sketch.boxes:
         for edge in box_edges(low, high):
             ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
@@ -79,15 +80,16 @@ def draw(sketch: RobotSketch) -> Figure:
     return canvas
 
 
-def _platform(attachments: np.ndarray) -> Any:
-    """The attachments' hull as a filled shape, its corners in order of angle about their centre."""
+def _draw_platform(ax: Any, attachments: np.ndarray) -> None:
+    """Draw the convex hull of the attachments: a body, a plate, or a line."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    centre = attachments.mean(axis=0)
-    _, _, axes = np.linalg.svd(attachments - centre)
-    flat = (attachments - centre) @ axes[:2].T
-    order = np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))
-    return Poly3DCollection([attachments[order]], facecolor=style.colour(4), edgecolor=style.colour(0), alpha=0.5)
+    corners = [attachments[face] for face in faces(attachments)]
+    if corners:
+        body = Poly3DCollection(corners, facecolor=style.colour(4), edgecolor=style.colour(0), alpha=0.5)
+        ax.add_collection3d(body)
+    else:
+        ax.plot(*attachments.T, color=style.colour(4), linewidth=3.0)
 
 
 def box_edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:

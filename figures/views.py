@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import style
+from .hull import outline
 from .plan import few_ticks
 
 if TYPE_CHECKING:
@@ -39,15 +40,15 @@ def _view(ax: Axes, scene: Scene, seen: list[int]) -> None:
 
     for index, lines in enumerate(scene.obstacles):
         label = "keep out" if index == 0 else None
-        ax.add_patch(Polygon(_hull(np.vstack(lines)[:, seen]), label=label, **FORBIDDEN))
+        ax.add_patch(Polygon(outline(np.vstack(lines)[:, seen]), label=label, **FORBIDDEN))
     for index, (low, high) in enumerate(scene.boxes):
         corners = np.array([[x, y] for x in (low[seen[0]], high[seen[0]]) for y in (low[seen[1]], high[seen[1]])])
-        ax.add_patch(Polygon(_hull(corners), label="reach" if index == 0 else None, **REACH))
+        ax.add_patch(Polygon(outline(corners), label="reach" if index == 0 else None, **REACH))
     for k, shade, label in ((0, "#bbbbbb", "cables at the start"), (-1, "#777777", "cables at the end")):
         for cable in range(scene.anchors.shape[1]):
             ends = np.stack([scene.anchors[k, cable], scene.attachments[k, cable]])[:, seen]
             ax.plot(*ends.T, color=shade, linewidth=0.8, label=label if cable == 0 else None)
-        body = _hull(scene.attachments[k][:, seen])
+        body = outline(scene.attachments[k][:, seen])
         if len(body) > 1:
             ax.add_patch(Polygon(body, facecolor=shade, edgecolor=style.colour(0), alpha=0.6))
     for index, name in enumerate(scene.names):
@@ -62,21 +63,3 @@ def _view(ax: Axes, scene: Scene, seen: list[int]) -> None:
     ax.autoscale_view()
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(few_ticks())
-
-
-def _hull(points: np.ndarray) -> np.ndarray:
-    """Corners of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
-    ordered = sorted(set(map(tuple, points.tolist())))
-
-    def half(row: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-        chain: list[tuple[float, ...]] = []
-        for x, y in row:
-            while len(chain) > 1:
-                (ax, ay), (bx, by) = chain[-2:]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
-                    break
-                chain.pop()
-            chain.append((x, y))
-        return chain[:-1]
-
-    return np.array([*half(ordered), *half(ordered[::-1])])

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..figures import style
-from ..figures.animation import faces
+from ..figures.hull import faces
 from ..figures.robot import box_edges
 from ..models.robot import MobileCarrier
 from . import words
@@ -213,7 +213,7 @@ class Stage:
 
     def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
         """The hull of corners (k, 3) [m] in the frame above `name`, if they have one."""
-        triangles = [[face[0], *pair] for face in _hull(corners) for pair in pairwise(face[1:])]
+        triangles = [[face[0], *pair] for face in faces(corners) for pair in pairwise(face[1:])]
         if triangles:
             self._scene.add_mesh_simple(
                 name,
@@ -237,10 +237,6 @@ def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:
     around = np.cos(angles) * axes[1] + np.sin(angles) * axes[2]
     ends = tip - HEAD * along + HEAD / 3 * np.linalg.norm(along) * around
     return np.concatenate([[[start, tip]], np.stack([np.tile(tip, (BARBS, 1)), ends], axis=1)])
-
-
-def _hull(corners: np.ndarray) -> list[np.ndarray]:
-    return faces(corners) if len(corners) > 2 else []
 
 
 def _place(handle: viser.FrameHandle, pose: np.ndarray) -> None:

@@ -1,0 +1,95 @@
+"""The picture of a robot: its platform is the convex hull of its attachments, whatever its shape."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from towline import available, load
+from towline.figures import robot as figure
+from towline.figures.hull import faces, outline
+
+
+def sketch(robot):
+    return figure.RobotSketch(
+        title=robot.name,
+        anchors=robot.home_anchors,
+        attachments=robot.home_attachments,
+        com=robot.home_com,
+        carriers=robot.carrier_home[:, :3],
+        names=[carrier.name for carrier in robot.carriers],
+        boxes=[],
+        tensions=None,
+        positions=np.zeros((0, 3)),
+        feasible=np.zeros(0, bool),
+    )
+
+
+@pytest.fixture
+def drawn_faces(monkeypatch):
+    """A function of a robot that draws it and returns the corners (c, 3) of each face of the drawn platform."""
+    drawn = []
+    set_verts = Poly3DCollection.set_verts
+
+    def record(body, verts, *arguments):
+        drawn.extend(np.array(face) for face in verts)
+        set_verts(body, verts, *arguments)
+
+    def draw(robot):
+        drawn.clear()
+        figure.draw(sketch(robot))
+        return list(drawn)
+
+    monkeypatch.setattr(Poly3DCollection, "set_verts", record)
+    return draw
+
+
+@pytest.mark.parametrize("name", available())
+def test_the_drawn_platform_is_a_convex_body_that_holds_all_attachments(name, drawn_faces):
+    robot = load(name)
+    points, size = robot.home_attachments, robot.length
+    rank = np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6 * size)
+    drawn = drawn_faces(robot)
+    assert len(drawn) == {0: 0, 1: 0, 2: 1}.get(rank, len(drawn))
+    for face in drawn:
+        arms = face - face.mean(axis=0)
+        _, thickness, axes = np.linalg.svd(arms)
+        assert len(face) < 4 or thickness[2] < 1e-6 * size, "a face is not flat"
+        # Around a convex face all turns go the same way.
+        edges = np.roll(face, -1, axis=0) - face
+        turns = np.cross(edges, np.roll(edges, -1, axis=0)) @ axes[2]
+        assert (turns > -1e-9).all() or (turns < 1e-9).all(), "a face has a notch"
+        if rank == 3:
+            beyond = (points - face[0]) @ axes[2]
+            assert min(beyond.max(), -beyond.min()) < 1e-6 * size, "attachments lie on both sides of a face"
+
+
+@pytest.mark.parametrize("name", ["the-cable-robot-simulator", "cogiro"])
+def test_the_faces_close_the_body(name, drawn_faces):
+    corners = Counter()
+    for face in drawn_faces(load(name)):
+        for start, end in zip(face, np.roll(face, -1, axis=0), strict=True):
+            corners[frozenset({tuple(np.round(start, 9)), tuple(np.round(end, 9))})] += 1
+    assert corners
+    assert set(corners.values()) == {2}
+
+
+def test_the_hull_of_a_box_has_six_faces_of_four_corners():
+    box = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], float)
+    rng = np.random.default_rng(0)
+    inside = rng.uniform([0, 0, 0], [1, 2, 3], (20, 3))
+    hull = faces(np.vstack([inside, box]))
+    assert sorted(len(face) for face in hull) == [4] * 6
+    assert {int(corner) for face in hull for corner in face} == set(range(20, 28))
+
+
+def test_flat_bodies_lines_and_points():
+    square = np.array([[0, 0, 0], [1, 1, 0.5], [1, 0, 0.25], [0, 1, 0.25], [0.5, 0.5, 0.25]])
+    assert [sorted(face) for face in faces(square)] == [[0, 1, 2, 3]]
+    assert faces(np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 3]])) == []
+    assert faces(np.ones((4, 3))) == []
+    assert faces(np.zeros((0, 3))) == []
+    assert outline(np.array([[1.0, 1], [0, 0], [3, 3]])).tolist() == [[0, 0], [3, 3]]
+    assert outline(np.ones((3, 2))).tolist() == [[1, 1]]
+    assert len(outline(square[:, :2])) == 4
