@@ -10,12 +10,8 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -47,21 +43,6 @@ def whole_file(path: Path) -> Iterator[Path]:
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             raise _refusal(path, error) from None
         raise
-
-
-def save_netcdf(found: xr.Dataset, path: Path, encoding: dict[str, Any] | None = None) -> Path:
-    """Save a dataset as NetCDF, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If the place cannot be written to, or is full.
-    """
-    # In memory first: HDF5 brings the process down, file left behind, where a disk is full.
-    content = found.to_netcdf(engine="h5netcdf", encoding=encoding)
-    with whole_file(path) as temporary:
-        temporary.write_bytes(content)
-    return path
 
 
 @contextmanager

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..figures import animation, style
-from ..writing import save_netcdf, whole_file
+from ..netcdf import save_netcdf
+from ..writing import whole_file
 from .reports.drawings import drawings
 from .reports.finding import Finding
 from .reports.report import as_text
@@ -32,7 +33,7 @@ class Plan(Finding):
 
         Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
         """
-        return trajectory(self)
+        return trajectory(self).dataset()
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the trajectory as NetCDF, whole or not at all; `xarray.load_dataset` reads it.
@@ -42,7 +43,7 @@ class Plan(Finding):
         InputError
             If the place cannot be written to.
         """
-        return save_netcdf(self.trajectory, Path(file))
+        return save_netcdf(trajectory(self), Path(file))
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Draw path, views, tensions, base offset, other limits and convergence as PNG files in `folder`; their paths.

@@ -17,7 +17,8 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from ..models import Robot
-from ..writing import save_netcdf, whole_folder
+from ..netcdf import Contents, save_netcdf
+from ..writing import whole_folder
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
 from .counts import Job, Question
@@ -188,9 +189,8 @@ def save(found: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     lasting.attrs = {name: value for name, value in found.attrs.items() if name not in OF_THIS_RUN}
     if path.suffix == ".zarr":
         return _save_zarr(lasting, path)
-    packed = {"zlib": True, "complevel": 1}
-    encoding = {str(name): packed for name, variable in lasting.data_vars.items() if variable.size > CHUNK}
-    return save_netcdf(lasting, path, encoding)
+    compressed = [str(name) for name, variable in lasting.data_vars.items() if variable.size > CHUNK]
+    return save_netcdf(Contents.of(lasting), path, compressed)
 
 
 def _save_zarr(found: xr.Dataset, path: Path) -> Path:

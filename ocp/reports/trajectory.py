@@ -1,32 +1,30 @@
-"""A plan over time as an `xarray.Dataset`: the motion in {G} and the audited tensions, with units."""
+"""A plan over time as a dataset: the motion in {G} and the audited tensions, with units."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...models.parsing import to_yaml
 from ...models.robot import COORDINATES
+from ...netcdf import Contents, Variable
 from .finding import Finding
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["output_rows", "trajectory"]
 
 
-def trajectory(found: Finding) -> xr.Dataset:
-    """The motion and the audited tensions at the task's output rate; dimensions: time, coordinate, carrier, cable."""
-    import xarray as xr
+def trajectory(found: Finding) -> Contents:
+    """Return the motion and the audited tensions at the task's output rate.
 
+    Dimensions: time, coordinate, carrier, cable.
+    """
     robot, task = found.scenario.robot, found.scenario.task
     rows = output_rows(found)
     seen = found.audit
 
-    def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Any:
-        return dims, values, {"units": unit, "long_name": about}
+    def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Variable:
+        return Variable(dims, values, {"units": unit, "long_name": about})
 
     body, base = ("time", "coordinate"), ("time", "carrier", "coordinate")
     names = {"pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2"}
@@ -51,13 +49,13 @@ def trajectory(found: Finding) -> xr.Dataset:
         "report": json.dumps(found.summary()),
     }
     coordinates = {
-        "time": ("time", seen.times[rows], {"units": "s"}),
-        "coordinate": list(COORDINATES),
-        "carrier": [carrier.name for carrier in robot.carriers],
-        "carrier_kind": ("carrier", [carrier.kind for carrier in robot.carriers]),
-        "cable": np.arange(1, robot.m + 1),
+        "time": Variable(("time",), seen.times[rows], {"units": "s"}),
+        "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
+        "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),
+        "carrier_kind": Variable(("carrier",), np.array([carrier.kind for carrier in robot.carriers])),
+        "cable": Variable(("cable",), np.arange(1, robot.m + 1)),
     }
-    return xr.Dataset(variables, coordinates, attributes)
+    return Contents(variables, coordinates, attributes)
 
 
 def output_rows(found: Finding) -> np.ndarray:

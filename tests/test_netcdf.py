@@ -1,0 +1,65 @@
+"""Datasets as NetCDF files: what xarray reads is what xarray would have written."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from towline.errors import InputError
+from towline.netcdf import Contents, Variable, save_netcdf
+
+CONTENTS = Contents(
+    {
+        "tensions": Variable(("time", "cable"), np.arange(6.0).reshape(3, 2), {"units": "N"}),
+        "slack": Variable(("cable",), np.array([True, False])),
+        "status": Variable(("time",), np.array(["optimal", "µ", ""])),
+        "margin": Variable((), np.array(np.nan), {"units": "N"}),
+        "count": Variable(("carrier",), np.array([2**40])),
+        "empty": Variable(("point", "cable"), np.zeros((0, 2))),
+    },
+    {
+        "time": Variable(("time",), np.array([0.0, 0.5, 1.0]), {"units": "s"}),
+        "cable": Variable(("cable",), np.array([1, 2])),
+        "carrier": Variable(("carrier",), np.array(["quad"])),
+        "carrier_kind": Variable(("carrier",), np.array(["prescribed"])),
+    },
+    {"title": "a plan", "samples": 7, "seconds": 0.25, "robot": "name: x\n" * 20_000},
+)
+
+
+def test_what_is_read_is_what_xarray_would_have_saved(tmp_path):
+    save_netcdf(CONTENTS, tmp_path / "ours.nc")
+    CONTENTS.dataset().to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
+    ours, theirs = (xr.load_dataset(tmp_path / name) for name in ("ours.nc", "theirs.nc"))
+    xr.testing.assert_identical(ours, theirs)
+    assert {name: ours[name].dtype for name in ours.variables} == {name: theirs[name].dtype for name in ours.variables}
+    assert set(ours.coords) == set(CONTENTS.coordinates)
+    xr.testing.assert_identical(Contents.of(ours).dataset(), ours)
+
+
+def test_equal_contents_are_equal_files_and_compressed_ones_smaller(tmp_path):
+    many = CONTENTS._replace(variables={"zero": Variable(("point", "axis"), np.zeros((10_000, 3)))})
+    for name, compressed in (("one", ()), ("two", ()), ("packed", ["zero"])):
+        save_netcdf(many, tmp_path / name, compressed)
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+    assert (tmp_path / "packed").stat().st_size < 0.5 * (tmp_path / "one").stat().st_size
+    xr.testing.assert_identical(xr.load_dataset(tmp_path / "packed"), xr.load_dataset(tmp_path / "one"))
+
+
+def test_a_place_that_cannot_be_written_to_is_named(tmp_path):
+    with pytest.raises(InputError, match="is a folder"):
+        save_netcdf(CONTENTS, tmp_path)
+
+
+def test_saving_loads_no_ecosystem(tmp_path):
+    """Xarray, pandas and dask cost a second each, and more than the file does."""
+    code = f"""
+import sys, numpy, pathlib
+from towline.netcdf import Contents, Variable, save_netcdf
+save_netcdf(Contents({{"x": Variable(("row",), numpy.ones(3))}}, {{}}, {{}}), pathlib.Path({str(tmp_path / "x.nc")!r}))
+print(*sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"xarray", "pandas", "dask", "scipy", "casadi"} & set(done.stdout.split())
