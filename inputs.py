@@ -1,12 +1,13 @@
-"""What arguments are refused, in one line each."""
+"""Check arguments, and refuse wrong ones in one line: the field, what is accepted, the value."""
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import InputError
 
-__all__ = ["number", "required", "shown", "whole_number"]
+__all__ = ["finite_array", "number", "real_array", "required", "shown", "whole_number"]
 
 Kind = TypeVar("Kind")
 
@@ -22,24 +23,47 @@ def shown(value: object) -> str:
 
 
 def required(name: str, value: object, kind: type[Kind]) -> Kind:
-    """Return `value`, or raise InputError if it is no `kind`."""
+    """Return `value`, or raise InputError unless it is a `kind`."""
     if not isinstance(value, kind):
-        raise InputError(f"{name}: is a {type(value).__name__}; accepted: a {kind.__name__}")
+        raise InputError(f"{name} must be a {kind.__name__}, got {shown(value)}, a {type(value).__name__}")
     return value
 
 
 def number(name: str, value: object, least: float, most: float, also: str = "") -> float:
-    """Return a number from `least` to `most`, or raise InputError; `also` says what else would have been accepted."""
+    """Return a number from `least` to `most`, or raise InputError; `also` adds to the message what else is accepted."""
     if isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool):
         # A whole number may have no float.
         as_float = np.inf if isinstance(value, int) and abs(value) > 10**300 else float(value)
         if least <= as_float <= most:
             return as_float
-    raise InputError(f"{name}: is {shown(value)}; accepted: a number from {least:g} to {most:g}{also}")
+    raise InputError(f"{name} must be a number from {least:g} to {most:g}{also}, got {shown(value)}")
 
 
 def whole_number(name: str, value: object, least: int, most: int) -> int:
     """Return a whole number from `least` to `most`, or raise InputError."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:
         return int(value)
-    raise InputError(f"{name}: is {shown(value)}; accepted: a whole number from {least} to {most}")
+    raise InputError(f"{name} must be a whole number from {least} to {most}, got {shown(value)}")
+
+
+def real_array(name: str, value: Any) -> NDArray[Any]:
+    """Return `value` as an array of real numbers, without a copy where it is one, or raise InputError."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):
+        raise InputError(
+            f"{name} must be an array of real numbers, got {shown(value)} (rows of unequal length?)"
+        ) from None
+    if array.dtype.kind not in "fiu":
+        given = shown(value) if array.ndim == 0 else f"entries of type {array.dtype.name}"
+        raise InputError(f"{name} must be an array of real numbers, got {given}")
+    return array
+
+
+def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return a float64 copy of `value` of this shape, or raise InputError unless all its numbers are finite."""
+    array = np.array(real_array(name, value), dtype=np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        given = shown(array.tolist()) if array.shape == shape else f"an array of shape {array.shape}"
+        raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got {given}")
+    return array

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import processors
 from ..errors import InputError
-from ..inputs import number, shown, whole_number
+from ..inputs import number, real_array, shown, whole_number
 from . import compiled
 from .problem import TensionProblem
 from .registry import solve
@@ -92,13 +92,13 @@ class BatchSolution:
         InputError
             If the row is invalid; the message says why.
         """
-        accepted = f"what picks one row of shape {self.code.shape}"
+        accepted = f"index must pick one row of a batch of shape {self.code.shape}"
         try:
             picked = self.code[index]
         except (IndexError, TypeError, ValueError):
-            raise InputError(f"index: is {shown(index)}; accepted: {accepted}") from None
+            raise InputError(f"{accepted}, got {shown(index)}") from None
         if np.ndim(picked):
-            raise InputError(f"index: is {shown(index)}, {np.size(picked)} rows; accepted: {accepted}")
+            raise InputError(f"{accepted}, got {shown(index)}, which picks {np.size(picked)} rows")
         return _alone(_row(self.problem, index), self.rho)
 
 
@@ -154,7 +154,7 @@ def solve_batch(
     matrix = _real("A", A)
     if matrix.ndim < 2 or 0 in matrix.shape[-2:]:
         raise InputError(
-            f"A: has shape {matrix.shape}; accepted: (..., n, m) with n >= 1 wrench rows and m >= 1 cables"
+            f"A must be of shape (..., n, m) with n >= 1 wrench rows and m >= 1 cables, got shape {matrix.shape}"
         )
     n, m = matrix.shape[-2:]
     given = {
@@ -244,15 +244,7 @@ def _row(problem: dict[str, Array], index: int | tuple[int, ...]) -> TensionProb
 
 def _real(name: str, value: ArrayLike) -> Array:
     """Return `value` as float64, or raise InputError if it is not an array of real numbers."""
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError, OverflowError):
-        raise InputError(f"{name}: is no array (rows of unequal length?); accepted: an array of real numbers") from None
-    if array.dtype.kind not in "fiu":
-        raise InputError(
-            f"{name}: has shape {array.shape} and type {array.dtype.name}; accepted: an array of real numbers"
-        )
-    return np.asarray(array, dtype=np.float64)
+    return np.asarray(real_array(name, value), dtype=np.float64)
 
 
 def _ends(name: str, value: ArrayLike, size: int, repeat: bool = False) -> Array:
@@ -262,7 +254,7 @@ def _ends(name: str, value: ArrayLike, size: int, repeat: bool = False) -> Array
         return np.full(size, array)
     if array.ndim == 0 or array.shape[-1] != size:
         also = " or a single number" if repeat else ""
-        raise InputError(f"{name}: has shape {array.shape}; accepted: (..., {size}), for this A{also}")
+        raise InputError(f"{name} must be of shape (..., {size}) for this A{also}, got shape {array.shape}")
     return array
 
 
@@ -274,6 +266,6 @@ def _leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
             lead = np.broadcast_shapes(lead, shape)
         except ValueError:
             raise InputError(
-                f"{name}: has leading dimensions {shape}; accepted: what broadcasts with {lead}, those before it"
+                f"{name} must have leading dimensions that broadcast with {lead}, those before it, got {shape}"
             ) from None
     return lead

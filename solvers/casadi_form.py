@@ -69,7 +69,7 @@ def casadi_function(
     """
     m, n = whole_number("m", m, 1, _MOST), whole_number("n", n, 1, _MOST)
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9]|_(?!_))*", name):
-        raise InputError(f"name: is {shown(name)}; accepted: a letter, then letters, digits and single underscores")
+        raise InputError(f"name must be a letter, then letters, digits and single underscores, got {shown(name)}")
     constants = {"t_ref": t_ref, "weights": weights, "length": length}
     TensionProblem(np.zeros((n, m)), np.zeros(n), 0.0, 1.0, **constants)
     return _callback(name, m, n, constants)

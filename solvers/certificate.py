@@ -10,25 +10,40 @@ available wrench to w makes the gap d . w - h(d) as large as it can be: then it 
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..inputs import required
+from ..inputs import finite_array, required
+from ..text import quantity
 from ..tolerances import NEGLIGIBLE, RANK
 from .problem import TensionProblem
 from .projection import project
 
-__all__ = ["Certificate", "certificate_along", "certify"]
+__all__ = ["Certificate", "CertificateText", "certificate_along", "certify"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
+# A part of a direction that makes up less than this share of it is left out of its description.
+_LEAST_SHARE = 0.05
+
+
+class CertificateText(NamedTuple):
+    """What a certificate says, as text: `Certificate.describe` in pieces, for tables."""
+
+    along: str
+    needed: str
+    available: str
+    short_by: str
+    limits: str
+
+
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """A wrench direction along which the required wrench lies beyond everything the cables can give.
+    """A wrench direction along which the required wrench lies beyond everything that the cables can give.
 
     Attributes
     ----------
@@ -37,18 +52,24 @@ class Certificate:
         force entries are numbers, its moment entries are in 1/m, and |(d_force, length * d_moment)| = 1. With
         any other number of rows |d| = 1.
     support :
-        h(d) [N]: the most that tensions inside the limits can give along d.
+        h(d) [N]: the maximum that tensions inside the limits can give along d.
     demand :
         d . w [N]: what is required along d.
     shortfall :
         demand - support [N], positive. If `binding` is not empty it is the distance from w to the available wrench set
         in the norm |(force, moment / length)|; if it is empty (singular), the distance from w to the range of A.
     at_max, at_min :
-        Indices of the cables that could give more along d only by exceeding t_max, or by going below t_min.
+        Indices of the cables that could give more along d only by exceeding t_max, or by falling below t_min.
     closest :
         Tensions inside the limits whose wrench is nearest to w [N], shape (m,).
     length :
         The characteristic length [m] of the problem.
+    time :
+        Of a motion: the instant [s] at which w is required. None for a single problem.
+    span :
+        Of a motion: start and end [s] of the time around `time` during which no tensions give the required wrench.
+    wind :
+        Of a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
     """
 
     direction: Array  # (n,)
@@ -59,6 +80,9 @@ class Certificate:
     at_min: Indices
     closest: Array  # (m,)
     length: float
+    time: float | None = None
+    span: tuple[float, float] | None = None
+    wind: tuple[float, float, float] | None = None
 
     @property
     def binding(self) -> Indices:
@@ -92,22 +116,74 @@ class Certificate:
             and np.array_equal(at_min, self.at_min)
         )
 
-    def describe(self) -> str:
-        """Tell direction, demand, support and the cables at their limits (from 1), in two lines."""
-        limits = {"t_max": self.at_max, "t_min": self.at_min}
-        told = [f"{name} in {_numbers(indices + 1, 0)}" for name, indices in limits.items() if indices.size]
-        cables = f"cables at their limit: {'; '.join(told)}" if told else "no cable pulls along it at all"
-        direction = f"({_numbers(self.direction, 3)})"
-        if self.direction.size == 6:
-            direction = f"force ({_numbers(self.direction[:3], 3)}), moment ({_numbers(self.direction[3:], 3)})/m"
-        return (
-            f"along the wrench direction {direction}:\n"
-            f"{self.demand:.4g} N are needed and at most {self.support:.4g} N available, "
-            f"short by {self.shortfall:.4g} N; {cables}"
+    def text(self, up: ArrayLike | None = None) -> CertificateText:
+        """Return direction, needed, available, short by and limits as text; cables are counted from 1.
+
+        Of six wrench rows the direction is given by its largest parts and their shares. A share is the square of a
+        component, moments divided by `length`: all shares sum up to 100 %.
+
+        Parameters
+        ----------
+        up :
+            The direction opposite to gravity in the frame of the wrench, shape (3,): a vertical force along one of the
+            axes is then marked "(up)" or "(down)". Default: none is marked.
+
+        Raises
+        ------
+        InputError
+            If `up` is not three finite numbers.
+        """
+        pull_only = ": the cables can pull only the other way" if self.support < 0.0 else ""
+        limits = [
+            f"{name} of cable{'s' if indices.size > 1 else ''} {', '.join(str(int(i) + 1) for i in indices)}"
+            for name, indices in (("t_min", self.at_min), ("t_max", self.at_max))
+            if indices.size
+        ]
+        return CertificateText(
+            along=self._along(None if up is None else finite_array("up", up, (3,))),
+            needed=f"{quantity(self.demand, 'N')}",
+            available=f"{quantity(self.support, 'N')} at most{pull_only}",
+            short_by=f"{quantity(self.shortfall, 'N')}",
+            limits="; ".join(limits) or "no cable pulls along this direction, however large its tension",
         )
 
+    def describe(self, up: ArrayLike | None = None) -> str:
+        """Describe the certificate in two lines: along what direction, needed, available, short by, and which limits.
+
+        Of a motion, time, span and wind come first. `up` is as in `text`.
+        """
+        text = self.text(up)
+        when = "" if self.time is None else f"at t = {self.time:.3f} s"
+        if self.span is not None:
+            when += f" (no tensions from {self.span[0]:.3f} s to {self.span[1]:.3f} s)"
+        if self.wind is not None:
+            when += f" in wind ({', '.join(f'{value + 0.0:g}' for value in self.wind)}) m/s"
+        return (
+            f"{when.strip() + ', ' if when else ''}along {text.along}:\n"
+            f"needed {text.needed}, available {text.available}, short by {text.short_by}; limits: {text.limits}"
+        )
+
+    def _along(self, up: Array | None) -> str:
+        """Return the direction as text."""
+        if self.direction.size != 6:
+            return f"the wrench direction ({', '.join(f'{value + 0.0:.3f}' for value in self.direction)})"
+        parts = self.direction * np.repeat([1.0, self.length], 3)
+        shares = parts**2 / (parts @ parts)
+        pieces = []
+        for i in np.argsort(-shares, kind="stable"):
+            if shares[i] < _LEAST_SHARE:
+                continue
+            axis, sign = "xyz"[i % 3], "+" if parts[i] > 0.0 else "-"
+            sense = ""
+            if up is not None and i < 3 and abs(up[i]) > 0.99 * float(np.linalg.norm(up)) > 0.0:
+                sense = " (up)" if parts[i] * up[i] > 0.0 else " (down)"
+            kind = "force along" if i < 3 else "moment about"
+            pieces.append(f"{100 * shares[i]:.0f} % {kind} {sign}{axis}{sense}")
+        return ", ".join(pieces)
+
     def to_dict(self) -> dict[str, Any]:
-        """Return plain lists and numbers, ready for JSON."""
+        """Return plain lists and numbers, ready for JSON; time, span and wind only where they are set."""
+        motion = {"time": self.time, "span": self.span, "wind": self.wind}
         return {
             "direction": self.direction.tolist(),
             "shortfall": self.shortfall,
@@ -118,6 +194,11 @@ class Certificate:
             "demand": self.demand,
             "closest": self.closest.tolist(),
             "length": self.length,
+            **{
+                name: list(value) if isinstance(value, tuple) else value
+                for name, value in motion.items()
+                if value is not None
+            },
         }
 
 
@@ -159,10 +240,6 @@ def certificate_along(problem: TensionProblem, direction: Array) -> Certificate 
     return _along(problem, vector / size, project(problem)[0]) if 0.0 < size < np.inf else None
 
 
-def _numbers(values: NDArray[Any], decimals: int) -> str:
-    return ", ".join(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)
-
-
 def _outside_range(problem: TensionProblem) -> Array | None:
     """Return the part of S w outside the range of S A, or None if A has full row rank."""
     U, sigma, _ = np.linalg.svd(problem.scaled_A)
@@ -188,7 +265,7 @@ def _along(problem: TensionProblem, unit: Array, closest: Array) -> Certificate 
 
 
 def _support(problem: TensionProblem, direction: Array) -> tuple[float, Indices, Indices]:
-    """Return the support value [N] of the available wrench set along `direction`, and who is at which limit for it."""
+    """Return the support value [N] of the available wrench set along `direction`, and the cables at each limit."""
     pull = direction @ problem.A
     small = NEGLIGIBLE * problem.column_norms.max()
     at_max, at_min = np.flatnonzero(pull > small), np.flatnonzero(pull < -small)

@@ -79,7 +79,7 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     tensions = _tensions(required("solution", solution, TensionSolution))
     if tensions.size != required("problem", problem, TensionProblem).m:
         raise InputError(
-            f"solution: has {tensions.size} tensions; accepted: {problem.m}, one for each cable of problem"
+            f"solution must have {problem.m} tensions, one for each cable of the problem, got {tensions.size}"
         )
     return derivatives(problem, tensions).w
 
@@ -149,5 +149,5 @@ def _active_set(problem: TensionProblem, tensions: Array) -> tuple[NDArray[np.bo
 
 def _tensions(solution: TensionSolution) -> Array:
     if solution.tensions is None:
-        raise InputError(f"solution: has no tensions, its status is {solution.status}; accepted: one with tensions")
+        raise InputError(f"solution must be one with tensions, got status {solution.status}")
     return solution.tensions

@@ -66,5 +66,5 @@ def start_in_form(form: StandardForm, start: Any) -> Any:
     except (ValueError, TypeError, OverflowError):
         t = np.zeros(0, dtype=object)
     if t.shape != form.origin.shape or t.dtype.kind not in "fiu" or not np.isfinite(t).all():
-        raise InputError(f"start: is {shown(start)}; accepted: {form.origin.size} finite tensions [N], one per cable")
+        raise InputError(f"start must be {form.origin.size} finite tensions [N], one per cable, got {shown(start)}")
     return (t[form.moving] - form.origin[form.moving]) / form.unit

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..inputs import real_array
 from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 __all__ = ["TensionProblem"]
@@ -79,25 +80,25 @@ class TensionProblem:
     ) -> None:
         matrix = _real_array("A", A)
         if matrix.ndim != 2 or 0 in matrix.shape:
-            raise InputError(f"A: has shape {matrix.shape}; accepted: (n, m) with n >= 1 wrench rows and m >= 1 cables")
+            raise InputError(
+                f"A must be of shape (n, m) with n >= 1 wrench rows and m >= 1 cables, got shape {matrix.shape}"
+            )
         n, m = matrix.shape
         wrench = _real_array("w", w)
         if wrench.shape != (n,):
-            raise InputError(f"w: has shape {wrench.shape}; accepted: ({n},), one entry per row of A")
+            raise InputError(f"w must be of shape ({n},), one entry per row of A, got shape {wrench.shape}")
         _require_finite("A", matrix)
         _require_finite("w", wrench)
 
         lower = _per_cable("t_min", t_min, m)
         upper = _per_cable("t_max", t_max, m)
-        _reject_at("t_min", lower, lower > _LARGEST, f"a number up to {_LARGEST:g}, or -inf")
-        _reject_at("t_max", upper, upper < -_LARGEST, f"a number from {-_LARGEST:g}, or inf")
+        _reject_at("t_min", lower, lower > _LARGEST, f"numbers up to {_LARGEST:g}, or -inf")
+        _reject_at("t_max", upper, upper < -_LARGEST, f"numbers from {-_LARGEST:g}, or inf")
         lower[lower < -_LARGEST], upper[upper > _LARGEST] = -np.inf, np.inf
         crossed = lower > upper
         if crossed.any():
             i = int(np.argmax(crossed))
-            raise InputError(
-                f"t_min: is {lower[i]:g} at cable {i}, above t_max = {upper[i]:g}; accepted: t_min <= t_max"
-            )
+            raise InputError(f"t_min must be at most t_max, got {lower[i]:g} above {upper[i]:g} at cable {i}")
 
         wish = np.zeros(m) if t_ref is None else _per_cable("t_ref", t_ref, m)
         _require_finite("t_ref", wish)
@@ -106,8 +107,8 @@ class TensionProblem:
         _reject_at("weights", omega, out_of_range, f"numbers > 0, from {_LIGHTEST:g} to {_HEAVIEST:g}")
         if omega.max() > WEIGHTS_APART * omega.min():
             raise InputError(
-                f"weights: are from {omega.min():g} to {omega.max():g}; accepted: the largest at most "
-                f"{WEIGHTS_APART:g} times the least"
+                f"weights must be such that the largest is at most {WEIGHTS_APART:g} times the smallest, "
+                f"got {omega.min():g} to {omega.max():g}"
             )
 
         parts = (matrix.ravel(), wrench, lower, upper, wish, omega)
@@ -179,13 +180,7 @@ class TensionProblem:
 
 def _real_array(name: str, value: ArrayLike) -> Array:
     """Return a float64 copy of `value`, or raise InputError if it is not an array of real numbers."""
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError, OverflowError):
-        raise InputError(f"{name}: is no array (rows of unequal length?); accepted: an array of real numbers") from None
-    if array.dtype.kind not in "fiu":
-        raise InputError(f"{name}: has entries of type {array.dtype.name}; accepted: an array of real numbers")
-    array = np.array(array, dtype=np.float64, order="C")
+    array = np.array(real_array(name, value), dtype=np.float64, order="C")
     array[np.abs(array) < _SMALLEST] = 0.0
     return array
 
@@ -196,8 +191,10 @@ def _per_cable(name: str, value: ArrayLike, m: int) -> Array:
     if array.ndim == 0:
         array = np.full(m, array)
     elif array.shape != (m,):
-        raise InputError(f"{name}: has shape {array.shape}; accepted: ({m},), one entry per cable, or a single number")
-    _reject_at(name, array, np.isnan(array), "a number")
+        raise InputError(
+            f"{name} must be of shape ({m},), one entry per cable, or a single number, got shape {array.shape}"
+        )
+    _reject_at(name, array, np.isnan(array), "numbers")
     return array
 
 
@@ -212,7 +209,7 @@ def _reject_at(name: str, array: Array, bad: NDArray[np.bool_], accepted: str) -
     if bad.any():
         index = np.unravel_index(int(np.argmax(bad)), array.shape)
         where = ", ".join(str(int(i)) for i in index)
-        raise InputError(f"{name}: is {array[index]:g} at index {where}; accepted: {accepted}")
+        raise InputError(f"{name} must be {accepted}, got {array[index]:g} at index {where}")
 
 
 def _positive_length(length: float | None) -> float:
@@ -220,8 +217,8 @@ def _positive_length(length: float | None) -> float:
         return 1.0
     value = _real_array("length", length)
     if value.ndim != 0 or not _LIGHTEST <= value <= _HEAVIEST:
-        shown = f"has shape {value.shape}" if value.ndim else f"is {value:g}"
+        given = f"shape {value.shape}" if value.ndim else f"{value:g}"
         raise InputError(
-            f"length: {shown}; accepted: one number > 0 [m], from {_LIGHTEST:g} to {_HEAVIEST:g}, or None for 1 m"
+            f"length must be one number > 0 [m], from {_LIGHTEST:g} to {_HEAVIEST:g}, or None for 1 m, got {given}"
         )
     return float(value)

@@ -114,10 +114,14 @@ def _call_once(
         except Exception as error:
             if options and isinstance(error, TypeError | AttributeError | ValueError):
                 raise InputError(
-                    f"options: {', '.join(options)} went to {name}, which says: {error}; accepted: its own settings"
+                    f"options must be settings of {name}, got {', '.join(options)}: {_one_line(error)}"
                 ) from None
             return Proposal(None, detail=f"{name}: {type(error).__name__}: {error}")
     if not answer.found or answer.x is None or not np.isfinite(answer.x).all():
         said = answer.extras.get("status") or getattr(answer.extras.get("info"), "status", "found nothing")
         return Proposal(None, detail=f"{name}: {said}")
     return Proposal(np.asarray(answer.x, dtype=np.float64))
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

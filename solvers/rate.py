@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..inputs import required
+from ..inputs import real_array, required, shown
 from .problem import TensionProblem
 
 __all__ = ["limit_rate"]
@@ -40,19 +40,15 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
     required("problem", problem, TensionProblem)
     at, step = _per_cable("previous", previous, problem.m), _per_cable("rate_max", rate_max, problem.m)
     if not (step >= 0.0).all() or not np.isfinite(at).all():
-        wrong = f"rate_max: is {step.min():g}" if np.isfinite(at).all() else "previous: is not finite"
-        raise InputError(f"{wrong}; accepted: finite tensions and numbers >= 0 [N per call]")
+        if np.isfinite(at).all():
+            raise InputError(f"rate_max must be numbers >= 0 [N per call], got {step.min():g}")
+        raise InputError(f"previous must be finite tensions [N], got {shown(at.tolist())}")
     lower, upper = (np.clip(limit, at - step, at + step) for limit in (problem.t_min, problem.t_max))
     return TensionProblem(problem.A, problem.w, lower, upper, problem.t_ref, problem.weights, problem.length)
 
 
 def _per_cable(name: str, value: ArrayLike, m: int) -> NDArray[np.float64]:
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError, OverflowError):
-        raise InputError(
-            f"{name}: is no array (rows of unequal length?); accepted: ({m},) or one real number"
-        ) from None
-    if array.dtype.kind not in "fiu" or array.shape not in ((), (m,)):
-        raise InputError(f"{name}: has shape {array.shape}, type {array.dtype}; accepted: ({m},) or one real number")
+    array = real_array(name, value)
+    if array.shape not in ((), (m,)):
+        raise InputError(f"{name} must be of shape ({m},) or a single number, got shape {array.shape}")
     return np.broadcast_to(array.astype(np.float64), (m,))

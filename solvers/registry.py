@@ -179,16 +179,16 @@ def _lookup(name: str | Method, backend: str | None, options: dict[str, Any]) ->
     elif isinstance(name, str) and name in _METHODS:
         method = _METHODS[name]
     else:
-        raise InputError(f"method: {shown(name)} is unknown; accepted: {', '.join(_METHODS)}")
+        raise InputError(f"method must be one of {', '.join(_METHODS)}, got {shown(name)}")
     available = method.backends()
     if backend is None:
         backend = next(iter(available), None)
     elif not isinstance(backend, str) or backend not in available:
-        accepted = ", ".join(available) or f"None, since method {method.name} has no back ends"
-        raise InputError(f"backend: {shown(backend)} is not installed; accepted: {accepted}")
+        accepted = f"one of {', '.join(available)}" if available else f"None, as method {method.name} has no back ends"
+        raise InputError(f"backend must be {accepted}, got {shown(backend)}")
     if method.options is not None:
         unknown = [key for key in options if key not in method.options]
         if unknown:
-            accepted = ", ".join(method.options) or f"none, method {method.name} has no options"
-            raise InputError(f"options: {unknown[0]!r} is unknown; accepted: {accepted}")
+            accepted = f"among {', '.join(method.options)}" if method.options else f"empty for method {method.name}"
+            raise InputError(f"options must be {accepted}, got {shown(unknown[0])}")
     return method, backend

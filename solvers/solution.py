@@ -128,9 +128,7 @@ class TensionSolution:
         direction = None if self._direction is None else self._direction(self.problem)
         certificate = None if direction is None else certificate_along(self.problem, direction)
         if certificate is None:
-            raise SolverError(
-                f"{self.method}: says {self.status}, but no certificate confirms it; accepted: method daqp"
-            )
+            raise SolverError(f"{self.method} reported {self.status}, but no certificate confirms it; try method daqp")
         return certificate
 
     @property

@@ -149,24 +149,24 @@ def test_bad_rows_are_flagged_and_the_rest_solved():
     rest = np.setdiff1d(np.arange(20), bad)
     assert (batch.code[rest] == good.code[rest]).all()
     np.testing.assert_array_equal(batch.tensions[rest], good.tensions[rest])
-    with pytest.raises(InputError, match="A: is nan at index 0, 0"):
+    with pytest.raises(InputError, match=r"A must be finite .*, got nan at index 0, 0"):
         batch.solution(1)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"A": np.ones(6)}, r"A: has shape \(6,\); accepted: \(\.\.\., n, m\)"),
-        ({"A": np.ones((2, 6, 8)) + 1j}, r"A: has shape \(2, 6, 8\) and type complex128"),
-        ({"A": [[1.0, 2.0], [3.0]]}, "A: is no array"),
-        ({"w": np.ones((2, 5))}, r"w: has shape \(2, 5\); accepted: \(\.\.\., 6\)"),
+        ({"A": np.ones(6)}, r"A must be of shape \(\.\.\., n, m\) .*, got shape \(6,\)"),
+        ({"A": np.ones((2, 6, 8)) + 1j}, r"A must be .*, got entries of type complex128"),
+        ({"A": [[1.0, 2.0], [3.0]]}, "A must be an array of real numbers, got .*unequal length"),
+        ({"w": np.ones((2, 5))}, r"w must be of shape \(\.\.\., 6\) .*, got shape \(2, 5\)"),
         (
             {"w": np.ones((3, 6))},
-            r"w: has leading dimensions \(3,\); accepted: what broadcasts with \(2,\), those before it",
+            r"w must have leading dimensions that broadcast with \(2,\), those before it, got \(3,\)",
         ),
-        ({"t_min": np.ones(6)}, r"t_min: has shape \(6,\); accepted: \(\.\.\., 8\)"),
-        ({"t_max": None}, r"t_max: has shape \(\) and type object"),
-        ({"threads": 0}, "threads: is 0; accepted: a whole number from 1"),
+        ({"t_min": np.ones(6)}, r"t_min must be of shape \(\.\.\., 8\) .*, got shape \(6,\)"),
+        ({"t_max": None}, r"t_max must be an array of real numbers, got None"),
+        ({"threads": 0}, "threads must be a whole number from 1 to 1024, got 0"),
     ],
 )
 def test_wrong_arguments_are_told(change, message):
@@ -255,7 +255,7 @@ def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch
         assert solution.certificate.singular is (solution.status is Status.SINGULAR)
         assert solution.certificate.shortfall <= certify(problem).shortfall * (1 + 1e-9)
     monkeypatch.setattr(type(methods()["active-set"]), "direction", lambda self, problem: None)
-    with pytest.raises(SolverError, match="active-set: says infeasible, but no certificate confirms it"):
+    with pytest.raises(SolverError, match="active-set reported infeasible, but no certificate confirms it"):
         _ = solve(TensionProblem([[1.0, -1.0]], [60.0], 1, 60)).certificate
 
 

@@ -187,7 +187,7 @@ def test_a_shared_matrix_changes_nothing(m):
 
 @pytest.mark.parametrize("rho", ["stiff", 0.0, -1.0, np.nan, np.inf, True, 1e13])
 def test_rho_is_a_number_in_its_range(rho):
-    with pytest.raises(InputError, match=r"^rho: .*accepted: a number from 1e-12 to 1e\+12, or None"):
+    with pytest.raises(InputError, match=r"^rho must be a number from 1e-12 to 1e\+12, or None, got "):
         solve_batch(np.eye(2), np.ones(2), 0.0, 1.0, rho=rho)
 
 
@@ -195,13 +195,13 @@ def test_rho_is_a_number_in_its_range(rho):
 def test_an_index_picks_one_row(index):
     batch = solve_batch(np.eye(2), np.ones((3, 2)), 0.0, 2.0)
     assert batch.solution(-1).feasible
-    with pytest.raises(InputError, match=r"^index: .*accepted: what picks one row of shape \(3,\)$"):
+    with pytest.raises(InputError, match=r"^index must pick one row of a batch of shape \(3,\), got "):
         batch.solution(index)
 
 
 @pytest.mark.parametrize("threads", [0, True, 2.0, np.arange(40), "two"])
 def test_threads_is_a_whole_number(threads):
-    with pytest.raises(InputError, match=r"^threads: .*accepted: a whole number from 1 to 1024$"):
+    with pytest.raises(InputError, match=r"^threads must be a whole number from 1 to 1024, got "):
         solve_batch(np.eye(2), np.ones(2), 0.0, 1.0, threads=threads)
 
 
