@@ -1,10 +1,11 @@
-"""Hooks of MkDocs: what the site needs beyond its pages.
+"""Extend MkDocs: translate formulas and lay out the sources of the package.
 
-Formulas become MathML when the site is built, which browsers draw without any script: `pymdownx.arithmatex` leaves
-`$...$` and `$$...$$` as LaTeX in elements of class arithmatex, and here it is translated.
+Formulas become MathML when the site is built, because browsers draw MathML without any script:
+`pymdownx.arithmatex` leaves `$...$` and `$$...$$` as LaTeX in elements of class arithmatex, and `on_page_content`
+translates it.
 
-The repository's root is the package `towline`, so no folder has that name, in which mkdocstrings looks for sources.
-They are laid out under build/docs/towline as an installation has them.
+mkdocstrings looks for sources in a folder called `towline`. The repository's root is that package, whatever the folder
+is called, so the sources are copied to build/docs/towline.
 """
 
 import html
@@ -32,10 +33,10 @@ def on_startup(**_: object) -> None:
 
 
 def on_page_content(content: str, **_: object) -> str:
-    """Translate the formulas of a page, which is HTML by now; those of docstrings too."""
+    """Translate the formulas of an HTML page, docstrings included."""
     return FORMULA.sub(_mathml, content)
 
 
-def _mathml(found: re.Match[str]) -> str:
-    display = "block" if found[1] == "div" else "inline"
-    return convert(html.unescape(found[2]).strip(), display=display)
+def _mathml(formula: re.Match[str]) -> str:
+    display = "block" if formula[1] == "div" else "inline"
+    return convert(html.unescape(formula[2]).strip(), display=display)
