@@ -45,17 +45,17 @@ class Diagnosis:
 def diagnose(robot: Robot) -> Diagnosis:
     """Diagnose `robot` at its home pose, with its carriers at home."""
     dynamics = Dynamics(robot)
-    scale = np.array([1.0, 1, 1, robot.length, robot.length, robot.length])[:, None]
+    scale = robot.wrench_scale[:, None]
     rows = robot.dof_mask[:, None]
-    A = dynamics.wrench_matrix(robot.home) / scale * rows
+    A = dynamics.wrench_matrix(robot.home) * scale * rows
     lengths = dynamics.cable_lengths(robot.home)
     singular_values = np.linalg.svd(A, compute_uv=False)[: len(robot.platform.dof)]
     level, tilted = _poses_about_home(robot, lengths)
     rank = _rank(A)
     return Diagnosis(
         rank=rank,
-        rank_level=int(_ranks(dynamics.wrench_matrix(level) / scale * rows).max()),
-        rank_tilted=int(_ranks(dynamics.wrench_matrix(tilted) / scale * rows).max()),
+        rank_level=int(_ranks(dynamics.wrench_matrix(level) * scale * rows).max()),
+        rank_tilted=int(_ranks(dynamics.wrench_matrix(tilted) * scale * rows).max()),
         singular_values=singular_values,
         lengths=lengths,
         reason=_why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else "",

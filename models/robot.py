@@ -435,6 +435,11 @@ class Robot(Part):
         return self.weight or float(self.t_max.mean())
 
     @property
+    def wrench_scale(self) -> np.ndarray:
+        """Factors that bring a wrench to newtons, (6,): 1 for forces [-], 1 / `length` for moments [1/m]."""
+        return np.repeat([1.0, 1.0 / self.length], 3)  # (6,)
+
+    @property
     def length(self) -> float:
         """Length that makes moments comparable to forces [m]: the largest distance of an attachment from the CoM."""
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)

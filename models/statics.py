@@ -177,8 +177,7 @@ def _judge(
     robot: Robot, dynamics: Dynamics, pose: np.ndarray, carriers: np.ndarray, tensions: np.ndarray
 ) -> Equilibrium:
     w = dynamics.required_wrench(pose, np.zeros(6), np.zeros(6))
-    missing = (dynamics.wrench_matrix(pose, carriers) @ tensions - w) * robot.dof_mask
-    missing[3:] /= robot.length
+    missing = (dynamics.wrench_matrix(pose, carriers) @ tensions - w) * robot.dof_mask * robot.wrench_scale
     com = pose[:3] + rotation(ca.DM(pose)[3:6]).full() @ np.array(robot.platform.com)
     energy = -robot.platform.mass * float(np.dot(robot.gravity, com))
     return Equilibrium(pose, tensions, dynamics.cable_lengths(pose, carriers), energy, float(np.linalg.norm(missing)))

@@ -64,7 +64,7 @@ def durations(scenario: Scenario) -> Durations | None:
     shares = np.linspace(0.0, 1.0, PLACES)
     platform, carriers = scenario.motion(shares * scenario.duration, None)
     rows = np.flatnonzero(robot.dof_mask)
-    scale = 1.0 / np.array([1.0, 1, 1, *[robot.length] * 3])[rows]
+    scale = robot.wrench_scale[rows]
     A = dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     values = np.linalg.svd(A, compute_uv=False)
     if robot.m < len(rows) or (values[:, -1] < INDEPENDENT * values[:, 0]).any():

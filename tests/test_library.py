@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from towline.distribution import pose_problem
 from towline.models import Dynamics, Robot, available, load
 from towline.models.caspr import read_caspr
 from towline.models.diagnosis import diagnose
@@ -199,3 +200,11 @@ def test_point_mass_and_planar_platform():
     for push in 5.0 * np.vstack([np.eye(3), -np.eye(3)]) * [1, 1, 0.1]:
         pushed = TensionProblem(problem.A, problem.w + push, planar.t_min, planar.t_max)
         assert solve(pushed).feasible
+
+
+@pytest.mark.parametrize("name", available())
+def test_moments_are_scaled_in_one_way(name):
+    """A robot's own scale is the one by which its tension problems compare moments with forces."""
+    robot = load(name)
+    assert pose_problem(Dynamics(robot), robot.home).row_scale == pytest.approx(robot.wrench_scale, rel=1e-15)
+    assert (robot.wrench_scale[:3] == 1).all()

@@ -51,7 +51,7 @@ def rows_of(robot: Robot, forces_only: bool = False) -> np.ndarray:
 def matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
     """Wrench matrices (k, rows, m) [N per N] of some thousand places at a time, and which places these are."""
     dynamics = dynamics_of(robot)
-    scale = np.where(rows < 3, 1.0, 1.0 / robot.length)
+    scale = robot.wrench_scale[rows]
     for start in range(0, len(places), PLACES_AT_ONCE):
         part = slice(start, start + PLACES_AT_ONCE)
         A = dynamics.wrench_matrix(places.pose[part], places.carriers[part])
@@ -85,7 +85,7 @@ def can_give(
     low = robot.t_min if t_min is None else t_min
     high = robot.t_max if t_max is None else t_max
     given = np.zeros(len(places), dtype=bool)
-    wanted = wrenches[..., rows] * np.where(rows < 3, 1.0, 1.0 / robot.length)
+    wanted = wrenches[..., rows] * robot.wrench_scale[rows]
     shared = wanted.ndim == 2
     for part, A in matrices(robot, places, rows):
         left = np.arange(len(A))
@@ -104,7 +104,7 @@ def lacking(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray
     That is the shortfall of the proofs that the batch solver finds: zero exactly where `can_give` says yes.
     """
     rows = rows_of(robot) if rows is None else rows
-    wanted = wrenches[:, rows] * np.where(rows < 3, 1.0, 1.0 / robot.length)
+    wanted = wrenches[:, rows] * robot.wrench_scale[rows]
     missing = np.zeros(len(places))
     for part, A in matrices(robot, places, rows):
         for w in wanted:

@@ -203,7 +203,7 @@ def _unwound(lengths: np.ndarray) -> np.ndarray:
 
 def _traction(robot: Robot, A: np.ndarray, w: np.ndarray, dT: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """T, (N, m), with |A (T + dT) - w|, (N,), and the rank of A, (N,), on the rows that can move."""
-    scale = robot.dof_mask / np.array([1, 1, 1, robot.length, robot.length, robot.length])
+    scale = robot.dof_mask * robot.wrench_scale
     A, w = A * scale[:, None], w * scale
     left = w - np.einsum("nij,nj->ni", A, dT)
     T = np.einsum("nij,nj->ni", np.linalg.pinv(A, rcond=SINGULAR), left)

@@ -159,7 +159,7 @@ def _few_cables(scenario: Scenario, A: np.ndarray) -> bool:
 def _scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
     """Wrenches (n, 6, ...) with moments over `Robot.length` and without what the platform does not feel."""
     robot = scenario.robot
-    scale = robot.dof_mask / np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    scale = robot.dof_mask * robot.wrench_scale
     return wrenches * scale.reshape(6, *[1] * (wrenches.ndim - 2))
 
 

@@ -34,7 +34,7 @@ def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Fu
     else:
         A = dynamics.wrench_matrix(platform[0], pose_rows[0])
         w = dynamics.required_wrench(*platform, *pose_rows, wind=wind)
-    scale = robot.force_scale * np.array([1.0, 1, 1, robot.length, robot.length, robot.length])
+    scale = robot.force_scale / robot.wrench_scale
     moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
     balance = ((A @ tensions - w) / ca.DM(scale))[moving]
     in_world = _in_world(scenario, platform, carriers)

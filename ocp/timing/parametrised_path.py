@@ -223,7 +223,7 @@ class ParametrisedPath:
 
     def _check_pace(self, s: np.ndarray, platform: Motion, carriers: Motion) -> None:
         """Where nothing moves with s, no time law can make it move."""
-        in_metres = np.array([1.0, 1, 1, *[self.robot.length] * 3])
+        in_metres = 1.0 / self.robot.wrench_scale
         pace = np.sqrt(
             np.square(platform.velocity * in_metres).sum(axis=1)
             + np.square(carriers.velocity * in_metres).sum(axis=(1, 2))

@@ -97,7 +97,7 @@ def phase_plane(
     robot = parametrised.robot
     platform, carriers = parametrised.at(s)
     rows = np.flatnonzero(robot.dof_mask)
-    scale = np.array([1.0, 1, 1, *[1 / robot.length] * 3])[rows]
+    scale = robot.wrench_scale[rows]
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     wrench = Wrench(*(part[:, rows] * scale for part in parametrised.wrench(platform)))
     middle = (robot.t_min + robot.t_max) / 2
@@ -123,7 +123,7 @@ def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, ma
     at_rest = plane.rows(weight)[2][:, -1] > 0  # beside the span of the cables whatever the speed
     at_rest[[0, -1]] = True
     rows = plane.tension_rows(weight)
-    in_rows = robot.dof_mask / np.array([1.0, 1, 1, *[robot.length] * 3])
+    in_rows = robot.dof_mask * robot.wrench_scale
     found = []
     for k in np.flatnonzero(at_rest | (rows[2] > 0).any(axis=1)):  # at the others the platform can rest
         if at_rest[k]:

@@ -156,7 +156,7 @@ def _rank_test() -> Claim:
     places = found.places.only(found.held)
     robot = found.robot
     A = Dynamics(robot).wrench_matrix(places.pose, places.carriers)
-    A[:, 3:] /= robot.length
+    A *= robot.wrench_scale[:, None]
     w = np.array([0.0, 0.0, robot.weight, 0.0, 0.0, 0.0])
     left = w - (A @ (np.linalg.pinv(A) @ w)[..., None])[..., 0]
     relative = np.linalg.norm(left, axis=1) / robot.weight

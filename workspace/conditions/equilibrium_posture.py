@@ -130,7 +130,7 @@ def _balance(robot: Any) -> ca.Function:
     pose, tensions = ca.SX.sym("pose", 6), ca.SX.sym("tensions", robot.m)
     carriers = ca.SX.sym("carrier_pose", len(robot.carriers), 6)
     A = dynamics.wrench_matrix(pose, carriers)
-    scale = ca.DM([1.0] * 3 + [1.0 / robot.length] * 3) / robot.weight
+    scale = ca.DM(robot.wrench_scale) / robot.weight
     error = scale * (A @ tensions - ca.DM(rest_wrench(robot)))
     first = 3
     if robot.fixed_lengths is not None:

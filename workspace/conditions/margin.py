@@ -37,7 +37,7 @@ class Margin(Condition):
         Outside, negative, they are bounds: the distance is at least as large, and as large where a facet is nearest.
         """
         rows = rows_of(robot)
-        w = rest_wrench(robot)[rows] * np.where(rows < 3, 1.0, 1.0 / robot.length)
+        w = rest_wrench(robot)[rows] * robot.wrench_scale[rows]
         found = np.empty(len(places))
         for part, A in matrices(robot, places, rows):
             found[part] = _margins(A, w, robot.t_min, robot.t_max)

@@ -38,7 +38,7 @@ class WrenchWithTolerance(Condition):
     def error(self, robot: Robot, places: Places) -> np.ndarray:
         """Smallest wrench error that tensions inside the limits leave, (n,) [N]; infinite where a cable has none."""
         rows = rows_of(robot)
-        w = rest_wrench(robot)[rows] * np.where(rows < 3, 1.0, 1.0 / robot.length)
+        w = rest_wrench(robot)[rows] * robot.wrench_scale[rows]
         error = np.empty(len(places))
         for part, A in matrices(robot, places, rows):
             error[part] = solve_batch(A, w, robot.t_min, robot.t_max, rho=_RHO, threads=1).residual

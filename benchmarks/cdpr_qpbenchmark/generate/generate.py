@@ -75,7 +75,7 @@ def degenerate(rng: np.random.Generator) -> Iterator[TensionProblem]:
         robot = dynamics.robot
         for _ in range(2):
             A = dynamics.wrench_matrix(_nearby(rng, dynamics)) * robot.dof_mask[:, None]
-            direction = rng.normal(size=6) / np.repeat([1.0, robot.length], 3)
+            direction = rng.normal(size=6) * robot.wrench_scale
             corner = np.where(direction @ A > 0, robot.t_max, robot.t_min)
             yield wrench_problem(dynamics.robot, A, A @ corner, robot.t_min, robot.t_max)
 
@@ -120,7 +120,7 @@ def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
     """A wrench at `part` times the largest tension beyond the boundary, along the normal there."""
     dynamics = Dynamics(load(name))
     robot = dynamics.robot
-    scale = np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask
+    scale = robot.wrench_scale * robot.dof_mask
     A = dynamics.wrench_matrix(_nearby(rng, dynamics))
     normal = rng.normal(size=6) * robot.dof_mask
     normal /= np.linalg.norm(normal)
