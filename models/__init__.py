@@ -1,8 +1,33 @@
-"""Robots as data, and their mechanics as CasADi Functions. This room knows no solver."""
+"""Robots as data, and their mechanics as CasADi Functions. This package knows no solver.
 
-from .dynamics import Dynamics
-from .files import available, load
-from .relative_dynamics import RelativeDynamics
-from .robot import Robot
+Each name below loads its module when it is first used, so that reading a robot file does not load CasADi.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .library import available
+
+if TYPE_CHECKING:
+    from .dynamics import Dynamics
+    from .files import load
+    from .relative_dynamics import RelativeDynamics
+    from .robot import Robot
 
 __all__ = ["Dynamics", "RelativeDynamics", "Robot", "available", "load"]
+
+_HOME = {"Dynamics": "dynamics", "RelativeDynamics": "relative_dynamics", "Robot": "robot", "load": "files"}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted({*globals(), *_HOME})

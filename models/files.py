@@ -8,15 +8,9 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..inputs import shown
+from .library import FOLDER, available
 from .parsing import read_yaml
 from .robot import Robot
-
-LIBRARY = Path(__file__).parent / "library"
-
-
-def available() -> list[str]:
-    """Names of the robots in the library, sorted."""
-    return sorted(path.stem for path in LIBRARY.glob("*.yaml"))
 
 
 def load(name: str | os.PathLike[str]) -> Robot:
@@ -37,7 +31,7 @@ def load(name: str | os.PathLike[str]) -> Robot:
     except TypeError:
         raise InputError(f"robot: {name!r}; accepted: a name or a path") from None
     if text in available():
-        return read_yaml(LIBRARY / f"{text}.yaml", Robot)
+        return read_yaml(FOLDER / f"{text}.yaml", Robot)
     path = Path(text)
     if path.suffix in (".yaml", ".yml") or _exists(path):
         return read_yaml(path, Robot)

@@ -13,7 +13,7 @@ import xarray as xr
 from PIL import Image
 
 from towline.models import available, load
-from towline.models.files import LIBRARY
+from towline.models.library import FOLDER
 
 TOWLINE = Path(sys.executable).with_name("towline")
 
@@ -270,7 +270,7 @@ WRONG_FILES = {
 @pytest.mark.parametrize("case", WRONG_FILES)
 def test_wrong_robot_file_is_one_line_and_exit_code_2(case, tmp_path):
     change, named = WRONG_FILES[case]
-    text = (LIBRARY / "wang-flying.yaml").read_text()
+    text = (FOLDER / "wang-flying.yaml").read_text()
     file = tmp_path / "mine.yaml"
     changed = change(text)
     assert changed != text

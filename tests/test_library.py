@@ -7,7 +7,7 @@ from towline.distribution import pose_problem
 from towline.models import Dynamics, Robot, available, load
 from towline.models.caspr import read_caspr
 from towline.models.diagnosis import diagnose
-from towline.models.files import LIBRARY
+from towline.models.library import FOLDER
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.solvers import TensionProblem, solve
 
@@ -87,7 +87,7 @@ def test_source_says_where_numbers_come_from(name):
     """A published model, or what is assumed; and nothing but facts: no comment besides the editor's line."""
     source = load(name).source
     assert "CASPR (D. Lau et al., BSD-3-Clause)" in source or "Assumed" in source or "assumed" in source
-    comments = [line for line in (LIBRARY / f"{name}.yaml").read_text().splitlines() if "#" in line]
+    comments = [line for line in (FOLDER / f"{name}.yaml").read_text().splitlines() if "#" in line]
     assert comments == ["# yaml-language-server: $schema=robot.schema.json"]
 
 

@@ -9,7 +9,7 @@ import pytest
 from towline.errors import InputError
 from towline.models import Robot, available, load
 from towline.models.diagnosis import diagnose
-from towline.models.files import LIBRARY
+from towline.models.library import FOLDER, contents
 from towline.models.parsing import parse_yaml, to_yaml
 
 GOOD = """\
@@ -141,14 +141,34 @@ def test_library_robots_survive_writing_and_reading(name):
 
 
 def test_published_schema_is_the_models():
-    published = json.loads((LIBRARY / "robot.schema.json").read_text())
+    published = json.loads((FOLDER / "robot.schema.json").read_text())
     assert published == Robot.model_json_schema()
     for name in available():
-        assert "$schema=robot.schema.json" in (LIBRARY / f"{name}.yaml").read_text()
+        assert "$schema=robot.schema.json" in (FOLDER / f"{name}.yaml").read_text()
+
+
+def test_the_contents_of_the_library_are_those_of_its_files():
+    """`towline robots` lists them without reading each file; a new robot needs a line in contents.json."""
+    rows = []
+    for name in available():
+        robot = load(name)
+        kinds = [carrier.kind for carrier in robot.carriers]
+        rows.append(
+            {
+                "name": name,
+                "cables": robot.m,
+                "carriers": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
+                "mass": robot.platform.mass,
+                "source": robot.source.strip().splitlines()[0].strip(),
+            }
+        )
+    lines = "[\n" + ",\n".join(json.dumps(row, ensure_ascii=False) for row in rows) + "\n]\n"
+    assert (FOLDER / "contents.json").read_text(encoding="utf-8") == lines
+    assert contents() == rows
 
 
 def test_robot_without_a_home_gets_one_below_its_anchors():
-    text = re.sub(r"  home: .*\n", "", (LIBRARY / "wang-flying.yaml").read_text())
+    text = re.sub(r"  home: .*\n", "", (FOLDER / "wang-flying.yaml").read_text())
     robot = parse_yaml(text, Robot, "no home")
     np.testing.assert_allclose(robot.home, [0, 0, -0.07 - 0.52, 0, 0, 0], atol=1e-9)
 
