@@ -1,4 +1,4 @@
-"""The machine that figures come from, in one line."""
+"""Describe the machine that figures come from."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def machine(packages: tuple[str, ...] = ("casadi", "numpy", "numba")) -> str:
-    """Processor, cores and versions, in one line; packages that are not installed are left out."""
+    """Return processor, cores and versions in one line; packages that are not installed are left out."""
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     models = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
     processor = models[0] if models else platform.processor()

@@ -1,10 +1,11 @@
-"""Random planning tasks over six robots: what becomes of each, and whether that is true.
+"""Plan random tasks over six robots, and check what each plan claims.
 
     python -m towline.benchmarks.random_tasks [--count 200] [--start 0]
 
-Each task is told by its seed. A plan that is called feasible has passed its audit; one that is called infeasible has a
-certificate, which is verified here once more, or leaves a limit of its carriers, which the task fixed; "not found" is
-counted. Exit code 1 if more than 5 % are not found, or anything is wrong.
+A seed determines a task. A feasible plan must have tensions inside their limits that give the force, by equations that
+are written here again. An infeasible plan must have a certificate, which is verified again, or carriers that the task
+itself moves beyond their limits. Plans of status "not-found" are counted. The exit code is 1 if more than 5 % are not
+found or any plan claims what is not true.
 """
 
 from __future__ import annotations
@@ -28,28 +29,30 @@ MOST_NOT_FOUND = 0.05
 
 
 class Outcome(NamedTuple):
-    """What became of the task of one seed."""
+    """Hold the result of the task of one seed."""
 
     seed: int
     robot: str
-    told: str  # a `MotionStatus`, or "wrong: ..." with why
+    result: str  # a `MotionStatus`, or "wrong: ..." with the reason
     seconds: float
 
 
 def main() -> None:
-    """Run and report."""
+    """Run the tasks and print a summary."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--start", type=int, default=0, help="the first seed")
+    parser.add_argument("--count", type=int, default=200, help="number of tasks (default: 200)")
+    parser.add_argument("--start", type=int, default=0, help="the first seed (default: 0)")
     options = parser.parse_args()
-    if options.count < 1 or options.start < 0:
-        parser.error(f"--count: {options.count}, --start: {options.start}; accepted: from 1 on, from 0 on")
+    if options.count < 1:
+        parser.error(f"--count must be 1 or more, got {options.count}")
+    if options.start < 0:
+        parser.error(f"--start must be 0 or more, got {options.start}")
     outcomes = []
     for seed in range(options.start, options.start + options.count):
         outcomes.append(attempt(seed))
-        if outcomes[-1].told not in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE):
-            print(f"seed {seed}, {outcomes[-1].robot}: {outcomes[-1].told}", flush=True)
-    counts = Counter(outcome.told.split(":")[0] for outcome in outcomes)
+        if outcomes[-1].result not in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE):
+            print(f"seed {seed}, {outcomes[-1].robot}: {outcomes[-1].result}", flush=True)
+    counts = Counter(outcome.result.split(":")[0] for outcome in outcomes)
     times = [outcome.seconds for outcome in outcomes]
     slowest = max(outcomes, key=lambda outcome: outcome.seconds)
     longest = f"longest {slowest.seconds:.1f} s (seed {slowest.seed}, {slowest.robot})"
@@ -58,42 +61,42 @@ def main() -> None:
 
 
 def attempt(seed: int) -> Outcome:
-    """Plan the task of a seed and check what the plan says of itself."""
+    """Plan the task of a seed and check what the plan claims."""
     name, task = random_task(seed)
     start = time.perf_counter()
     try:
-        found = plan(load(name), task)
-        told = wrong(found) or found.status.value
+        planned = plan(load(name), task)
+        result = wrong(planned) or planned.status.value
     except TowlineError as error:
-        told = f"wrong: {error}"
-    return Outcome(seed, name, told, time.perf_counter() - start)
+        result = f"wrong: {error}"
+    return Outcome(seed, name, result, time.perf_counter() - start)
 
 
-def wrong(found: Plan) -> str:
-    """Return what a plan says of itself that is not so; empty if nothing."""
-    audit, robot = found.audit, found.scenario.robot
+def wrong(planned: Plan) -> str:
+    """Return which claim of a plan is not true, "wrong: ..."; empty if all are."""
+    audit, robot = planned.audit, planned.scenario.robot
     low, high = robot.t_min, robot.t_max
-    if found.status is MotionStatus.FEASIBLE:
+    if planned.status is MotionStatus.FEASIBLE:
         tensions = audit.tensions
         if not ((tensions >= low) & (tensions <= high)).all():
             return "wrong: feasible, but a tension is beyond its limits"
-        A = found.scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
-        w = found.scenario.dynamics.required_wrench(*audit.motion, *audit.carriers, wind=found.scenario.wind)
-        missing = ((np.einsum("nij,nj->ni", A, tensions) - w) * robot.dof_mask)[:, :3]
-        if np.linalg.norm(missing, axis=1).max() > max(audit.tolerance, 1e-6):
+        A = planned.scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
+        w = planned.scenario.dynamics.required_wrench(*audit.motion, *audit.carriers, wind=planned.scenario.wind)
+        short = ((np.einsum("nij,nj->ni", A, tensions) - w) * robot.dof_mask)[:, :3]
+        if np.linalg.norm(short, axis=1).max() > max(audit.tolerance, 1e-6):
             return "wrong: feasible, but the tensions do not give the force"
-        return "" if not audit.excess else "wrong: feasible, but a limit is left"
-    if found.status is MotionStatus.INFEASIBLE and not audit.excess:
+        return "" if not audit.excess else "wrong: feasible, but a limit is exceeded"
+    if planned.status is MotionStatus.INFEASIBLE and not audit.excess:
         certificate, at = audit.certificate, audit.certificate_time
         if certificate is None or at is None:
             return "wrong: infeasible, but nothing proves it"
         row = int(np.argmin(np.abs(audit.times - at)))
         pose, carriers = audit.motion.pose[row], audit.carriers.pose[row]
-        A = found.scenario.dynamics.wrench_matrix(pose, carriers)
+        A = planned.scenario.dynamics.wrench_matrix(pose, carriers)
         motions = [part[row] for part in (*audit.motion, *audit.carriers)]
-        wind = audit.certificate_wind or found.scenario.wind
-        w = found.scenario.dynamics.required_wrench(*motions, wind=wind)
-        problem = wrench_problem(found.scenario.robot, A, w, *found.scenario.bounds())
+        wind = audit.certificate_wind or planned.scenario.wind
+        w = planned.scenario.dynamics.required_wrench(*motions, wind=wind)
+        problem = wrench_problem(planned.scenario.robot, A, w, *planned.scenario.bounds())
         return "" if certificate.verify(problem) else "wrong: infeasible, but its certificate proves nothing"
     return ""
 
@@ -132,7 +135,7 @@ def random_task(seed: int) -> tuple[str, Task]:
 
 
 def _path(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool) -> dict[str, Any]:
-    """A path about the platform's home, in the coordinates that it has."""
+    """Return a path about the platform's home, in its degrees of freedom."""
     dynamics, home = Dynamics(robot), robot.home
     rest = np.zeros(6)
 
@@ -170,7 +173,7 @@ def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray) -> bool:
 
 
 def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """Carriers at rest at home, or a single one that moves as given."""
+    """Return carriers at rest at home, or one carrier that moves along a given path."""
     carrier = robot.carriers[0]
     if carrier.kind != "prescribed" or rng.random() < 0.5:
         return {"kind": "hold"}
@@ -181,7 +184,7 @@ def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
 
 
 def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """What the carriers do: those that can move are free, quadrotors always, others mostly."""
+    """Return free carriers where the robot has some that can move: always for quadrotors, mostly for others."""
     kinds = {carrier.kind for carrier in robot.carriers}
     if "quadrotor" in kinds or (kinds & {"prescribed", "mobile"} and rng.random() < 0.8):
         return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}

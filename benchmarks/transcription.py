@@ -1,11 +1,11 @@
-"""The same plans by each solver and by each scheme: what they take, and what the audit sees between the points.
+"""Compare solvers and schemes on the same plans: their time, and the wrench error that the audit measures.
 
     python -m towline.benchmarks.transcription [--runs 5]
 
 The first table compares IPOPT with fatrop: build and first solve, and the same object solved again from its own
-solution; medians of several runs. The second lets the load of paper C's robot, whose three cables cannot follow any
-motion exactly, be carried by each scheme on ever finer meshes, without refinement: the wrench that is missing between
-the points at most, over the weight, and the time of one run.
+solution; medians of several runs. The second carries the load of paper C's robot, whose three cables cannot follow every
+motion exactly, by each scheme on ever finer meshes without refinement. It prints the largest wrench error between the
+points over the weight, and the time of one run.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Case = tuple[Robot, Task]
 
 
 class Timing(NamedTuple):
-    """Build and first solve, and again [s]; iterations of both; the objective."""
+    """Times of build and first solve and of the second solve [s], iterations of both, and the objective."""
 
     first: float
     again: float
@@ -49,34 +49,34 @@ class Timing(NamedTuple):
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print both tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=5, help="of each case (default: 5)")
     options = parser.parse_args()
     if options.runs < 1:
-        parser.error(f"--runs: {options.runs}; accepted: from 1 on")
+        parser.error(f"--runs must be 1 or more, got {options.runs}")
     print(machine(("casadi", "numpy")))
     for name, case in CASES.items():
         for solver in ("ipopt", "fatrop"):
             print(_line(name, solver, case, options.runs), flush=True)
     for scheme in SCHEMES:
         for steps in STEPS:
-            print(_missing(scheme, steps), flush=True)
+            print(_wrench_error(scheme, steps), flush=True)
 
 
 def circle(ends: Literal["free", "rest"]) -> Case:
-    """Paper F's circle with the base free, N = 100; not periodic, which fatrop cannot do."""
+    """Return paper F's circle with the base free, N = 100; not periodic, which fatrop does not support."""
     task = tasks()[1]
     return load("wang-flying"), task.model_copy(update={"base": task.base.model_copy(update={"ends": ends})})
 
 
 def crane() -> Case:
-    """Eight cables, the tube free, N = 100."""
+    """Return a line for eight cables, with the tube free, N = 100."""
     return load("ipanema-1"), Task.model_validate(LINE)
 
 
 def towing(drive: towing_plans.Drive) -> Case:
-    """Paper C's robot with least effort, N = 50."""
+    """Return paper C's robot with least effort, N = 50."""
     robot = towing_plans.robot("wang-ctmrts", drive)
     return robot, towing_plans.task(robot, "effort")
 
@@ -118,7 +118,7 @@ def _timed(case: Callable[[], Case], solver: str) -> Timing:
     )
 
 
-def _missing(scheme: str, steps: int) -> str:
+def _wrench_error(scheme: str, steps: int) -> str:
     robot, task = towing("variable-length")
     changed: dict[str, Any] = {"scheme": scheme}
     scenario = lay_out(robot, task.model_copy(update=changed))
@@ -126,7 +126,7 @@ def _missing(scheme: str, steps: int) -> str:
     outcome = Solver(build(scenario, Mesh(steps))).solve(None)
     took = time.perf_counter() - start
     share = audit(scenario, outcome.deviation).violation.max() / robot.force_scale
-    return f"{scheme:9} N = {steps:3}  missing {share:8.2e} of the weight  {took:6.3f} s  {outcome.message}"
+    return f"{scheme:9} N = {steps:3}  wrench error {share:8.2e} of the weight  {took:6.3f} s  {outcome.message}"
 
 
 if __name__ == "__main__":

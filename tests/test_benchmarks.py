@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from towline.benchmarks import tension
+from towline.benchmarks import planning, tension
 from towline.benchmarks.qp_solver import multipliers, register, solve_problem
 from towline.benchmarks.tension_contenders import REFERENCE, Contender, contenders
 from towline.benchmarks.tension_tasks import KINDS, make_task
@@ -204,3 +204,22 @@ def test_bench_refuses_in_one_line(arguments, told):
     assert done.returncode == 2
     assert told in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_all_plan_the_same_circle():
+    """Everyone's plan passes the audit, and the three by inverse dynamics have the same optimum."""
+    runs = planning.measure(8, 1)
+    assert list(runs) == ["towline", "CasADi, direct", "CasADi, mapped", "CasADi Opti", "rockit"]
+    for name, (run,) in runs.items():
+        assert run.first > 0 < run.again, name
+        assert all(audit.passed and audit.violation.max() < 1e-9 for audit in run.audits), name
+        moved = np.abs(run.audits[0].carriers.pose - run.audits[1].carriers.pose).max()
+        assert moved < 1e-5, name
+    ours = runs["towline"][0].audits[0]
+    for name in ("CasADi, direct", "CasADi, mapped"):
+        theirs = runs[name][0].audits[0]
+        np.testing.assert_allclose(theirs.carriers.pose, ours.carriers.pose, atol=1e-5)
+        np.testing.assert_allclose(theirs.tensions, ours.tensions, atol=1e-4)
+    lines = planning.table(runs)
+    assert len(lines) == 1 + len(runs)
+    assert "1.00, 1.00   passed" in lines[1]

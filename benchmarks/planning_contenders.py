@@ -1,0 +1,316 @@
+"""Paper F's circle with the base free, as each contender of `benchmarks.planning` writes it.
+
+All have the same task: the platform on the circle and level, every tension inside its limits, the base's acceleration
+at most 3 m/s^2, the last state and the base's last acceleration equal to the first, and the same costs; a base
+acceleration that is constant in each interval has no jerk to pay for. All use IPOPT with
+the same tolerances, scaled unknowns and exact Hessians; they start from a guess on the path, and again from their own
+solution and its multipliers. What only the second solve needs is made before its time is taken.
+
+- towline: `Planner`, which makes its own guess.
+- CasADi, direct and mapped: the same inverse dynamics written out in CasADi, for this robot and this task alone.
+- Opti and rockit: as their manuals do it, multiple shooting with RK4 of the platform's forward dynamics, tensions and
+  base acceleration constant in each interval. The step is an SX function: to expand the whole program makes an
+  iteration a tenth faster and the first solve four times slower.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ..models import Robot, load
+from ..models.rotation import inverse_rate_matrix, rotation
+from ..ocp import Planner, Task
+from ..ocp.audits.audit import Audit, audit
+from ..ocp.tasks.scenario import Deviation, lay_out
+from ..ocp.tasks.scheme import SCHEMES
+from ..studies.flying.circle import HOVER, tasks
+
+__all__ = ["CONTENDERS", "Run", "circle"]
+
+ROBOT = "wang-flying"
+MOST = 3.0  # acceleration of the base [m/s^2]
+OFFSET, JERK = 10.0, 10.0  # base away from the hovering point [m], and its jerk [m/s^3], that cost as much as 1 m/s^2
+ACCURACY = {"print_level": 0, "sb": "yes", "tol": 1e-8, "constr_viol_tol": 1e-9}
+FIRST = ACCURACY | {"mu_init": 1e-2}  # the guess is near: IPOPT's own 0.1 takes more iterations
+AGAIN = ACCURACY | {
+    "mu_init": 1e-6,
+    "warm_start_init_point": "yes",
+    "warm_start_bound_push": 1e-6,
+    "warm_start_bound_frac": 1e-6,
+    "warm_start_slack_bound_push": 1e-6,
+    "warm_start_slack_bound_frac": 1e-6,
+    "warm_start_mult_bound_push": 1e-6,
+}
+
+
+Solve = Callable[..., Any]  # (states, controls, multipliers) -> the same of the solution
+
+
+class Run(NamedTuple):
+    """Times of build and first solve and of the second solve [s], and the audits of both solutions."""
+
+    first: float
+    again: float
+    audits: tuple[Audit, Audit]
+
+
+def circle(steps: int) -> Task:
+    """Return the circle with the base free, on so many intervals."""
+    return tasks()[1].model_copy(update={"steps": steps})
+
+
+def towline(steps: int) -> Run:
+    """Plan twice with one `Planner`; its audits and its check of rest are not counted, since no other has them."""
+    robot = load(ROBOT)
+    start = time.perf_counter()
+    planner = Planner(robot, circle(steps))
+    laid_out = time.perf_counter() - start
+    first = planner.plan()
+    planner.plan()  # the solver for a warm start is made here
+    again = planner.plan()
+    times = laid_out + first.build_s + first.solve_s, again.build_s + again.solve_s
+    return Run(*times, (first.audit, again.audit))
+
+
+def direct(steps: int) -> Run:
+    """Write the program in SX, node by node, as CasADi's examples do."""
+    return _direct(steps, mapped=False)
+
+
+def mapped(steps: int) -> Run:
+    """Write the same program with one SX function of a node, mapped over the nodes: it is differentiated only once."""
+    return _direct(steps, mapped=True)
+
+
+def _direct(steps: int, mapped: bool) -> Run:
+    """Write inverse dynamics for this robot and this task alone: base motion and tensions at each node.
+
+    The platform is level and does not turn, and neither does the base, so no rotation and no inertia is left. Position
+    and speed are integrated exactly from an acceleration that is linear in each interval.
+    """
+    robot = load(ROBOT)
+    start = time.perf_counter()
+    task = circle(steps)
+    nodes = np.linspace(0.0, task.seconds, steps + 1)
+    path = task.path.at(nodes, task.seconds)
+    h, weight, m = task.seconds / steps, robot.force_scale, robot.m
+    needed = robot.platform.mass * (path.acceleration[:, :3] - np.array(robot.gravity)) / weight
+    given = ca.DM(np.hstack([path.pose[:, :3], needed]).T)
+
+    node = _node(robot)
+    X: Any = (ca.MX if mapped else ca.SX).sym("X", 9 + m, steps + 1)
+    if mapped:
+        outputs: list[Any] = list(node.map(steps + 1)(X, given))
+    else:
+        columns = [node(X[:, k], given[:, k]) for k in range(steps + 1)]
+        outputs = [ca.horzcat(*parts) for parts in zip(*columns, strict=True)]
+    costs, balances = outputs
+    q, v, a = X[:3, :], X[3:6, :], X[6:9, :]
+    here, there = a[:, :-1], a[:, 1:]
+    position = q[:, 1:] - (q[:, :-1] + h * v[:, :-1] + h**2 / 6 * (2 * here + there))
+    speed = h * (v[:, 1:] - (v[:, :-1] + h / 2 * (here + there)))
+    shares = np.full((1, steps + 1), 1 / steps)
+    shares[0, [0, -1]] /= 2
+    problem = {
+        "x": ca.vec(X),
+        "f": ca.dot(costs, ca.DM(shares)) + ca.sumsqr((there - here) / h) / JERK**2 / steps,
+        "g": ca.vertcat(ca.vec(balances), ca.vec(position), ca.vec(speed), X[:9, 0] - X[:9, -1]),
+    }
+
+    low, high = np.full((2, 9 + m, steps + 1), np.inf)
+    low[:9] *= -1
+    low[9:], high[9:] = robot.t_min[:, None] / weight, robot.t_max[:, None] / weight
+    node_low, node_high = np.zeros((2, steps + 1, 7))
+    node_low[:, 6], node_high[:, 6] = -np.inf, 1.0
+    rest = np.zeros(6 * steps + 9)
+    bounds = {
+        "lbx": low.ravel("F"),
+        "ubx": high.ravel("F"),
+        "lbg": np.r_[node_low.ravel(), rest],
+        "ubg": np.r_[node_high.ravel(), rest],
+    }
+
+    guess = np.zeros((9 + m, steps + 1))
+    guess[:3] = (path.pose[:, :3] - path.pose[:, :3].mean(axis=0)).T
+    guess[3:6], guess[6:9] = path.velocity[:, :3].T, path.acceleration[:, :3].T
+    guess[9:] = 1 / m
+    solver = ca.nlpsol("direct", "ipopt", problem, _options(FIRST))
+    solution = solver(x0=guess.ravel("F"), **bounds)
+    first = time.perf_counter() - start
+
+    warm = ca.nlpsol("direct", "ipopt", problem, _options(AGAIN))
+    start = time.perf_counter()
+    repeated = warm(x0=solution["x"], lam_x0=solution["lam_x"], lam_g0=solution["lam_g"], **bounds)
+    again = time.perf_counter() - start
+
+    def audited(x: ca.DM) -> Audit:
+        columns = x.full().reshape(9 + m, steps + 1, order="F").T
+        parts = columns[:, :3], columns[:, 3:6], columns[:, 6:9], weight * columns[:, 9:]
+        return audit(lay_out(robot, task), Deviation(nodes, *parts))
+
+    return Run(first, again, (audited(solution["x"]), audited(repeated["x"])))
+
+
+def _node(robot: Robot) -> ca.Function:
+    """Return cost and constraints of a node with (q, v, a, tensions / weight), given (place, force / weight)."""
+    x, given = ca.SX.sym("x", 9 + robot.m), ca.SX.sym("given", 6)
+    q, _, a, tensions = ca.vertsplit(x, [0, 3, 6, 9, 9 + robot.m])
+    force, moment = -given[3:], ca.SX.zeros(3)
+    for i in range(robot.m):
+        cable = ca.DM(np.array(HOVER[:3]) + robot.anchors[i] - robot.attachments[i]) + q - given[:3]
+        pull = tensions[i] / ca.norm_2(cable) * cable
+        force += pull
+        moment += ca.cross(ca.DM(robot.attachments[i] / robot.length), pull)
+    cost = ca.sumsqr(tensions) + ca.sumsqr(a) + ca.sumsqr(q) / OFFSET**2
+    values = ca.vertcat(force, moment, ca.sumsqr(a) / MOST**2)
+    return ca.Function("node", [x, given], [cost, values], {"cse": True, "is_diff_in": [True, False]})
+
+
+class _Shooting:
+    """Hold what both peers need: a step of the dynamics, the path, costs and a guess.
+
+    x = (position, angles, velocity and body rates of the platform, position and velocity of the base), u = (tensions
+    over the weight, acceleration of the base).
+    """
+
+    def __init__(self, robot: Robot, steps: int) -> None:
+        self.robot, self.steps, self.task = robot, steps, circle(steps)
+        self.seconds = self.task.seconds
+        self.nodes = np.linspace(0.0, self.seconds, steps + 1)
+        self.path = self.task.path.at(self.nodes, self.seconds)
+        self.low, self.high = robot.t_min / robot.force_scale, robot.t_max / robot.force_scale
+        self.step = _step(robot, self.seconds / steps)
+
+    def guess(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return states (18, N + 1) and controls (9, N): on the path, the base above it, the weight shared out."""
+        base = self.path.pose[:, :3] - self.path.pose[:, :3].mean(axis=0) + HOVER[:3]
+        states = np.hstack([self.path.pose, self.path.velocity, base, self.path.velocity[:, :3]]).T
+        tensions = np.full((self.steps, 6), 1 / 6)
+        return states, np.hstack([tensions, self.path.acceleration[:-1, :3]]).T
+
+    def cost(self, u: Any, x: Any) -> Any:
+        """Return the running cost: that of the others without the jerk, which a constant acceleration does not have."""
+        return ca.sumsqr(u) + ca.sumsqr(x[12:15] - ca.DM(HOVER[:3])) / OFFSET**2
+
+    def audited(self, x: ca.DM, u: ca.DM) -> Audit:
+        """Audit the base's motion of a solution: x (18, N + 1), u (9, N)."""
+        states, a = x.full()[12:18].T, u.full()[6:9].T
+        h = self.seconds / self.steps
+        nodes = np.linspace(0.0, self.seconds, 2 * self.steps + 1)
+        q, v, accelerations = (np.zeros((len(nodes), 3)) for _ in range(3))
+        # The scheme has its accelerations in the middle of each interval.
+        q[::2], v[::2] = states[:, :3] - HOVER[:3], states[:, 3:]
+        q[1::2] = q[:-1:2] + h / 2 * v[:-1:2] + h**2 / 8 * a
+        v[1::2] = v[:-1:2] + h / 2 * a
+        accelerations[1::2] = a
+        accelerations[:-1:2], accelerations[-1] = a, a[-1]
+        tensions = self.robot.force_scale * np.repeat(u.full()[:6].T, 2, axis=0)
+        tensions = np.vstack([tensions, tensions[-1]])
+        task = self.task.model_copy(update={"scheme": "constant"})
+        deviation = Deviation(nodes, q, v, accelerations, tensions, SCHEMES["constant"])
+        return audit(lay_out(self.robot, task), deviation)
+
+
+def _step(robot: Robot, h: float) -> ca.Function:
+    """Return (x, u) -> x after h [s], by RK4 of Newton's and Euler's equations for a CoM in the platform's origin."""
+    x, u = ca.SX.sym("x", 18), ca.SX.sym("u", 9)
+    R, rates, inertia = rotation(x[3:6]), x[9:12], ca.DM(robot.inertia)
+    force, moment = robot.platform.mass * ca.DM(robot.gravity), ca.SX.zeros(3)
+    for i in range(robot.m):
+        arm = R @ ca.DM(robot.attachments[i])
+        cable = x[12:15] + ca.DM(robot.anchors[i]) - x[:3] - arm
+        pull = robot.force_scale * u[i] / ca.norm_2(cable) * cable
+        force += pull
+        moment += ca.cross(arm, pull)
+    turning = ca.inv(inertia) @ (R.T @ moment - ca.cross(rates, inertia @ rates))
+    moving = [x[6:9], inverse_rate_matrix(x[3:6]) @ rates, force / robot.platform.mass, turning]
+    f = ca.Function("f", [x, u], [ca.vertcat(*moving, x[15:18], u[6:9])])
+    k1 = f(x, u)
+    k2 = f(x + h / 2 * k1, u)
+    k3 = f(x + h / 2 * k2, u)
+    k4 = f(x + h * k3, u)
+    return ca.Function("step", [x, u], [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)], {"cse": True})
+
+
+def opti(steps: int) -> Run:
+    """Write the shooting with CasADi's Opti."""
+
+    def write(problem: _Shooting, ipopt: dict[str, Any]) -> ca.Function:
+        nlp = ca.Opti()
+        X, U = nlp.variable(18, steps + 1), nlp.variable(9, steps)
+        cost = 0.0
+        for k in range(steps):
+            nlp.subject_to(X[:, k + 1] == problem.step(X[:, k], U[:, k]))
+            nlp.subject_to(nlp.bounded(problem.low, U[:6, k], problem.high))
+            nlp.subject_to(ca.sumsqr(U[6:9, k]) / MOST**2 <= 1)
+            nlp.subject_to(X[:6, k + 1] == problem.path.pose[k + 1])
+            cost += problem.cost(U[:, k], X[:, k]) / steps
+        nlp.subject_to(X[:, 0] == X[:, -1])
+        nlp.subject_to(U[6:9, 0] == U[6:9, -1])
+        nlp.minimize(cost)
+        nlp.solver("ipopt", _options(ipopt))
+        return nlp.to_function("opti", [X, U, nlp.lam_g], [X, U, nlp.lam_g])
+
+    return _shot(steps, write)
+
+
+def rockit(steps: int) -> Run:
+    """Write the shooting with rockit."""
+    from rockit import MultipleShooting, Ocp
+
+    def write(problem: _Shooting, ipopt: dict[str, Any]) -> Solve:
+        make: Any = Ocp  # its types say that T is a whole number and that a state may be None
+        ocp = make(T=problem.seconds)
+        x, u = ocp.state(18), ocp.control(9)
+        place = ocp.parameter(6, grid="control+")
+        ocp.set_value(place, problem.path.pose.T)
+        ocp.set_next(x, problem.step(x, u))
+        ocp.subject_to(problem.low <= (u[:6] <= problem.high))
+        ocp.subject_to(ca.sumsqr(u[6:9]) / MOST**2 <= 1)
+        ocp.subject_to(x[:6] == place, include_first=False)
+        ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
+        ocp.subject_to(ocp.at_t0(u[6:9]) == ocp.at_tf(u[6:9]))
+        ocp.add_objective(ocp.sum(problem.cost(u, x)) / steps)
+        ocp.solver("ipopt", _options(ipopt))
+        ocp.method(MultipleShooting(N=steps))
+        X, U = (ocp.sample(each, grid=grid)[1] for each, grid in ((x, "control"), (u, "control-")))
+        places = ocp.sample(place, grid="control")[1]
+        multipliers = ocp._method.opti.lam_g  # rockit's own code generator takes it from here too
+        solve = ocp.to_function("rockit", [X, U, multipliers, places], [X, U, multipliers])
+        return lambda X, U, multipliers: solve(X, U, multipliers, problem.path.pose.T)
+
+    return _shot(steps, write)
+
+
+def _shot(steps: int, write: Callable[[_Shooting, dict[str, Any]], Solve]) -> Run:
+    """Time a peer; `write` builds its solver with the given options of IPOPT."""
+    robot = load(ROBOT)
+    start = time.perf_counter()
+    problem = _Shooting(robot, steps)
+    solve = write(problem, FIRST)
+    solution = solve(*problem.guess(), 0)
+    first = time.perf_counter() - start
+    warm = write(problem, AGAIN)
+    start = time.perf_counter()
+    repeated = warm(*solution)
+    again = time.perf_counter() - start
+    return Run(first, again, (problem.audited(*solution[:2]), problem.audited(*repeated[:2])))
+
+
+def _options(ipopt: dict[str, Any]) -> dict[str, Any]:
+    """Return options of `nlpsol` with these of IPOPT; a solve that fails raises RuntimeError."""
+    return {"print_time": False, "error_on_fail": True, "ipopt": ipopt}
+
+
+CONTENDERS: dict[str, Callable[[int], Run]] = {
+    "towline": towline,
+    "CasADi, direct": direct,
+    "CasADi, mapped": mapped,
+    "CasADi Opti": opti,
+    "rockit": rockit,
+}
