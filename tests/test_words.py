@@ -1,0 +1,196 @@
+"""Test that texts for users avoid the private words of early versions: plain technical English only.
+
+Texts are the pages, the change log, notebooks and examples; the help of every command; reports of a feasible, an
+infeasible and an undecided plan; the schemas of files; and, of every shipped module, docstrings and string literals
+(error messages, labels of figures, rows of reports).
+"""
+
+import ast
+import json
+import re
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from towline import Robot, Task, load, plan
+from towline.cli.main import app
+from towline.ocp import MotionStatus
+
+ROOT = Path(__file__).parent.parent
+
+# What is banned, and what to write. Each pattern matches whole words, in any case.
+BANNED = {
+    r"told|tells?|telling": "reports, message, summary",
+    r"(?<!paper )says?|(?<!paper )said|saying": "reports, message, states",
+    r"seen|sees": "checked, audit",
+    r"asked|asks?|asking": "requested, options, requires",
+    r"lacks?|lacked|lacking": "shortfall, violation, without",
+    r"mend(s|ed|ing)?": "fixed",
+    r"paces?|the way along|way of time": "time law",
+    r"tall(y|ies)": "counts",
+    r"rungs?|ladders?": "stage",
+    r"course(?<!of course)": "parametrised path, trajectory",
+    r"hanging (pose|posture|point|place|state)s?|hangings": "three-cable pose, pose at rest",
+    r"counts? as none": "tolerance",
+    r"apart by": "separated by",
+    r"most of each": "maximum of each",
+    r"likewise": "write it out",
+    r"rooms?": "package",
+    r"can(not)? but|nothing but|none but": "only",
+    r"(goes|go|going) by": "depends on, follows",
+    r"in words": "as text",
+    r"dear(er)?": "costly",
+    r"what was found|how it was found|what is found": "the result",
+    r"whoever|(?<!everyone )(?<!user )(?<!users )(?<!reader )(?<!readers )who": "which, that",
+}
+PHRASES = {
+    r"\b[Nn]one: ": "default: ...",
+    r"; accepted: ": "x must be ..., got ...",
+    r"\bis (-?\d[\d.]*|nan); ": "x must be ..., got ...",
+    r"^\s*found:": "result:",
+}
+FORBIDDEN = {
+    **{re.compile(rf"(?<![\w`'-])({words})(?![\w`-])", re.IGNORECASE): instead for words, instead in BANNED.items()},
+    **{re.compile(words, re.MULTILINE): instead for words, instead in PHRASES.items()},
+}
+# Inline code, addresses, and quotations of what others wrote.
+NOT_OURS = re.compile(r"``[^`]+``|`[^`\n]+`|https?://\S+|“[^”]*”")
+
+
+def offences(text):
+    """Return the forbidden words in a text, each with its surroundings."""
+    ours = NOT_OURS.sub(lambda quoted: " " * len(quoted[0]), text)
+    return [
+        f"'{match[0].strip()}' (write: {instead}): ...{ours[max(match.start() - 40, 0) : match.end() + 40]!r}"
+        for pattern, instead in FORBIDDEN.items()
+        for match in pattern.finditer(ours)
+    ]
+
+
+# Packages and pages whose prose is still being rewritten: not checked yet, and this set shrinks to nothing.
+PENDING = {"benchmarks", "cli", "docs/benchmarks", "docs/benchmarks.md", "docs/errata", "examples", "figures", "models"}
+PENDING |= {"notebooks", "ocp", "solvers", "studies", "tolerances.py", "viewer", "workspace", "writing.py"}
+PACKAGES = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+MODULES = [
+    str(file.relative_to(ROOT)) for package in PACKAGES for file in ROOT.joinpath(*package.split(".")[1:]).glob("*.py")
+]
+PAGES = [
+    str(file.relative_to(ROOT))
+    for file in (
+        ROOT / "README.md",
+        ROOT / "CHANGELOG.md",
+        ROOT / "mkdocs.yml",
+        ROOT / "Makefile",
+        *(ROOT / "docs").rglob("*.md"),
+        *(ROOT / "examples").glob("*.py"),
+        *(ROOT / "notebooks").glob("*.ipynb"),
+        *(ROOT / "models" / "library").glob("*.yaml"),
+    )
+]
+
+
+def literals(file):
+    """Return line and text of each docstring and of each string literal that is prose."""
+    tree = ast.parse(file.read_text())
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    docstrings = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, documented) and node.body and isinstance(node.body[0], ast.Expr)
+    }
+    return [
+        (node.lineno, node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if id(node) in docstrings or " " in node.value
+    ]
+
+
+def cells(file):
+    """Return the text of a notebook's cells and of their outputs."""
+    texts = []
+    for cell in json.loads(file.read_text())["cells"]:
+        texts.append("".join(cell["source"]))
+        for output in cell.get("outputs", []):
+            shown = [
+                output.get("text", ""),
+                *(output.get("data", {}).get(f"text/{kind}", "") for kind in ("plain", "markdown")),
+            ]
+            texts += ["".join(text) for text in shown]
+    return "\n".join(texts)
+
+
+def descriptions(schema):
+    """Return all descriptions in a JSON Schema."""
+    if isinstance(schema, list):
+        return [text for part in schema for text in descriptions(part)]
+    if not isinstance(schema, dict):
+        return []
+    own = schema.get("description")
+    return [
+        *([own] if isinstance(own, str) else []),
+        *(text for part in schema.values() for text in descriptions(part)),
+    ]
+
+
+def commands(group, name=()):
+    """Return the words of each command, groups included."""
+    nested = getattr(group, "commands", {})
+    return [name, *(words for own, command in nested.items() for words in commands(command, (*name, own)))]
+
+
+@pytest.mark.parametrize("text", ["the report says so", "None: home.", "pose: is -1; accepted: six", "counts as none"])
+def test_the_list_finds_what_is_banned(text):
+    assert offences(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["of course", "six rows", "the paper says", "`told`", "the Rungekutta scheme", "see also"]
+)
+def test_the_list_leaves_plain_english_alone(text):
+    assert not offences(text)
+
+
+def pending(path):
+    return any(path == part or path.startswith(f"{part}/") for part in PENDING)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if not pending(page)])
+def test_pages(page):
+    file = ROOT / page
+    assert not offences(cells(file) if file.suffix == ".ipynb" else file.read_text())
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if not pending(module)])
+def test_docstrings_and_messages(module):
+    hits = [f"{module}:{line}: {hit}" for line, text in literals(ROOT / module) for hit in offences(text)]
+    assert not hits, "\n".join(hits)
+
+
+@pytest.mark.skipif("cli" in PENDING, reason="still being rewritten")
+@pytest.mark.parametrize("words", commands(typer.main.get_command(app)), ids=" ".join)
+def test_help(words):
+    assert not offences(" ".join(CliRunner().invoke(app, [*words, "--help"]).output.split()))
+
+
+@pytest.mark.skipif("ocp" in PENDING, reason="still being rewritten")
+def test_reports():
+    """Check one feasible, one infeasible and one undecided report, and their JSON."""
+    robot = load("wang-flying")
+    rest = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1}
+    sideways = {"name": "sideways", "path": {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}, "duration": 1}
+    feasible, infeasible = plan(robot, rest), plan(robot, sideways)
+    undecided = replace(infeasible, status=MotionStatus.NOT_FOUND)
+    assert (feasible.status, infeasible.status) == (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
+    for result in (feasible, infeasible, undecided):
+        assert not offences(result.report())
+
+
+@pytest.mark.skipif(bool({"models", "ocp"} & PENDING), reason="still being rewritten")
+@pytest.mark.parametrize("model", [Robot, Task])
+def test_schemas(model):
+    assert not offences("\n".join(descriptions(model.model_json_schema())))
