@@ -87,14 +87,14 @@ def wrong(planned: Plan) -> str:
             return "wrong: feasible, but the tensions do not give the force"
         return "" if not audit.excess else "wrong: feasible, but a limit is exceeded"
     if planned.status is MotionStatus.INFEASIBLE and not audit.excess:
-        certificate, at = audit.certificate, audit.certificate_time
-        if certificate is None or at is None:
+        certificate = planned.certificate
+        if certificate is None or certificate.time is None:
             return "wrong: infeasible, but nothing proves it"
-        row = int(np.argmin(np.abs(audit.times - at)))
+        row = int(np.argmin(np.abs(audit.times - certificate.time)))
         pose, carriers = audit.motion.pose[row], audit.carriers.pose[row]
         A = planned.scenario.dynamics.wrench_matrix(pose, carriers)
         motions = [part[row] for part in (*audit.motion, *audit.carriers)]
-        wind = audit.certificate_wind or planned.scenario.wind
+        wind = certificate.wind or planned.scenario.wind
         w = planned.scenario.dynamics.required_wrench(*motions, wind=wind)
         problem = wrench_problem(planned.scenario.robot, A, w, *planned.scenario.bounds())
         return "" if certificate.verify(problem) else "wrong: infeasible, but its certificate proves nothing"

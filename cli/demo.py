@@ -22,7 +22,7 @@ def demo(
         result = flying_circle.run(folder, progress)
     written = [str(path) for path in (*result.pictures, *result.files)]
     if as_json:
-        halves = {"hovering": result.hovering.summary(), "free": result.free.summary()}
+        halves = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict()}
         print_json({"as_expected": result.as_expected, **halves, "files": written})
     else:
         typer.echo("Paper F's circle, r = 1 m at 99 m, under a quadrotor hovering at 100 m:\n")

@@ -67,7 +67,7 @@ def plan(
             written["animation"] = found.animate(animate, speed, fps)
     if as_json:
         files = {name: str(path) for name, path in written.items()}
-        print_json({**found.summary(), **files, "figures": [str(picture) for picture in pictures]})
+        print_json({**found.to_dict(), **files, "figures": [str(picture) for picture in pictures]})
     else:
         typer.echo(found.report())
         typer.echo("  Written")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .reports.finding import Finding
+from .result import Plan
 
 __all__ = ["cost"]
 
 
-def cost(found: Finding) -> float:
+def cost(found: Plan) -> float:
     """The objective of a feasible plan without free coordinates: tensions, their rates, duration and margin."""
     objective, robot, seen = found.scenario.task.objective, found.scenario.robot, found.audit
     total = float(np.mean(np.sum((seen.tensions / (objective.tension or robot.force_scale)) ** 2, axis=1)))

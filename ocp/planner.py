@@ -16,14 +16,13 @@ from dataclasses import replace
 from typing import Any
 
 from ..models import Robot
-from .audits.audit import Audit, at_rest, tensions_may_mend
+from .audits.audit import Audit, certified_at_rest, other_tensions_may_pass
 from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
-from .reports.finding import Relaxed
 from .rest_margin import rest_margin
-from .result import Plan
+from .result import Plan, Relaxed
 from .search import Search
 from .start import deviation_from
 from .status import MotionStatus
@@ -76,8 +75,8 @@ def plan(
     Plan
         With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves it
         but its duration; or `not-found`, with the certificate at the worst time of the closest motion that was found,
-        or with the limits that it leaves. `Plan.stages` tells how it came to that, `Plan.missing` what the motion
-        lacks, `Plan.relaxed` a duration that would do.
+        or with the limits that it leaves. `Plan.stages` record the steps, `Plan.infeasible_spans` when tensions do not
+        exist, `Plan.relaxed` a feasible duration.
 
     Raises
     ------
@@ -143,7 +142,7 @@ def _fixed_motion(search: Search) -> Plan:
     seen = search.audit_motion(search.scenario, None)
     spent = time.perf_counter() - start
     status = MotionStatus.FEASIBLE if seen.passed else MotionStatus.INFEASIBLE
-    if not seen.passed and tensions_may_mend(search.scenario, seen):
+    if not seen.passed and other_tensions_may_pass(search.scenario, seen):
         chosen = _free_motion(search, None)
         if chosen.feasible:
             return chosen
@@ -154,9 +153,9 @@ def _fixed_motion(search: Search) -> Plan:
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
     """Which durations the path leaves; None: not known."""
-    with search.stage("durations") as verdict:
+    with search.stage("durations") as stage:
         left = durations(scenario)
-        verdict.told = _told(left)
+        stage.message = _told(left)
     return left
 
 
@@ -177,7 +176,7 @@ def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relax
 
 def _told(left: Durations | None) -> str:
     if left is None:
-        return "not asked: something else is free too, or goes by times of its own"
+        return ""
     if not left.exist:
         return f"none by the path's own time law, as {100 * left.at:.3g} % along it shows"
     upper = "" if left.longest == float("inf") else f", {left.longest:.4g} s and less"
@@ -186,14 +185,14 @@ def _told(left: Durations | None) -> str:
 
 def _rest_along_the_path(search: Search) -> Plan | None:
     """How far rest is from the tension limits; a proof if the motion rests at an end where nothing holds it."""
-    with search.stage("rest along the path") as verdict:
+    with search.stage("rest along the path") as stage:
         margin = rest_margin(search.scenario)
-        verdict.told = margin.describe()
+        stage.message = margin.describe()
     span = search.scenario.duration_range
     if search.scenario.count or span is None or margin.margin[[0, -1]].min() >= 0:
         return None
     slowest = search.scenario.lasting(span.max)
-    proven = at_rest(slowest, search.audit_motion(slowest, None, f"audit of {span.max:.4g} s"))
+    proven = certified_at_rest(slowest, search.audit_motion(slowest, None, f"audit of {span.max:.4g} s"))
     return None if proven is None else Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
@@ -209,8 +208,8 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
     own = left is None or left.leave(span.min, span.max)
     if own and scenario.task.objective.time is None:
         return None, own
-    with search.stage("timing") as verdict:
-        timing, verdict.told = fastest(scenario)
+    with search.stage("timing") as stage:
+        timing, stage.message = fastest(scenario)
     if timing is None:
         return None, own
     if timing.duration is not None and span.min <= timing.duration <= span.max:

@@ -1,38 +1,139 @@
-"""`Plan`: what a planner found, with its faces: dataset, file, figures, film, report."""
+"""`Plan`: a planned motion and its audit, as data, dataset, file, figures, film and report."""
 
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..figures import animation, style
+import numpy as np
+
 from ..netcdf import save_netcdf
+from ..solvers import Certificate
 from ..writing import whole_file
-from .reports.drawings import drawings
-from .reports.finding import Finding
-from .reports.report import as_text
-from .reports.report_page import page
-from .reports.scene import scene
-from .reports.trajectory import trajectory
+from .audits.audit import Audit
+from .audits.infeasible_spans import infeasible_spans
+from .stage import Stage
+from .status import MotionStatus
+from .tasks.scenario import Deviation, Scenario
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Plan"]
+__all__ = ["Plan", "Relaxed"]
 
 
-class Plan(Finding):
-    """A planned motion, what its audit saw, and the ways to look at it; its data are those of `Finding`."""
+@dataclass(frozen=True)
+class Plan:
+    """A planned motion and its audit.
+
+    Attributes
+    ----------
+    scenario
+        The robot and the task, laid out.
+    status
+        See `MotionStatus`.
+    deviation
+        What the planner chose: the free coordinates and the tensions at the nodes; None if the task fixes the motion.
+    audit
+        The dense evaluation that decides whether the plan is feasible.
+    build_s, solve_s
+        Wall time to build and to solve the nonlinear programs [s], over all attempts; 0 if none was solved.
+    iterations, message
+        Of the last run of the solver: its iterations, and its own message.
+    iterates
+        Rows of (iteration, objective, infeasibility) of all runs of the solver, in order: where the iteration falls
+        back to 0 another run begins.
+    stages
+        The steps of the planner, in order, with their messages and times.
+    relaxed
+        If not feasible: a task near this one that is feasible, if the planner knows one.
+    """
+
+    scenario: Scenario
+    status: MotionStatus
+    deviation: Deviation | None
+    audit: Audit
+    build_s: float
+    solve_s: float
+    iterations: int = 0
+    message: str = ""
+    iterates: tuple[tuple[int, float, float], ...] = ()
+    stages: tuple[Stage, ...] = ()
+    relaxed: Relaxed | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """Return whether the audit confirms every tension limit, and every other limit of task and robot."""
+        return self.status is MotionStatus.FEASIBLE
+
+    @property
+    def tension_min(self) -> float | None:
+        """Return the smallest audited tension [N]; None if at some time there are none."""
+        return float(self.audit.tensions.min()) if np.isfinite(self.audit.tensions).all() else None
+
+    @property
+    def tension_max(self) -> float | None:
+        """Return the largest audited tension [N]; None if at some time there are none."""
+        return float(self.audit.tensions.max()) if np.isfinite(self.audit.tensions).all() else None
+
+    @property
+    def margin(self) -> float | None:
+        """Return the smallest distance of any tension from its limits [N]; None if at some time there are none."""
+        robot = self.scenario.robot
+        inside = np.minimum(self.audit.tensions - robot.t_min, robot.t_max - self.audit.tensions)
+        return float(inside.min()) if np.isfinite(inside).all() else None
+
+    @property
+    def tracking_error_max(self) -> float:
+        """Return the largest distance of the platform from its path [m]."""
+        return float(self.audit.tracking_error.max())
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """Return the proof with the largest shortfall, with its time and wind; None for a feasible plan.
+
+        None also if tensions exist throughout and only other limits are exceeded (`audit.excess`). The direction is in
+        {G}; `wind` is set for a task with a box of winds.
+        """
+        return None if self.feasible else self.audit.certificate
+
+    @cached_property
+    def infeasible_spans(self) -> tuple[Certificate, ...]:
+        """Return a certificate for each span of time without tensions inside their limits; see `infeasible_spans`."""
+        return infeasible_spans(self.scenario, self.audit)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""
+        return {
+            "feasible": self.feasible,
+            "status": self.status.value,
+            "tension_min": self.tension_min,
+            "tension_max": self.tension_max,
+            "margin": self.margin,
+            "tracking_error_max": self.tracking_error_max,
+            "build_s": self.build_s,
+            "solve_s": self.solve_s,
+            "iterations": self.iterations,
+            "solver_message": self.message,
+            "audit": self.audit.to_dict(),
+            "certificate": None if self.certificate is None else self.certificate.to_dict(),
+            "infeasible_spans": [certificate.to_dict() for certificate in self.infeasible_spans],
+            "relaxed": None if self.relaxed is None else self.relaxed.to_dict(),
+            "stages": [stage._asdict() for stage in self.stages],
+        }
 
     @cached_property
     def trajectory(self) -> xr.Dataset:
-        """The motion in {G} and the audited tensions over time, sampled at the task's output rate, units as attributes.
+        """Return the motion in {G} and the audited tensions over time, at the task's output rate, units as attributes.
 
         Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
         """
+        from .reports.trajectory import trajectory
+
         return trajectory(self).dataset()
 
     def save(self, file: str | os.PathLike[str]) -> Path:
@@ -41,22 +142,29 @@ class Plan(Finding):
         Raises
         ------
         InputError
-            If the place cannot be written to.
+            If the file cannot be written.
         """
+        from .reports.trajectory import trajectory
+
         return save_netcdf(trajectory(self), Path(file))
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Draw path, views, tensions, base offset, other limits and convergence as PNG files in `folder`; their paths.
+        """Save the figures as PNG files in `folder`, and return their paths.
 
-        What there is nothing of has no figure: no convergence where no solver ran, no base where all is ground.
+        Path, views, tensions, base offset, other limits and convergence. A figure without content is left out:
+        convergence if no solver ran, base if every carrier is on the ground.
         """
+        from ..figures import style
+
         return [style.save(drawn, Path(folder) / f"{name}.png") for name, drawn in self.figures().items()]
 
     def figures(self) -> dict[str, Figure]:
-        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook or save another way.
+        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook, say.
 
-        A name is missing where there is nothing to draw, as for `plot`.
+        A figure without content is left out, as in `plot`.
         """
+        from .reports.drawings import drawings
+
         return {name: drawing.figure for name, drawing in drawings(self, self.trajectory).items()}
 
     def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
@@ -71,34 +179,66 @@ class Plan(Finding):
         speed
             Seconds of the motion in one second of the film; 1 is real time.
         fps
-            Frames a second. GIF counts in hundredths of a second: it gets the nearest rate, at most 50, and the motion
-            keeps its speed.
+            Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
+            motion keeps its speed.
 
         Raises
         ------
         InputError
-            If the suffix, the speed or the rate are none that can be, or the place cannot be written to.
+            If the suffix, the speed or the rate is not valid, or the file cannot be written.
         """
+        from ..figures import animation
+        from .reports.scene import scene
+
         path = Path(file)
-        when = animation.timing(path, self.scenario.duration, speed, fps)
-        return animation.draw(scene(self, when.times), when, path)
+        frames = animation.timing(path, self.scenario.duration, speed, fps)
+        return animation.draw(scene(self, frames.times), frames, path)
 
     def report(self) -> str:
-        """What a person wants to know, as text: the verdict in the first line, then the facts that it rests on."""
+        """Return the report as text: the result in the first line, then the facts behind it."""
+        from .reports.report import as_text
+
         return as_text(self)
 
     def save_report(self, file: str | os.PathLike[str]) -> Path:
         """Write the report as one HTML file with its figures inside, whole or not at all.
 
-        It loads nothing from anywhere, so that it can be mailed and kept. A method of its own, and not an argument of
-        `report`: what returns text writes no files, and `save_report` is found beside `save`.
+        The file loads nothing from anywhere, so that it can be mailed and kept. This is a method of its own, not an
+        argument of `report`: what returns text writes no files.
 
         Raises
         ------
         InputError
-            If the place cannot be written to.
+            If the file cannot be written.
         """
+        from .reports.report_page import page
+
         path = Path(file)
         with whole_file(path) as temporary:
             temporary.write_text(page(self, self.trajectory), encoding="utf-8")
         return path
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """A feasible task near the one that was requested, and its plan.
+
+    Attributes
+    ----------
+    name, unit
+        The field of the task that differs, and its unit.
+    requested, possible
+        Its value in the task, and the nearest value for which a feasible plan is known.
+    plan
+        The plan of that task.
+    """
+
+    name: str
+    unit: str
+    requested: float
+    possible: float
+    plan: Plan
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return {"name", "unit", "requested", "possible"} for JSON."""
+        return {"name": self.name, "unit": self.unit, "requested": self.requested, "possible": self.possible}

@@ -10,18 +10,18 @@ from .audits.audit import Audit, audit
 from .nlp.program import build
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
-from .reports.stage import Stage
 from .result import Plan
+from .stage import Stage
 from .status import MotionStatus
 from .tasks.scenario import Deviation, Scenario
 
 __all__ = ["Search"]
 
 
-class Verdict:
-    """What a stage will have said; set while it runs."""
+class RunningStage:
+    """A stage that is running; it sets its message."""
 
-    told = ""
+    message = ""
 
 
 class Search:
@@ -34,11 +34,11 @@ class Search:
         self._iterates: list[tuple[int, float, float]] = []
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[Verdict]:
+    def stage(self, name: str) -> Iterator[RunningStage]:
         """Record what happens inside as a stage of the ladder."""
-        start, verdict = time.perf_counter(), Verdict()
-        yield verdict
-        self.stages.append(Stage(name, verdict.told, time.perf_counter() - start))
+        start, running = time.perf_counter(), RunningStage()
+        yield running
+        self.stages.append(Stage(name, running.message, time.perf_counter() - start))
 
     def _seen(self, iteration: int, objective: float, infeasibility: float) -> None:
         """Keep what an iteration came to, and tell whoever asked."""
@@ -60,7 +60,7 @@ class Search:
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh.
         """
-        with self.stage(f"{name} of {mesh.steps} steps") as verdict:
+        with self.stage(f"{name} of {mesh.steps} steps") as stage:
             start = time.perf_counter()
             if mesh not in self._solvers:
                 self._solvers[mesh] = Solver(build(self.scenario, mesh))
@@ -71,9 +71,9 @@ class Search:
             outcome = solver.solve(at, self._seen, coarser, self.seconds_left)
             self.build_s += built - start
             self.solve_s += time.perf_counter() - built
-            verdict.told = f"{outcome.message}, {outcome.iterations} iterations"
+            stage.message = f"{outcome.message}, {outcome.iterations} iterations"
             if mesh.elastic:
-                verdict.told += f", short by {outcome.slack:.3g} N"
+                stage.message += f", short by {outcome.slack:.3g} N"
         return outcome
 
     def plan(self, status: MotionStatus, outcome: Outcome, seen: Audit) -> Plan:
@@ -89,9 +89,9 @@ class Search:
 
     def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
         """What the audit says of any motion."""
-        with self.stage(name) as verdict:
+        with self.stage(name) as stage:
             seen = audit(scenario, deviation)
-            verdict.told = "passed" if seen.passed else describe(seen)
+            stage.message = "passed" if seen.passed else describe(seen)
         return seen
 
 

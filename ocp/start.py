@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..models.parsing import validate
 from ..models.robot import Part
 from .nlp.guess import initial_guess
-from .reports.finding import Finding
+from .result import Plan
 from .tasks.path import AnyPath, PathBase, RestPath
 from .tasks.scenario import Deviation, Scenario
 from .timing.timing import Timing
@@ -25,7 +25,7 @@ class _Start(Part):
     start: AnyPath = Field(description="for the platform to start from")
 
 
-def deviation_from(scenario: Scenario, start: Finding | Timing | AnyPath | dict[str, Any]) -> Deviation | None:
+def deviation_from(scenario: Scenario, start: Plan | Timing | AnyPath | dict[str, Any]) -> Deviation | None:
     """What a start deviates by from the references of `scenario`; None: nothing, the task fixes the motion.
 
     Raises
@@ -33,7 +33,7 @@ def deviation_from(scenario: Scenario, start: Finding | Timing | AnyPath | dict[
     InputError
         If it does not fit, or is none.
     """
-    if isinstance(start, Finding):
+    if isinstance(start, Plan):
         return _of_plan(scenario, start)
     if isinstance(start, Timing):
         return _of_timing(scenario, start)
@@ -44,7 +44,7 @@ def deviation_from(scenario: Scenario, start: Finding | Timing | AnyPath | dict[
     return _along(scenario, start, {}, start.natural_duration or scenario.duration)
 
 
-def _of_plan(scenario: Scenario, start: Finding) -> Deviation | None:
+def _of_plan(scenario: Scenario, start: Plan) -> Deviation | None:
     """A plan's own deviation, stretched to this scenario's duration."""
     if start.deviation is None:
         return None

@@ -94,7 +94,7 @@ def test_exact_waypoints():
     (excess,) = told["tube.waypoints"]
     assert excess.time == pytest.approx(knot)
     assert excess.value == pytest.approx(SMALL, rel=0.01)
-    assert excess.about == "platform off point 2"
+    assert excess.about == "platform at point 2"
     beside = SMALL * np.sin(2 * np.pi * (NODES - knot))
     assert audit(scenario, moved(scenario, none, None, 1, beside)).excess == []
 
@@ -178,7 +178,7 @@ def test_soft_limits_are_told_apart():
 
 def test_an_excess_is_a_sentence_and_data():
     excess = Excess("cable_speed", "cable 3", 0.25, 1.5, 1.0, "m/s")
-    assert str(excess) == "cable_speed: cable 3 at t = 0.250 s: 1.5 m/s, accepted: at most 1 m/s"
+    assert str(excess) == "cable_speed of cable 3 must be at most 1 m/s, is 1.5 m/s at t = 0.250 s"
     told = json.loads(json.dumps(excess.to_dict()))
     assert told["text"] == str(excess)
     assert (told["limit"], told["about"], told["time"], told["value"], told["bound"], told["unit"]) == (
@@ -190,10 +190,10 @@ def test_an_excess_is_a_sentence_and_data():
         "m/s",
     )
     nowhere = Excess("duration", "motion", None, np.nan, 1.0, "s", "at least", "why")
-    assert str(nowhere) == "duration: motion: nan s, accepted: at least 1 s (why)"
+    assert str(nowhere) == "duration of motion must be at least 1 s, is undefined (why)"
     assert nowhere.to_dict()["value"] is None
     scenario, _ = on_the_path({"path": RIGHT, "limits": {"cable_speed": 0.01}})
-    summary = json.loads(json.dumps(audit(scenario, None).summary()))
+    summary = json.loads(json.dumps(audit(scenario, None).to_dict()))
     assert summary["excess"][0]["limit"] == "cable_speed"
     assert summary["excess"][0]["value"] > 0.01
 

@@ -117,7 +117,7 @@ def test_fatrop_says_no_as_ipopt_does():
         task = {"path": path, "duration": 2, "tube": {"position": 0.01}, "steps": 10, "solver": solver}
         found = plan(load("ipanema-1"), task)
         assert found.status == "not-found"
-        assert found.certificate["shortfall"] > 0
+        assert found.certificate.shortfall > 0
 
 
 def test_what_fatrop_cannot_do_is_one_line():

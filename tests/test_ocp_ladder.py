@@ -98,12 +98,12 @@ def test_what_cannot_rest_at_its_end_is_infeasible_at_once():
     path = {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}
     found = plan(load("wang-flying"), {"path": path, "duration": {"min": 1, "max": 4}})
     assert found.status is MotionStatus.INFEASIBLE
-    assert found.certificate["time"] == pytest.approx(4.0)
+    assert found.certificate.time == pytest.approx(4.0)
     assert not any("program" in name for name in names(found))
     assert found.iterations == 0
     # The end is at rest: its shortfall is the distance of the static wrench.
     short = capacity_margin(pose_problem(Dynamics(load("wang-flying")), [0.8, 0, -1, 0, 0, 0])).value
-    assert found.certificate["shortfall"] == pytest.approx(-short, rel=1e-6)
+    assert found.certificate.shortfall == pytest.approx(-short, rel=1e-6)
 
 
 def test_a_motion_that_is_too_fast_tells_a_duration_that_would_do():
@@ -128,19 +128,19 @@ def test_missing_spans_are_those_in_which_the_acceleration_is_too_large():
     fine = np.linspace(0, 1, 300_001)
     wanted = largest_acceleration(fine) / seconds**2
     up, down = fine[wanted > GRAVITY] * seconds, fine[wanted < -GRAVITY] * seconds
-    first, second = found.missing
+    first, second = found.infeasible_spans
     for span, times in ((first, up), (second, down)):
         np.testing.assert_allclose([span.start, span.end], [times[0], times[-1]], atol=1.1e-3)
     most = wanted.max() / GRAVITY * weight
-    assert first.certificate.demand == pytest.approx(weight + most, rel=1e-3)
-    assert first.certificate.support == pytest.approx(2 * weight, rel=1e-9)
-    assert first.certificate.at_max.tolist() == [0]
-    assert second.certificate.at_min.tolist() == [0]
+    assert first.demand == pytest.approx(weight + most, rel=1e-3)
+    assert first.support == pytest.approx(2 * weight, rel=1e-9)
+    assert first.at_max.tolist() == [0]
+    assert second.at_min.tolist() == [0]
     told = found.report()
     assert "When wrench is missing" in told
     assert f"{first.start:.3f}" in told
-    assert len(found.summary()["missing"]) == 2
-    assert plan(robot, {"path": LIFT, "duration": 3.0}).missing == ()
+    assert len(found.to_dict()["infeasible_spans"]) == 2
+    assert plan(robot, {"path": LIFT, "duration": 3.0}).infeasible_spans == ()
 
 
 class TestTiming:
@@ -211,7 +211,7 @@ class TestTiming:
             {"path": LINE, "duration": {"min": 0.1, "max": 4}, "objective": {"time": 0.001}, "steps": 30},
         )
         assert found.feasible
-        (told,) = [stage.verdict for stage in found.stages if stage.name == "timing"]
+        (told,) = [stage.message for stage in found.stages if stage.name == "timing"]
         assert "toppra is not installed" in told
 
     def test_a_timing_is_a_start(self):
@@ -270,5 +270,5 @@ def test_every_rung_is_told_with_its_time():
     assert names(found)[2] == "audit"
     for stage in found.stages:
         assert stage.seconds >= 0
-        assert stage.verdict in found.report()
-    assert [stage["name"] for stage in found.summary()["stages"]] == names(found)
+        assert stage.message in found.report()
+    assert [stage["name"] for stage in found.to_dict()["stages"]] == names(found)

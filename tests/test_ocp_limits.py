@@ -11,7 +11,7 @@ from towline.errors import InputError
 from towline.models import load
 from towline.ocp import plan
 from towline.ocp.tasks.clearance import between_cables, cable_outside, point_outside
-from towline.ocp.tasks.limits import limits
+from towline.ocp.tasks.named_limits import named_limits
 from towline.ocp.tasks.scenario import lay_out
 from towline.ocp.tasks.task import Task
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
@@ -99,7 +99,7 @@ def test_winch_speeds_are_differences_of_lengths():
     path = {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.3]}
     found = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 9.0, "platform_speed": 9.0}})
     seen = found.audit
-    all_limits = limits(found.scenario)
+    all_limits = named_limits(found.scenario)
     assert [limit.name for limit in all_limits.all] == ["cable_speed", "platform_speed"]
     lengths = found.scenario.dynamics.cable_lengths(seen.motion.pose, seen.carriers.pose)
     by_difference = np.gradient(lengths, seen.times, axis=0)[1:-1]
@@ -145,10 +145,10 @@ def test_quadrotors_move_as_forward_dynamics_moves_them():
     found = plan(robot, task | {"base": {"kind": "free", "ends": "rest"}})
     assert found.feasible, found.report()
     seen, scenario = found.audit, found.scenario
-    names = [limit.name for limit in limits(scenario).all]
+    names = [limit.name for limit in named_limits(scenario).all]
     assert names == ["thrust", "force across the thrust", "torque", "torque", "torque"]
     bodies = [np.hstack(seen.motion), np.hstack([part[:, 0] for part in seen.carriers])]
-    asked = limits(scenario).function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T
+    asked = named_limits(scenario).function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T
     carrier = robot.carriers[0]
     assert asked[:, 0].max() <= carrier.thrust_max
     assert np.abs(asked[:, 3:]).max() <= max(carrier.torque_max)

@@ -50,7 +50,7 @@ def test_the_helix_is_impossible_on_the_straight_line():
     paths = {"quad": task.base.around["quad"]}
     found = plan(load("wang-flying"), {**task.model_dump(mode="json"), "base": {"kind": "given", "paths": paths}})
     assert found.status == "infeasible"
-    assert found.certificate["shortfall"] == pytest.approx(7.627, abs=1e-3)  # as under a hovering quadrotor
+    assert found.certificate.shortfall == pytest.approx(7.627, abs=1e-3)  # as under a hovering quadrotor
 
 
 CASES = [
@@ -91,7 +91,7 @@ def test_paper_c_carries_its_load(name, drive, aim, steps):
         np.testing.assert_allclose(dynamics.cable_lengths(body.pose, bases.pose), 1.2, atol=1e-6)
     if aim == "time":
         assert found.scenario.duration < 1.0 < towing_plans.SECONDS
-    assert found.audit.summary()["drift"]["window_position"] < 1e-4
+    assert found.audit.to_dict()["drift"]["window_position"] < 1e-4
     assert found.audit.drift.position < 1e-3
     assert "pulled as planned" in found.report()
 

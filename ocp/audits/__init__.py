@@ -1,1 +1,1 @@
-"""The judge of every motion: evaluated again, densely, by code that is not the nonlinear program."""
+"""The audit of every motion: evaluated again, densely, by code that is not the nonlinear program."""

@@ -1,10 +1,10 @@
-"""Drift: where the platform goes if the planned tensions pull it, the carriers moving as planned.
+"""Drift: how far the planned tensions alone, without feedback, take the platform off its plan.
 
 A robot with fewer independent cables than degrees of freedom cannot follow an interpolated motion exactly: between the
-nodes a little wrench is missing. Forward dynamics tells what that does. Pulled by tensions that do not answer to what
-they see, a load has no stiffness along its cables and may have less than none against turning, so over a whole plan
-the smallest error grows as it likes: that says as much about the system as about the plan. Over short windows, each
-started on the plan, the drift is the plan's own error: missing wrench, twice integrated. Both are told.
+nodes a little of the required wrench is missing. Forward dynamics shows the effect. Under tensions without feedback a
+load has no stiffness along its cables and may have negative stiffness against turning, so over a whole plan the
+smallest error grows without bound: that is a property of the system as much as of the plan. Over short windows, each
+started on the plan, the drift is the plan's own error: the missing wrench, integrated twice. Both are reported.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ MOST_STEPS = 2000  # over the whole plan
 
 
 class Drift(NamedTuple):
-    """How far open-loop forward dynamics leaves the plan; infinite if it leaves all bounds.
+    """The distance of open-loop forward dynamics from the plan; infinite if it diverges.
 
     Attributes
     ----------
     window
-        How long each of the windows is, which start on the plan one after the other [s].
+        Duration of each window [s]; each starts on the plan, one after the other.
     window_position, window_attitude
         Largest distance [m] and largest difference of an Euler angle [rad] at the end of a window.
     position, attitude
@@ -53,11 +53,11 @@ def drift(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motio
     starts = np.arange(0, intervals - 2 * pairs + 1, 2 * pairs)
     inputs = (carriers.pose, tensions)
     ends = _run(scenario, motion, inputs, starts, pairs, 1, step)[-1]
-    windows = _apart(ends, motion.pose[starts + 2 * pairs])
+    windows = _differences(ends, motion.pose[starts + 2 * pairs])
     stride = max(int(np.ceil(intervals / 2 / MOST_STEPS)), 1)
     count = intervals // (2 * stride)
     whole = _run(scenario, motion, inputs, np.zeros(1, dtype=int), count, stride, step)[:, 0]
-    over_all = _apart(whole, motion.pose[2 * stride * np.arange(1, count + 1)])
+    over_all = _differences(whole, motion.pose[2 * stride * np.arange(1, count + 1)])
     return Drift(2 * pairs * float(step), *windows, *over_all)
 
 
@@ -70,7 +70,7 @@ def _run(
     stride: int,
     step: float,
 ) -> np.ndarray:
-    """Poses (count, k, 6) after each of `count` steps of 2 `stride` samples, from the plan's states at `rows` (k,)."""
+    """Return poses (count, k, 6) after each of `count` steps of 2 `stride` samples, from the plan at `rows` (k,)."""
     h = 2 * stride * step
 
     def slope(state: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -93,8 +93,8 @@ def _run(
     return poses
 
 
-def _apart(poses: np.ndarray, planned: np.ndarray) -> tuple[float, float]:
-    """Largest distance [m] and difference of an Euler angle [rad] of poses (n, 6); infinite if any is no number."""
+def _differences(poses: np.ndarray, planned: np.ndarray) -> tuple[float, float]:
+    """Return largest distance [m] and difference of an Euler angle [rad] of poses (n, 6); infinite if they diverge."""
     off = poses - planned
     off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
     if not np.isfinite(off).all():

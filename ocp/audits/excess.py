@@ -1,4 +1,4 @@
-"""A limit that a motion does not keep: what is passed, by what, when, and by how much."""
+"""`Excess`: a limit that a motion exceeds: which, by what, when, and by how much."""
 
 from __future__ import annotations
 
@@ -7,29 +7,31 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...text import quantity
+
 __all__ = ["Excess"]
 
 
 @dataclass(frozen=True)
 class Excess:
-    """One limit at the instant where it is passed by most. Its text is the sentence that a report has.
+    """One limit at the instant where it is exceeded by most. Its text is the sentence in a report.
 
     Attributes
     ----------
     limit
-        The physical name: that of the task's or robot's field.
+        Its name in the task or the robot's file.
     about
         "cable 3", "quad1", "platform".
     time
-        [s]; None if it is about no instant.
+        [s]; None if it applies to no instant.
     value, bound
-        What there is and what is accepted, in `unit`; a value of nan: there is none.
+        The value and its bound, in `unit`; nan if there is no value.
     unit
         Of both.
     accepted
-        On which side of the bound the value ought to be.
+        On which side of the bound the value must be.
     why
-        What else a person ought to know; empty: nothing.
+        More to know; empty: nothing.
     """
 
     limit: str
@@ -42,13 +44,16 @@ class Excess:
     why: str = ""
 
     def __str__(self) -> str:
+        """Return "carrier_speed of quad1 must be at most 2 m/s, is 2.5 m/s at t = 1.250 s"."""
         at = "" if self.time is None else f" at t = {self.time:.3f} s"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
-        told = f"{self.limit}: {self.about}{at}: {self.value:.6g} {self.unit}"
-        return f"{told}, accepted: {side}{self.bound:.6g} {self.unit}" + (f" ({self.why})" if self.why else "")
+        value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
+        value = "undefined" if np.isnan(self.value) else value
+        why = f" ({self.why})" if self.why else ""
+        return f"{self.limit} of {self.about} must be {side}{bound}, is {value}{at}{why}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Ready for JSON, with the sentence as "text"; numbers that do not exist are None."""
+        """Return the fields for JSON, with the sentence as "text"; numbers that do not exist are None."""
         return {
             "limit": self.limit,
             "about": self.about,

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ..tasks.limits import Limits, limits
+from ..tasks.named_limits import NamedLimits, named_limits
 from ..tasks.path import Motion
 from ..tasks.scenario import POSITION, Scenario
 
@@ -63,7 +63,7 @@ def clear_formation(scenario: Scenario) -> Formation | None:
 
     None too where nothing of the formation is free to choose.
     """
-    found = limits(scenario)
+    found = named_limits(scenario)
     span = _span(scenario)
     if scenario.relative or not any(limit.name in DISTANCES for limit in found.all) or not span.any():
         return None
@@ -166,7 +166,7 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
 class _Distances:
     """By how much poses pass the task's distances, all in metres."""
 
-    def __init__(self, scenario: Scenario, found: Limits):
+    def __init__(self, scenario: Scenario, found: NamedLimits):
         bodies = 1 + len(scenario.robot.carriers)
         pose = ca.SX.sym("pose", 6, bodies)
         at_rest = [ca.vertcat(pose[:, i], ca.SX.zeros(12)) for i in range(bodies)]

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...models.rotation import rotation
 from ...models.wind import aerodynamic_wrench
-from ..tasks.limits import limits as limits_of
+from ..tasks.named_limits import named_limits
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
@@ -109,7 +109,7 @@ def _limit_rows(
     rows: list[Row],
 ) -> ca.SX | float:
     """Add the limits of `limits`, in units of their scale; return what passing the soft ones costs."""
-    limits = limits_of(scenario)
+    limits = named_limits(scenario)
     cost, at, weight = 0.0, 0, OTHER_COSTS if mesh.elastic else 1.0
     if (place := layout.slack_of("tension_rate")) is not None:  # its rows are of two nodes (`interval`)
         most = scenario.task.limits.tension_rate or 0.0

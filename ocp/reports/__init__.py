@@ -1,1 +1,1 @@
-"""What a plan tells: its figures as data, as text, as a page, as pictures and films."""
+"""Reports of a plan: data over time, text, HTML page, figures and film."""

@@ -1,4 +1,4 @@
-"""All figures of a plan, by name: what `Plan.plot` saves and the report's page shows."""
+"""`drawings`: all figures of a plan by name, as `Plan.plot` saves and the report's page shows them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...figures import plan as figures
+from ...figures import plan as plan_figures
 from ...figures.convergence import convergence
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
 from ...figures.views import views
-from .finding import Finding
+from ..result import Plan
 from .limited import limited
 from .scene import scene
 from .trajectory import output_rows
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
 
 __all__ = ["drawings"]
 
-INSTANTS = 60  # of carriers' ways in the views
+INSTANTS = 60  # along the carriers' paths in the views
 
 
-def drawings(found: Finding, trajectory: xr.Dataset) -> dict[str, Drawing]:
-    """The figures by the names of their files, without suffix; those of nothing are left out."""
-    times = np.linspace(0.0, found.scenario.duration, INSTANTS)
+def drawings(plan: Plan, trajectory: xr.Dataset) -> dict[str, Drawing]:
+    """Return the figures by the names of their files, without suffix; a figure without content is left out."""
+    times = np.linspace(0.0, plan.scenario.duration, INSTANTS)
     drawn = {
-        "path": Drawing("Path of the platform and places of the carriers", figures.path(trajectory)),
-        "views": Drawing("From above and from the side", views(scene(found, times))),
-        "tensions": Drawing("Tensions against their limits", figures.tensions(trajectory)),
+        "path": Drawing("Path of the platform and places of the carriers", plan_figures.path(trajectory)),
+        "views": Drawing("From above and from the side", views(scene(plan, times))),
+        "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
     if (trajectory["carrier_kind"] != "ground").any():
-        drawn["base"] = Drawing("Carriers beside and above the platform", figures.base_offset(trajectory))
-    rows = output_rows(found)
-    if quantities := limited(found, rows):
-        drawn["limits"] = Drawing("What else is limited", limits(found.audit.times[rows], quantities))
-    if found.iterates:
-        drawn["convergence"] = Drawing("How the solver came to it", convergence(found.iterates))
+        drawn["base"] = Drawing("Offset of the carriers from the platform", plan_figures.base_offset(trajectory))
+    rows = output_rows(plan)
+    if quantities := limited(plan, rows):
+        drawn["limits"] = Drawing("Other limits", limits(plan.audit.times[rows], quantities))
+    if plan.iterates:
+        drawn["convergence"] = Drawing("Convergence of the solver", convergence(plan.iterates))
     return drawn

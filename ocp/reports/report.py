@@ -1,4 +1,4 @@
-"""What a person wants to know of a plan, in sections of named facts; as text. `report_page` has them as HTML."""
+"""The report of a plan in sections of named facts, and as text; `report_page` shows them as HTML."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models import Robot
-from ...models.robot import COORDINATES, Vector3
+from ...models.robot import Vector3
 from ...solvers import Certificate
+from ...text import quantity, quantity_row
+from ..result import Plan
+from ..tasks.named_limits import named_limits
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
-from .finding import Finding
 
-LEAST_SHARE = 0.05  # of a direction: what turns it less is not put into words
 Fact = tuple[str, str]  # its name, and the fact with its unit
 
 
@@ -32,282 +32,263 @@ class Table(NamedTuple):
     rows: list[tuple[str, ...]]
 
 
-def verdict(plan: Finding) -> str:
-    """The answer in one line: robot, task, status, and what decided it."""
+def headline(plan: Plan) -> str:
+    """Return the result in one line: robot, task, status, and what decided it."""
     return f"{plan.scenario.robot.name}, {plan.scenario.task.name}: {plan.status.value.upper()}, {_decisive(plan)}"
 
 
-def sections(plan: Finding) -> list[Section]:
-    """All that the report tells below its first line; sections without facts are left out."""
-    titles = {"infeasible": "Why there is none", "not-found": "What the closest motion misses"}
-    found = [
-        Section(titles.get(plan.status.value, "Limits"), _why(plan)),
-        Section("Soft limits passed", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
+def sections(plan: Plan) -> list[Section]:
+    """Return the report below its first line; sections without facts are left out."""
+    titles = {"infeasible": "Why it is infeasible", "not-found": "What the closest motion violates"}
+    every = [
+        Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
+        Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
-        Section("Stages", [(stage.name, f"{stage.verdict} ({stage.seconds:.3f} s)") for stage in plan.stages]),
+        Section("Stages", _stages(plan)),
         Section("Computation", _computation(plan)),
     ]
-    return [section for section in found if section.facts]
+    return [section for section in every if section.facts]
 
 
-def missing(plan: Finding) -> Table | None:
-    """When the motion lacks wrench, which cables bind then, and what is needed and available along the certificate.
+def spans_table(plan: Plan) -> Table | None:
+    """Return the table of the spans without tensions, with what is needed and available at the worst instant of each.
 
-    None of a motion that lacks nothing.
+    None for a motion without such spans.
     """
     rows = []
-    for span in plan.missing:
-        certificate = span.certificate
-        most = describe_direction(certificate, plan.scenario.robot).partition(", ")[0]
+    for certificate in plan.infeasible_spans:
+        text = certificate.text(_up(plan))
+        start, end = certificate.span or (certificate.time, certificate.time)
+        times = tuple(f"{time:.3f}" for time in (start, end, certificate.time))
         numbers = (certificate.demand, certificate.support, certificate.shortfall)
-        times = (f"{time:.3f}" for time in (span.start, span.end, span.at))
-        rows.append((*times, most, _binding(certificate), *(_short(number) for number in numbers)))
-    columns = ("from [s]", "to [s]", "worst [s]", "along", "cables that bind")
-    columns += ("needed [N]", "available [N]", "short by [N]")
-    return Table("When wrench is missing", columns, rows) if rows else None
+        along = text.along.partition(", ")[0]
+        rows.append((*times, along, *(quantity(number) for number in numbers), text.limits))
+    columns = ("from [s]", "to [s]", "worst at [s]", "along")
+    columns += ("needed [N]", "available [N]", "short by [N]", "limits")
+    return Table("Spans without tensions", columns, rows) if rows else None
 
 
-def as_text(plan: Finding) -> str:
-    """The whole report for a terminal."""
+def as_text(plan: Plan) -> str:
+    """Return the whole report for a terminal."""
     parts = sections(plan)
     width = max(len(name) for section in parts for name, _ in section.facts)
-    lines = [verdict(plan)]
+    lines = [headline(plan)]
     for index, (title, facts) in enumerate(parts):
         lines.append(f"  {title}")
         lines += [f"    {name:<{width}}  {fact}" for name, fact in facts]
-        table = missing(plan) if index == 0 else None
+        table = spans_table(plan) if index == 0 else None
         if table is not None:
             lines += _in_columns(table)
     return "\n".join(lines)
 
 
 def _in_columns(table: Table) -> list[str]:
-    """A table's lines, columns as wide as they need."""
+    """Return a table's lines, columns as wide as they need."""
     rows = [table.columns, *table.rows]
     widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
-    told = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return [f"  {table.title}", *(f"    {line}" for line in told)]
+    lines = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return [f"  {table.title}", *(f"    {line}" for line in lines)]
 
 
-def _binding(certificate: Certificate) -> str:
-    """The cables at their limits along the certificate, counted from 1."""
-    at = (("t_min", certificate.at_min), ("t_max", certificate.at_max))
-    return "; ".join(f"{name}: {_listed(cables + 1)}" for name, cables in at if cables.size) or "none pulls so"
+def _up(plan: Plan) -> np.ndarray:
+    """Return the direction against gravity in {G}, (3,)."""
+    return -np.array(plan.scenario.robot.gravity)
 
 
-def _decisive(plan: Finding) -> str:
+def _decisive(plan: Plan) -> str:
     if plan.feasible:
-        return f"every tension inside its limits, by {_short(plan.margin)} N at least"
-    certificate, excess = plan.audit.certificate, plan.audit.excess
-    broken = f"{len(excess)} other limit{'s' * (len(excess) > 1)} broken" if excess else ""
+        return f"every tension at least {quantity(plan.margin, 'N')} inside its limits"
+    certificate, count = plan.certificate, len(plan.audit.excess)
+    exceeded = f"{count} other limit{'s' * (count > 1)} exceeded" if count else ""
     if certificate is None:
-        return broken or "see the solver's message"
-    short = f"short by {_short(certificate.shortfall)} N at t = {plan.audit.certificate_time:.3f} s"
-    if (wind := plan.audit.certificate_wind) is not None:
-        short += f" at wind {_wind(wind)}"
-    return f"{short}, {broken}" if broken else short
+        return exceeded or "see the solver's message"
+    short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
+    if certificate.wind is not None:
+        short += f" in wind {_wind(certificate.wind)}"
+    return f"{short}, {exceeded}" if exceeded else short
 
 
-def _why(plan: Finding) -> list[Fact]:
+def _reasons(plan: Plan) -> list[Fact]:
     if plan.feasible:
         return []
     facts: list[Fact] = []
-    certificate, robot = plan.audit.certificate, plan.scenario.robot
-    if certificate is not None:
-        pulled = ": the cables can but pull the other way"
+    if (certificate := plan.certificate) is not None:
+        text = certificate.text(_up(plan))
         facts += [
-            ("time", f"t = {plan.audit.certificate_time:.3f} s of {plan.scenario.duration:g} s"),
-            *([("wind", _wind(wind))] if (wind := plan.audit.certificate_wind) is not None else []),
-            ("constraint", _constraint(plan, certificate)),
-            ("wrench direction", describe_direction(certificate, robot)),
+            ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}"),
+            *([("wind", _wind(certificate.wind))] if certificate.wind is not None else []),
+            ("along", text.along),
             ("as a vector", _vector(certificate)),
-            ("needed", f"{_short(certificate.demand)} N along it"),
-            ("available", f"{_short(certificate.support)} N at most" + pulled * (certificate.support < 0)),
-            ("short by", f"{_short(certificate.shortfall)} N"),
+            ("needed", text.needed),
+            ("available", text.available),
+            ("short by", text.short_by),
+            ("limits", _bounds(plan, certificate) or text.limits),
         ]
-    facts += [("limit broken", str(excess)) for excess in plan.audit.excess]
+    facts += [("limit exceeded", str(excess)) for excess in plan.audit.excess]
     if (relaxed := plan.relaxed) is not None:
-        asked, possible = (f"{value:.4g} {relaxed.unit}" for value in (relaxed.asked, relaxed.possible))
-        facts.append(("would do", f"a {relaxed.name} of {possible} instead of {asked}, planned and audited"))
+        requested, possible = (quantity(value, relaxed.unit) for value in (relaxed.requested, relaxed.possible))
+        facts.append(("feasible", f"with a {relaxed.name} of {possible} instead of {requested} (planned and audited)"))
     return facts
 
 
-def _constraint(plan: Finding, certificate: Certificate) -> str:
-    if certificate.singular:
-        return "wrench balance: no cable pulls along the direction, however large its tension"
+def _bounds(plan: Plan, certificate: Certificate) -> str:
+    """Return the tension limits of a certificate with their values; empty if no cable pulls along it."""
     low, high = plan.scenario.bounds()
-    at = [("t_min", certificate.at_min, low), ("t_max", certificate.at_max, high)]
-    told = [
-        f"{name} in {'cables' if len(cables) > 1 else 'cable'} {_listed(cables + 1)} ({_values(bound[cables])} N)"
-        for name, cables, bound in at
+    limits = [
+        f"{name} of {'cables' if len(cables) > 1 else 'cable'} {', '.join(str(k + 1) for k in cables)} "
+        f"({quantity_row(np.unique(bound[cables]), 'N')})"
+        for name, cables, bound in (("t_min", certificate.at_min, low), ("t_max", certificate.at_max, high))
         if cables.size
     ]
     margin = plan.scenario.hard_margin
-    return f"tension limits, {'; '.join(told)}" + (f", with the margin of {margin:g} N" if margin else "")
-
-
-def describe_direction(certificate: Certificate, robot: Robot) -> str:
-    """Which way a certificate points: its parts of 5 % and more, the largest first, with their shares.
-
-    A share is the square of a component of the direction, moments over `Robot.length`: they sum up to 100 %.
-    """
-    direction = certificate.direction
-    names = COORDINATES if direction.size == 6 else robot.platform.dof
-    turning = np.array([name in COORDINATES[3:] for name in names])
-    parts = direction * np.where(turning, certificate.length, 1.0)
-    shares = parts**2 / (parts @ parts)
-    said = []
-    for i in np.argsort(-shares):
-        if shares[i] >= LEAST_SHARE:
-            axis, sign = COORDINATES.index(names[i]) % 3, "+" if parts[i] > 0 else "-"
-            kind = "moment about" if turning[i] else "force along"
-            sense = "" if turning[i] else _sense(robot, axis, float(parts[i]))
-            said.append(f"{100 * shares[i]:.0f} % {kind} {sign}{'xyz'[axis]}{sense}")
-    return ", ".join(said)
-
-
-def _sense(robot: Robot, axis: int, part: float) -> str:
-    """Up or down, where gravity says so."""
-    gravity = np.array(robot.gravity)
-    if abs(gravity[axis]) < 0.99 * np.linalg.norm(gravity) or not gravity.any():
-        return ""
-    return " (up)" if part * gravity[axis] < 0 else " (down)"
+    return "; ".join(limits) + (f", with the margin of {quantity(margin, 'N')}" if limits and margin else "")
 
 
 def _vector(certificate: Certificate) -> str:
     direction = certificate.direction
     if direction.size != 6:
-        return f"({_listed(direction, '.3f')})"
-    return f"force ({_listed(direction[:3], '.3f')}), moment ({_listed(direction[3:], '.3f')})/m"
+        return _listed(direction)
+    return f"force {_listed(direction[:3])}, moment {_listed(direction[3:])}/m"
 
 
-def _tensions(plan: Finding) -> list[Fact]:
-    robot, seen = plan.scenario.robot, plan.audit
-    there = np.isfinite(seen.tensions).all(axis=1)
+def _tensions(plan: Plan) -> list[Fact]:
+    robot, audit = plan.scenario.robot, plan.audit
+    exist = np.isfinite(audit.tensions).all(axis=1)
     facts: list[Fact] = []
-    if not there.all():
-        missing = seen.times[~there]
-        share = f"{100 * (~there).mean():.3g} % of the time"
-        facts.append(("none inside limits", f"{share}, between t = {missing[0]:.3f} s and t = {missing[-1]:.3f} s"))
-    if there.any():
-        times, values = seen.times[there], seen.tensions[there]
+    if not exist.all():
+        without = audit.times[~exist]
+        share = f"{quantity(100 * (~exist).mean(), digits=3)} % of the time"
+        facts.append(("none inside limits", f"{share}, between t = {without[0]:.3f} s and t = {without[-1]:.3f} s"))
+    if exist.any():
+        times, values = audit.times[exist], audit.tensions[exist]
         inside = np.minimum(values - robot.t_min, robot.t_max - values)
 
-        def told(index: int, which: np.ndarray) -> str:
+        def located(index: int, which: np.ndarray) -> str:
             row, cable = np.unravel_index(index, which.shape)
-            return f"{_short(which[row, cable])} N in cable {cable + 1} at t = {times[row]:.3f} s"
+            return f"{quantity(which[row, cable], 'N')} in cable {cable + 1} at t = {times[row]:.3f} s"
 
         nearest = np.unravel_index(int(inside.argmin()), inside.shape)
         limit = "t_min" if values[nearest] - robot.t_min[nearest[1]] == inside[nearest] else "t_max"
-        wanted = plan.scenario.task.margin
+        required = plan.scenario.task.margin
+        also = f" ({quantity(required, 'N')} required)" * (required > 0)
         facts += [
-            ("smallest", told(int(values.argmin()), values)),
-            ("largest", told(int(values.argmax()), values)),
-            ("margin", f"{told(int(inside.argmin()), inside)} from {limit}" + (f", {wanted:g} N asked" * (wanted > 0))),
+            ("smallest", located(int(values.argmin()), values)),
+            ("largest", located(int(values.argmax()), values)),
+            ("margin", f"{located(int(inside.argmin()), inside)}, from {limit}{also}"),
         ]
     limits = zip(robot.t_min, robot.t_max, strict=True)
-    pairs = list(dict.fromkeys(f"{low:g} N to {high:g} N" for low, high in limits))
-    facts.append(("limits", pairs[0] if len(pairs) == 1 else f"{pairs[0]} and {len(pairs) - 1} more, by cable"))
+    pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
+    facts.append(("limits", pairs[0] if len(pairs) == 1 else f"{pairs[0]}, and {len(pairs) - 1} more (by cable)"))
     return facts
 
 
-def _motion(plan: Finding) -> list[Fact]:
-    task, seen = plan.scenario.task, plan.audit
-    worst = int(seen.tracking_error.argmax())
-    error = f"{_short(plan.tracking_error_max * 1e3)} mm at most"
-    if seen.tracking_error[worst] > 0:
-        error += f", at t = {seen.times[worst]:.3f} s"
+def _motion(plan: Plan) -> list[Fact]:
+    task, audit = plan.scenario.task, plan.audit
+    worst = int(audit.tracking_error.argmax())
+    error = f"{_millimetres(plan.tracking_error_max)} at most"
+    if not error.startswith("0 "):
+        error += f", at t = {audit.times[worst]:.3f} s"
     speed, acceleration = (
-        np.linalg.norm(part[:, :3], axis=1).max() for part in (seen.motion.velocity, seen.motion.acceleration)
+        np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )
-    law = "" if plan.scenario.path is task.path else ", by the fastest time law"
+    law = "" if plan.scenario.path is task.path else ", with the fastest time law"
     return [
-        ("duration", f"{plan.scenario.duration:.6g} s"),
+        ("duration", quantity(plan.scenario.duration, "s", digits=6)),
         ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
         ("tracking error", error),
-        ("platform", f"up to {_short(speed)} m/s and {_short(acceleration)} m/s^2"),
-        *([("wind", _asked_wind(task))] if task.wind is not None else []),
+        ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
+        *([("wind", _task_wind(task))] if task.wind is not None else []),
     ]
 
 
+def _millimetres(metres: float) -> str:
+    """Return a length in millimetres; less than a nanometre is rounding."""
+    return quantity(0.0 if metres < 1e-9 else metres * 1e3, "mm")
+
+
 def _wind(wind: Vector3) -> str:
-    return f"({_listed(np.array(wind), 'g')}) m/s"
+    return f"({quantity_row(wind)}) m/s"
 
 
-def _asked_wind(task: Task) -> str:
-    """The task's wind, or its box and whose tensions are told."""
+def _task_wind(task: Task) -> str:
+    """Return the task's wind, or its box and the wind of the planned tensions."""
     if isinstance(task.wind, WindBox):
         box = task.wind
-        return f"any from {_wind(box.min)} to {_wind(box.max)}; the tensions are those in {_wind(box.middle)}"
+        return f"any from {_wind(box.min)} to {_wind(box.max)}; the tensions shown are those in {_wind(box.middle)}"
     return "" if task.wind is None else _wind(task.wind)
 
 
-def _carriers(plan: Finding) -> list[Fact]:
-    """The largest speed, acceleration and tilt of each carrier that could move, against its limits."""
+def _carriers(plan: Plan) -> list[Fact]:
+    """Return the largest speed, acceleration and tilt of each carrier that could move, against its limits."""
     facts = []
-    seen = plan.audit.carriers
+    motion, times = plan.audit.carriers, plan.audit.times
     for index, carrier in enumerate(plan.scenario.robot.carriers):
         if carrier.kind == "ground":
             continue
         limit = plan.scenario.limits.get(index)
         speed, acceleration = (
-            np.linalg.norm(part[:, index, :3], axis=1) for part in (seen.velocity, seen.acceleration)
+            np.linalg.norm(part[:, index, :3], axis=1) for part in (motion.velocity, motion.acceleration)
         )
-        if not (seen.velocity[:, index].any() or seen.acceleration[:, index].any()):
+        if not (motion.velocity[:, index].any() or motion.acceleration[:, index].any()):
             facts.append((carrier.name, "at rest"))
             continue
-        facts.append((carrier.name, _against(speed, limit and limit.speed, "m/s", plan.audit.times)))
-        facts.append(("", _against(acceleration, limit and limit.acceleration, "m/s^2", plan.audit.times)))
+        facts.append((carrier.name, _against(speed, limit and limit.speed, "m/s", times)))
+        facts.append(("", _against(acceleration, limit and limit.acceleration, "m/s^2", times)))
         if limit is not None and limit.tilt is not None:
-            upright = np.cos(seen.pose[:, index, 3]) * np.cos(seen.pose[:, index, 4])
+            upright = np.cos(motion.pose[:, index, 3]) * np.cos(motion.pose[:, index, 4])
             tilt = np.degrees(np.arccos(np.clip(upright, -1, 1)))
-            facts.append(("", _against(tilt, float(np.degrees(limit.tilt)), "degrees of tilt", plan.audit.times)))
+            facts.append(("", _against(tilt, float(np.degrees(limit.tilt)), "degrees of tilt", times)))
     return facts
 
 
 def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarray) -> str:
     row = int(values.argmax())
-    bound = "no limit" if limit is None else f"limit {limit:.4g} {unit.partition(' ')[0]}"
-    return f"up to {_short(values[row])} {unit} at t = {times[row]:.3f} s ({bound})"
+    bound = "no limit" if limit is None else f"limit {quantity(limit, unit.partition(' ')[0])}"
+    return f"up to {quantity(values[row], unit)} at t = {times[row]:.3f} s ({bound})"
 
 
-def _audit(plan: Finding) -> list[Fact]:
-    seen = plan.audit
+def _audit(plan: Plan) -> list[Fact]:
+    audit = plan.audit
+    worst = f"{quantity(audit.violation.max(), 'N')} at t = {audit.times[audit.worst]:.3f} s"
     facts = [
-        ("rate", f"{seen.rate:.6g} Hz, {len(seen.times)} instants, by code that is not the planner's"),
-        ("worst violation", f"{float(seen.violation.max()):.3g} N at t = {seen.times[seen.worst]:.3f} s"),
-        ("counts as none", f"up to {seen.tolerance:.2g} N"),
+        ("rate", f"{quantity(audit.rate, 'Hz', digits=6)}, {quantity(len(audit.times))} instants"),
+        ("worst violation", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
+        ("tensions, carriers", "checked by code that the planner does not use"),
     ]
-    if (drift := seen.drift) is not None:
-        away = f"{drift.window_position * 1e3:.3g} mm, {drift.window_attitude * 1e3:.3g} mrad"
-        facts.append((f"pulled as planned for {drift.window:.2g} s", f"{away} off the plan at most"))
-        whole = f"{drift.position * 1e3:.3g} mm, {drift.attitude * 1e3:.3g} mrad"
-        facts.append(("pulled as planned throughout", f"{whole} off the plan at most"))
+    if names := list(dict.fromkeys(limit.name for limit in named_limits(plan.scenario).all)):
+        facts.append(("other limits", f"{', '.join(names)}: by the planner's expressions, on the audit's instants"))
+    if (drift := audit.drift) is not None:
+        window = f"{_millimetres(drift.window_position)}, {quantity(drift.window_attitude * 1e3, 'mrad')}"
+        facts.append((f"drift in {quantity(drift.window, digits=2)} s", f"{window} at most, without feedback"))
+        whole = f"{_millimetres(drift.position)}, {quantity(drift.attitude * 1e3, 'mrad')}"
+        facts.append(("drift, whole plan", f"{whole} at most, without feedback"))
     return facts
 
 
-def _computation(plan: Finding) -> list[Fact]:
-    facts = [("build", f"{plan.build_s:.3f} s"), ("solve", f"{plan.solve_s:.3f} s")]
+def _stages(plan: Plan) -> list[Fact]:
+    """Return the messages of the planner's stages; a stage without a message is left out."""
+    return [
+        (stage.name, f"{stage.message} ({quantity(stage.seconds, 's', digits=2)})")
+        for stage in plan.stages
+        if stage.message
+    ]
+
+
+def _computation(plan: Plan) -> list[Fact]:
+    """Return times and solver of the nonlinear program; a plan that needed none has no facts."""
+    if plan.build_s == 0:
+        return []
+    facts = [("build", quantity(plan.build_s, "s", digits=3)), ("solve", quantity(plan.solve_s, "s", digits=3))]
     if plan.deviation is None:
-        fixed = plan.scenario.is_fixed
-        why = "the task fixes the motion, the audit alone decides" if fixed else "a stage before it knew the answer"
-        return [*facts, ("solver", f"none: {why}")]
+        return facts
     starts = sum(row[0] == 0 for row in plan.iterates)
     runs = f", run {starts} of {starts}" if starts > 1 else ""
-    return [*facts, ("solver", f"{plan.iterations} iterations{runs}: {plan.message}")]
+    return [*facts, ("solver", f"{quantity(plan.iterations)} iterations{runs}: {plan.message}")]
 
 
-def _short(value: float | None) -> str:
-    """Four digits; what is but rounding beside a newton or a metre is zero."""
-    return "-" if value is None else f"{0.0 if abs(value) < 1e-9 else value:.4g}"
-
-
-def _listed(values: np.ndarray, form: str = "d") -> str:
-    return ", ".join(f"{value:{form}}" for value in values).replace("-0.000", "0.000")
-
-
-def _values(values: np.ndarray) -> str:
-    return ", ".join(f"{value:g}" for value in np.unique(values))
+def _listed(values: np.ndarray) -> str:
+    """Return the parts of a direction with three decimals each."""
+    return f"({', '.join(f'{round(float(value), 3) + 0.0:.3f}' for value in values)})"

@@ -1,4 +1,4 @@
-"""The report of a plan as one HTML file: `report`'s facts as tables, figures inside, nothing to load."""
+"""The report of a plan as one HTML file: the facts of `report` as tables, figures inside, nothing to load."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from typing import TYPE_CHECKING
 from ...figures import page as html
 from ...figures import style
 from ...models.parsing import to_yaml
+from ..result import Plan
 from .drawings import drawings
-from .finding import Finding
-from .report import missing, sections, verdict
+from .report import headline, sections, spans_table
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Told apart with any kind of colour vision, and the word stands beside them.
+# Distinct with any kind of colour vision; the word stands beside them.
 COLOURS = {"feasible": style.colour(0), "infeasible": style.colour(1), "not-found": style.colour(5)}
 
 
-def page(plan: Finding, trajectory: xr.Dataset) -> str:
-    """The whole page."""
+def page(plan: Plan, trajectory: xr.Dataset) -> str:
+    """Return the whole page."""
     robot, task, status = plan.scenario.robot, plan.scenario.task, plan.status.value
-    decisive = verdict(plan).partition(f"{status.upper()}, ")[2]
+    decisive = headline(plan).partition(f"{status.upper()}, ")[2]
     pictures = [html.picture(drawing) for drawing in drawings(plan, trajectory).values()]
     files = [html.file("The robot's file", to_yaml(robot)), html.file("The task", to_yaml(task))]
     parts = [*_tables(plan), *pictures, *files]
     return html.page(f"{robot.name}: {task.name}", status, decisive, COLOURS[status], parts)
 
 
-def _tables(plan: Finding) -> list[str]:
-    """The sections; after the first, which tells why there is no plan, when wrench is missing."""
-    told, gaps = [html.facts(*section) for section in sections(plan)], missing(plan)
-    return told if gaps is None else [told[0], html.columns(*gaps), *told[1:]]
+def _tables(plan: Plan) -> list[str]:
+    """Return the sections, with the spans without tensions after the first, which states why there is no plan."""
+    tables, spans = [html.facts(*section) for section in sections(plan)], spans_table(plan)
+    return tables if spans is None else [tables[0], html.columns(*spans), *tables[1:]]

@@ -1,4 +1,4 @@
-"""A plan as figures draw it in space: where anchors, attachments and carriers are at given times."""
+"""`scene`: a plan as figures draw it in space, with anchors, attachments and carriers at given times."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from ...figures.animation import Scene
 from ...figures.robot import box_edges
 from ...models import kinematics
 from ...models.robot import MobileCarrier
+from ..result import Plan
 from ..tasks.task_limits import AnyKeepOut, Block, Sphere
-from .finding import Finding
 
 TRAIL = 10  # every so many audited instants have a point of the trail
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
 
 
-def scene(plan: Finding, times: np.ndarray) -> Scene:
-    """The plan's robot at the audited instants nearest to `times` [s]; nothing is interpolated."""
+def scene(plan: Plan, times: np.ndarray) -> Scene:
+    """Return the plan's robot at the audited instants nearest to `times` [s]; nothing is interpolated."""
     robot, audit = plan.scenario.robot, plan.audit
     step = audit.times[1] - audit.times[0]
     rows = np.clip(np.round(times / step).astype(int), 0, len(audit.times) - 1)
@@ -42,7 +42,7 @@ def scene(plan: Finding, times: np.ndarray) -> Scene:
 
 
 def outline(place: AnyKeepOut) -> list[np.ndarray]:
-    """Lines (n, 3) in {G} [m] along the surface of a place to keep out of."""
+    """Return lines (n, 3) in {G} [m] along the surface of a place to keep out of."""
     if isinstance(place, Block):
         return box_edges(np.array(place.min), np.array(place.max))
     if isinstance(place, Sphere):
@@ -57,6 +57,6 @@ def outline(place: AnyKeepOut) -> list[np.ndarray]:
 
 
 def _rings(radius: float, axes: np.ndarray) -> list[np.ndarray]:
-    """Three circles about the origin, one across each axis (3, 3)."""
+    """Return three circles about the origin, one across each axis of (3, 3)."""
     pairs = ((axes[1], axes[2]), (axes[2], axes[0]), (axes[0], axes[1]))
     return [radius * (np.cos(ROUND)[:, None] * u + np.sin(ROUND)[:, None] * v) for u, v in pairs]

@@ -9,19 +9,19 @@ import numpy as np
 from ...models.parsing import to_yaml
 from ...models.robot import COORDINATES
 from ...netcdf import Contents, Variable
-from .finding import Finding
+from ..result import Plan
 
 __all__ = ["output_rows", "trajectory"]
 
 
-def trajectory(found: Finding) -> Contents:
+def trajectory(plan: Plan) -> Contents:
     """Return the motion and the audited tensions at the task's output rate.
 
     Dimensions: time, coordinate, carrier, cable.
     """
-    robot, task = found.scenario.robot, found.scenario.task
-    rows = output_rows(found)
-    seen = found.audit
+    robot, task = plan.scenario.robot, plan.scenario.task
+    rows = output_rows(plan)
+    audit = plan.audit
 
     def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Variable:
         return Variable(dims, values, {"units": unit, "long_name": about})
@@ -29,27 +29,27 @@ def trajectory(found: Finding) -> Contents:
     body, base = ("time", "coordinate"), ("time", "carrier", "coordinate")
     names = {"pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2"}
     variables = {}
-    for name, part, carrier_part in zip(names, seen.motion, seen.carriers, strict=True):
+    for name, part, carrier_part in zip(names, audit.motion, audit.carriers, strict=True):
         variables[name] = over(body, part[rows], names[name], f"{name} of the platform frame in G")
         variables[f"carrier_{name}"] = over(base, carrier_part[rows], names[name], f"{name} of each carrier in G")
-    variables["tensions"] = over(("time", "cable"), seen.tensions[rows], "N", "cable tensions")
-    lengths = found.scenario.dynamics.cable_lengths(seen.motion.pose[rows], seen.carriers.pose[rows])
+    variables["tensions"] = over(("time", "cable"), audit.tensions[rows], "N", "cable tensions")
+    lengths = plan.scenario.dynamics.cable_lengths(audit.motion.pose[rows], audit.carriers.pose[rows])
     variables["cable_lengths"] = over(("time", "cable"), lengths, "m", "from anchor to attachment")
-    about = "tensions of least norm without limits; negative: to push"
-    variables["tensions_unlimited"] = over(("time", "cable"), seen.tensions_unlimited[rows], "N", about)
-    variables["violation"] = over(("time",), seen.violation[rows], "N", "missing wrench, moments over length")
-    variables["tracking_error"] = over(("time",), seen.tracking_error[rows], "m", "distance from the path")
+    about = "tensions of least norm without limits; negative: the cable would push"
+    variables["tensions_unlimited"] = over(("time", "cable"), audit.tensions_unlimited[rows], "N", about)
+    variables["violation"] = over(("time",), audit.violation[rows], "N", "shortfall of the wrench, moments over length")
+    variables["tracking_error"] = over(("time",), audit.tracking_error[rows], "m", "distance from the path")
     variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
     variables["t_max"] = over(("cable",), robot.t_max, "N", "largest tension allowed")
     attributes = {
         "title": f"towline plan of {robot.name}: {task.name}",
-        "status": found.status.value,
+        "status": plan.status.value,
         "robot": to_yaml(robot),
         "task": to_yaml(task),
-        "report": json.dumps(found.summary()),
+        "report": json.dumps(plan.to_dict()),
     }
     coordinates = {
-        "time": Variable(("time",), seen.times[rows], {"units": "s"}),
+        "time": Variable(("time",), audit.times[rows], {"units": "s"}),
         "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
         "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),
         "carrier_kind": Variable(("carrier",), np.array([carrier.kind for carrier in robot.carriers])),
@@ -58,6 +58,6 @@ def trajectory(found: Finding) -> Contents:
     return Contents(variables, coordinates, attributes)
 
 
-def output_rows(found: Finding) -> np.ndarray:
-    """Rows of the audit that are saved: at equal times, and each of them audited."""
-    return np.arange(0, len(found.audit.times), (len(found.audit.times) - 1) // found.scenario.output_samples)
+def output_rows(plan: Plan) -> np.ndarray:
+    """Return the rows of the audit that are saved, equally spaced in time."""
+    return np.arange(0, len(plan.audit.times), (len(plan.audit.times) - 1) // plan.scenario.output_samples)

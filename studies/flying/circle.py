@@ -36,7 +36,7 @@ class FlyingCircle:
     @property
     def as_expected(self) -> bool:
         """Whether the study shows what it is for: a proof that the one is impossible, and an audited plan."""
-        proven = self.hovering.certificate is not None and self.hovering.certificate["shortfall"] > 0
+        proven = self.hovering.certificate is not None and self.hovering.certificate.shortfall > 0
         return proven and self.free.feasible and self.free.tracking_error_max < 0.01
 
 

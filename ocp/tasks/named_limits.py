@@ -1,8 +1,8 @@
-"""The limits of a scenario beside tensions and wrench balance, each with the name that a person knows it by.
+"""The limits of a scenario beside tensions and wrench balance, each by its name in the task.
 
 A limit is an expression of everything that there is at one instant (`State`), with bounds in its own unit. The program
-keeps it at its nodes, the audit evaluates the same expression on its dense grid: a limit that holds at the nodes and
-not between them is seen there.
+keeps it at its nodes, the audit evaluates the same expression on its dense grid, which shows a limit that holds at the
+nodes and not between them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .clearance import between_cables, between_points, cable_outside, point_outs
 from .scenario import Scenario
 from .task_limits import KeepOut
 
-__all__ = ["Limit", "Limits", "limits"]
+__all__ = ["Limit", "NamedLimits", "named_limits"]
 
 LEAST_COSINE = 1e-4  # less of a cosine is no scale: of angles below a hundredth of a radian
 
@@ -37,19 +37,19 @@ class Limit(NamedTuple):
     Attributes
     ----------
     name
-        The physical name, that of the task's or robot's field.
+        Its name in the task or the robot's file.
     unit
         Of values and bounds.
     values
         (k, 1).
     low, high
-        The bounds of each; infinite: none.
+        The bounds of each; infinite: no bound.
     labels
         What each value is about: "cable 3", "quad1".
     scale
         A typical size in this unit.
     soft
-        Amount beyond the bounds that costs one; None: hard.
+        Amount beyond the bounds that costs one; None: the limit is hard.
     cosine
         Whether values and bounds are cosines of the angle that `unit` is of: they have derivatives where it is zero.
     """
@@ -66,7 +66,7 @@ class Limit(NamedTuple):
 
     @property
     def equation(self) -> bool:
-        """Whether it is met at nodes only, and between them nearly."""
+        """Return whether it is met at the nodes, and between them only nearly."""
         return self.low == self.high
 
 
@@ -81,32 +81,32 @@ class State:
 
     @cached_property
     def carrier_poses(self) -> ca.SX:
-        """(c, 6)."""
+        """Return the poses of all carriers, (c, 6)."""
         return ca.vertcat(*(carrier[0].T for carrier in self.carriers))
 
     @cached_property
     def anchors(self) -> ca.SX:
-        """(3, m) [m]."""
+        """Return the anchors, (3, m) [m]."""
         return kinematics.anchors(self.robot.anchors, self.robot.carrier_of_cable, self.carrier_poses)
 
     @cached_property
     def attachments(self) -> ca.SX:
-        """(3, m) [m]."""
+        """Return the attachments, (3, m) [m]."""
         return kinematics.transform(self.platform[0], self.robot.attachments)
 
     @cached_property
     def run(self) -> Exit:
-        """How the cables run: directions, leaving points and lengths."""
+        """Return directions, leaving points and lengths of the cables."""
         axes = kinematics.axes(self.robot.pulley_axes, self.robot.carrier_of_cable, self.carrier_poses)
         return kinematics.cables(self.robot.attachments, self.platform[0], self.anchors, axes, self.robot.pulley_radii)
 
     def rate(self, values: ca.SX) -> ca.SX:
-        """Time derivative of an expression of the poses, which are symbols."""
+        """Return the time derivative of an expression of the poses, which are symbols."""
         bodies = (self.platform, *self.carriers)
         return sum((ca.jtimes(values, pose, velocity) for pose, velocity, _ in bodies), ca.SX.zeros(*values.shape))
 
 
-class Limits(NamedTuple):
+class NamedLimits(NamedTuple):
     """All limits of a scenario, and the function that evaluates them.
 
     Attributes
@@ -120,31 +120,31 @@ class Limits(NamedTuple):
     function: ca.Function
 
 
-def limits(scenario: Scenario) -> Limits:
-    """All limits of `scenario`, of symbols of their own."""
+def named_limits(scenario: Scenario) -> NamedLimits:
+    """Return all limits of `scenario`, with symbols of their own."""
     robot = scenario.robot
     bodies = [ca.SX.sym(f"body{i}", 18) for i in range(1 + len(robot.carriers))]
     # Pieces of one symbol are no symbols: derivatives are taken with respect to these.
     motions: list[Motion] = [(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6)) for _ in bodies]
     tensions = ca.SX.sym("tensions", robot.m)
-    found = _all(scenario, State(robot, motions[0], motions[1:], tensions))
+    limits = _all(scenario, State(robot, motions[0], motions[1:], tensions))
     inner = ca.Function(
         "limits_of_parts",
         [*(part for motion in motions for part in motion), tensions],
-        [ca.vertcat(*(limit.values for limit in found))],
+        [ca.vertcat(*(limit.values for limit in limits))],
     )
     parts = [part for body in bodies for part in ca.vertsplit(body, 6)]
-    return Limits(found, ca.Function("limits", [*bodies, tensions], [inner(*parts, tensions)]))
+    return NamedLimits(limits, ca.Function("limits", [*bodies, tensions], [inner(*parts, tensions)]))
 
 
 def _all(scenario: Scenario, state: State) -> list[Limit]:
-    found = [*_of_cables(scenario, state), *_of_platform(scenario, state)]
-    found += [*_of_carriers(scenario, state), *_soft_of_carriers(scenario, state)]
-    found += [limit for place in scenario.task.limits.keep_out for limit in _of_place(state, place)]
+    limits = [*_of_cables(scenario, state), *_of_platform(scenario, state)]
+    limits += [*_of_carriers(scenario, state), *_soft_of_carriers(scenario, state)]
+    limits += [limit for place in scenario.task.limits.keep_out for limit in _of_place(state, place)]
     for index, carrier in enumerate(scenario.robot.carriers):
         if isinstance(carrier, QuadrotorCarrier):
-            found += _of_quadrotor(state, index, carrier)
-    return [_softened(limit, scenario.task.limits.soft) for limit in found]
+            limits += _of_quadrotor(state, index, carrier)
+    return [_softened(limit, scenario.task.limits.soft) for limit in limits]
 
 
 def _softened(limit: Limit, soft: dict[str, float]) -> Limit:
@@ -159,22 +159,24 @@ def _cables(m: int) -> list[str]:
 
 
 def _of_cables(scenario: Scenario, state: State) -> list[Limit]:
-    asked, robot = scenario.task.limits, scenario.robot
-    found = []
-    if asked.cable_speed is not None:
-        speed = asked.cable_speed
-        found.append(Limit("cable_speed", "m/s", state.rate(state.run.lengths), -speed, speed, _cables(robot.m), speed))
-    if asked.cable_length is not None:
-        low, high = asked.cable_length.min, asked.cable_length.max
+    given, robot = scenario.task.limits, scenario.robot
+    limits = []
+    if given.cable_speed is not None:
+        speed = given.cable_speed
+        limits.append(
+            Limit("cable_speed", "m/s", state.rate(state.run.lengths), -speed, speed, _cables(robot.m), speed)
+        )
+    if given.cable_length is not None:
+        low, high = given.cable_length.min, given.cable_length.max
         size = max(abs(low), abs(high), 1e-3)
-        found.append(Limit("cable_length", "m", state.run.lengths, low, high, _cables(robot.m), size))
-    if "margin" in asked.soft:
+        limits.append(Limit("cable_length", "m", state.run.lengths, low, high, _cables(robot.m), size))
+    if "margin" in given.soft:
         # Hard it bounds the tensions themselves.
         low, high = ca.DM(robot.t_min), ca.DM(robot.t_max)
         for inside in (state.tensions - low, high - state.tensions):
             least = scenario.task.margin
-            found.append(Limit("margin", "N", inside, least, np.inf, _cables(robot.m), robot.force_scale))
-    if asked.cable_clearance is not None:
+            limits.append(Limit("margin", "N", inside, least, np.inf, _cables(robot.m), robot.force_scale))
+    if given.cable_clearance is not None:
         values, labels = [], []
         for i, j in combinations(range(robot.m), 2):
             if _share_an_end(robot, i, j):
@@ -183,9 +185,9 @@ def _of_cables(scenario: Scenario, state: State) -> list[Limit]:
             values.append(between_cables(*ends))
             labels.append(f"cables {i + 1} and {j + 1}")
         if values:
-            clear = asked.cable_clearance
-            found.append(Limit("cable_clearance", "m", ca.vertcat(*values), clear, np.inf, labels, clear))
-    return found
+            clear = given.cable_clearance
+            limits.append(Limit("cable_clearance", "m", ca.vertcat(*values), clear, np.inf, labels, clear))
+    return limits
 
 
 def _share_an_end(robot: Robot, i: int, j: int) -> bool:
@@ -196,38 +198,38 @@ def _share_an_end(robot: Robot, i: int, j: int) -> bool:
 
 
 def _of_platform(scenario: Scenario, state: State) -> list[Limit]:
-    asked = scenario.task.limits
+    given = scenario.task.limits
     pose, velocity, acceleration = state.platform
-    found = []
+    limits = []
     for name, value, bound, unit in (
-        ("platform_speed", velocity[:3], asked.platform_speed, "m/s"),
-        ("platform_acceleration", acceleration[:3], asked.platform_acceleration, "m/s^2"),
-        ("platform_turn", body_rate(pose[3:6], velocity[3:6]), asked.platform_turn, "rad/s"),
+        ("platform_speed", velocity[:3], given.platform_speed, "m/s"),
+        ("platform_acceleration", acceleration[:3], given.platform_acceleration, "m/s^2"),
+        ("platform_turn", body_rate(pose[3:6], velocity[3:6]), given.platform_turn, "rad/s"),
     ):
         if bound is not None:
-            found.append(Limit(name, unit, _size(value, bound), 0.0, bound, ["platform"], bound))
-    if asked.platform_tilt is not None:
-        found.append(_tilt("platform_tilt", pose, asked.platform_tilt, "platform"))
-    if asked.platform_box is not None:
-        for axis, low, high in zip(range(3), asked.platform_box.min, asked.platform_box.max, strict=True):
-            found.append(Limit("platform_box", "m", pose[axis], low, high, [f"platform {'xyz'[axis]}"], 1.0))
-    return found
+            limits.append(Limit(name, unit, _size(value, bound), 0.0, bound, ["platform"], bound))
+    if given.platform_tilt is not None:
+        limits.append(_tilt("platform_tilt", pose, given.platform_tilt, "platform"))
+    if given.platform_box is not None:
+        for axis, low, high in zip(range(3), given.platform_box.min, given.platform_box.max, strict=True):
+            limits.append(Limit("platform_box", "m", pose[axis], low, high, [f"platform {'xyz'[axis]}"], 1.0))
+    return limits
 
 
 def _size(value: ca.SX, bound: float) -> ca.SX:
-    """|value|, larger by 5e-7 of the bound there: round at zero, where a motion rests and a norm has a corner."""
+    """Return |value|, smooth at zero, where a motion rests and a norm has a corner; at the bound 5e-7 too large."""
     return ca.sqrt(ca.sumsqr(value) + (1e-3 * bound) ** 2)
 
 
 def _tilt(name: str, pose: ca.SX, most: float, about: str) -> Limit:
-    """As the cosine, whose derivative exists when level too; on the scale of what it changes by up to the bound."""
+    """Limit the cosine of the tilt, whose derivative exists when level too; its scale is its change up to the bound."""
     upright, low = ca.cos(pose[3]) * ca.cos(pose[4]), float(np.cos(most))
     return Limit(name, "rad", upright, low, np.inf, [about], max(1.0 - low, LEAST_COSINE), cosine=True)
 
 
 def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:
-    """Carriers' own limits that the task makes soft; the hard ones hold between the nodes too (`interval`)."""
-    found, soft = [], scenario.task.limits.soft
+    """Return the carriers' limits that the task makes soft; the hard ones hold between the nodes too (`interval`)."""
+    limits, soft = [], scenario.task.limits.soft
     for index, limit in scenario.limits.items():
         name = scenario.robot.carriers[index].name
         pose, velocity, acceleration = state.carriers[index]
@@ -236,17 +238,17 @@ def _soft_of_carriers(scenario: Scenario, state: State) -> list[Limit]:
             ("carrier_acceleration", acceleration, limit.acceleration, "m/s^2"),
         ):
             if quantity in soft and bound is not None:
-                found.append(Limit(quantity, unit, _size(value[:3], bound), 0.0, bound, [name], bound))
+                limits.append(Limit(quantity, unit, _size(value[:3], bound), 0.0, bound, [name], bound))
         if "carrier_turn_acceleration" in soft and (turn := limit.turn_acceleration) is not None:
             labels = [f"{name} roll", f"{name} pitch"]
-            found.append(Limit("carrier_turn_acceleration", "rad/s^2", acceleration[3:5], -turn, turn, labels, turn))
+            limits.append(Limit("carrier_turn_acceleration", "rad/s^2", acceleration[3:5], -turn, turn, labels, turn))
         if "carrier_tilt" in soft and limit.tilt is not None:
-            found.append(_tilt("carrier_tilt", pose, limit.tilt, name))
+            limits.append(_tilt("carrier_tilt", pose, limit.tilt, name))
         if "carrier_reach" in soft and np.isfinite(limit.low).all():
             for axis in range(3):
                 bounds = float(limit.low[axis]), float(limit.high[axis])
-                found.append(Limit("carrier_reach", "m", pose[axis], *bounds, [f"{name} {'xyz'[axis]}"], 1.0))
-    return found
+                limits.append(Limit("carrier_reach", "m", pose[axis], *bounds, [f"{name} {'xyz'[axis]}"], 1.0))
+    return limits
 
 
 def _of_carriers(scenario: Scenario, state: State) -> list[Limit]:
@@ -287,17 +289,17 @@ def _of_place(state: State, place: KeepOut) -> list[Limit]:
             [(cable_outside(place, attachments[:, i], anchors[:, i]), f"cable {i + 1}") for i in range(robot.m)],
         ),
     ]
-    found = []
+    limits = []
     for name, distance, outside in bodies:
         if distance is not None and outside:
             values, labels = zip(*outside, strict=True)
             about = [f"{label} outside {place.name}" for label in labels]
-            found.append(Limit(name, "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
-    return found
+            limits.append(Limit(name, "m", ca.vertcat(*values), distance, np.inf, about, 1.0))
+    return limits
 
 
 def _of_quadrotor(state: State, index: int, carrier: QuadrotorCarrier) -> list[Limit]:
-    """Thrust and torque that its motion and its cables ask for; its thrust has no part across its axis."""
+    """Limit the thrust and torque that motion and cables require; the thrust has no part across its axis."""
     pose, velocity, acceleration = state.carriers[index]
     pull = pull_on_carrier(state.robot, index, state.run, pose, state.tensions)
     R = rotation(pose[3:6])
@@ -307,10 +309,10 @@ def _of_quadrotor(state: State, index: int, carrier: QuadrotorCarrier) -> list[L
     alpha = body_acceleration(pose[3:6], velocity[3:6], acceleration[3:6])
     torque = inertia @ alpha + ca.cross(Omega, inertia @ Omega) - pull[3:6]
     name, weight = carrier.name, state.robot.force_scale
-    found = [
+    limits = [
         Limit("thrust", "N", thrust[2], carrier.thrust_min, carrier.thrust_max, [name], carrier.thrust_max),
         Limit("force across the thrust", "N", thrust[:2], 0.0, 0.0, [f"{name} x", f"{name} y"], weight),
     ]
     for axis, most in zip(range(3), carrier.torque_max, strict=True):
-        found.append(Limit("torque", "N m", torque[axis], -most, most, [f"{name} {'xyz'[axis]}"], most))
-    return found
+        limits.append(Limit("torque", "N m", torque[axis], -most, most, [f"{name} {'xyz'[axis]}"], most))
+    return limits

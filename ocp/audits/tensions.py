@@ -1,0 +1,181 @@
+"""Tensions of every instant of a motion, and its distance from possible wrenches where there are none.
+
+What counts as violation is the distance, in newtons (moments over `Robot.length`), from the wrench that the motion
+requires to those that the cables can give inside their limits less the task's margin. For a box of winds it is the
+largest such distance of the winds that decide (`wind_set`), and if that is none, of winds inside the box too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...distribution import wrench_problem
+from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
+from ..tasks.path import Motion
+from ..tasks.scenario import Scenario
+from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
+from .distance import distances
+
+__all__ = ["INDEPENDENT", "TOLERANCE", "AuditedTensions", "Distribution", "in_all_winds", "scaled"]
+
+TOLERANCE = 1e-6  # [N]
+INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
+EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
+NEAREST = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
+INNER_WINDS = 8  # of a box, at each instant others
+
+
+class AuditedTensions(NamedTuple):
+    """Tensions of every instant, and why there are none where there are none."""
+
+    tensions: np.ndarray  # (n, m) [N], nan where there are none
+    violation: np.ndarray  # (n,) [N]
+    certificate: Certificate | None  # that with the largest shortfall; without time
+    row: int | None  # of the certificate
+    beyond: float  # [N] beyond the limits within the range of few cables, whose other errors are tolerated
+
+
+def scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
+    """Return wrenches (n, 6, ...) with moments over `Robot.length`, and zero where the platform has no freedom."""
+    robot = scenario.robot
+    scale = robot.dof_mask * robot.wrench_scale
+    return wrenches * scale.reshape(6, *[1] * (wrenches.ndim - 2))
+
+
+class Distribution:
+    """Distribute the tensions of all instants of a motion with wrench matrices A (n, 6, m), for any wrenches.
+
+    Where the tensions nearest to the preferred ones, without limits, happen to lie inside the limits they are the
+    result: a batch of pseudo-inverses gives those. The exact solver solves the other instants. Where no tensions exist
+    the distance of the wrench from the possible ones is computed for all instants at once (`distance`), and the
+    certificate only for the farthest.
+
+    Of few cables, whose columns do not span all wrenches, a wrench outside their span is expected to be missed by a
+    little. Inside the span nothing may be missed: there the limits count as for any robot.
+    """
+
+    def __init__(self, scenario: Scenario, A: np.ndarray, few: bool, tolerance: float):
+        self.scenario, self.A, self.few, self.tolerance = scenario, A, few, tolerance
+        self._scaled_A = scaled(scenario, A)
+        self._inverse = np.linalg.pinv(self._scaled_A, rcond=INDEPENDENT if few else 1e-9)
+
+    def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
+        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m); None: near zero."""
+        scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
+        robot, (low, high) = scenario.robot, scenario.bounds()
+        scaled_A, scaled_w = self._scaled_A, scaled(scenario, w)
+        near = np.zeros((len(w), robot.m)) if preferred is None else preferred
+        open_wrench = scaled_w - np.einsum("nij,nj->ni", scaled_A, near)
+        tensions = near + (self._inverse @ open_wrench[..., None])[..., 0]
+        violation = np.linalg.norm(scaled_w - np.einsum("nij,nj->ni", scaled_A, tensions), axis=1)
+        inside = ((tensions >= low) & (tensions <= high)).all(axis=1)
+        good = violation <= (tolerance if few else EXACT * (robot.force_scale + np.linalg.norm(scaled_w, axis=1)))
+        beyond, worst = 0.0, None
+        singly: list[int] = []
+        rows = np.flatnonzero(~(inside & good))
+        if rows.size and not few:
+            far = distances(scaled_A[rows], scaled_w[rows], low, high)
+            if far.proven.any():
+                impossible = rows[far.proven]
+                violation[impossible], tensions[impossible] = far.distance[far.proven], np.nan
+                singly.append(int(impossible[np.argmax(violation[impossible])]))
+            rows = rows[~far.proven]
+        if rows.size:
+            batch = solve_batch(scaled_A[rows], scaled_w[rows], low, high, near[rows])
+            solved, proven = batch.feasible, np.isfinite(batch.shortfall)
+            tensions[rows[solved]], violation[rows[solved]] = batch.tensions[solved], batch.residual[solved]
+            singly += rows[~solved & ~proven].tolist()
+            if proven.any():
+                impossible = rows[proven]
+                closest, away = _nearest(scaled_A[impossible], scaled_w[impossible], low, high)
+                violation[impossible] = np.fmax(away, batch.shortfall[proven])
+                tensions[impossible] = closest if few else np.nan
+                short = violation[impossible]
+                if few:
+                    in_range = _short_in_range(scaled_A[impossible], scaled_w[impossible], low, high)
+                    beyond, short = float(in_range.max()), np.where(in_range > 0, in_range, short)
+                singly.append(int(impossible[np.argmax(short)]))
+        worst_row: int | None = None
+        for k in singly:
+            problem = wrench_problem(robot, A[k], w[k], low, high, near[k])
+            tensions[k], violation[k], certificate = self._single(problem)
+            if certificate is not None and (worst is None or certificate.shortfall > worst.shortfall):
+                worst, worst_row = certificate, k
+        return AuditedTensions(tensions, violation, worst, worst_row, beyond)
+
+    def _single(self, problem: TensionProblem) -> tuple[np.ndarray, float, Certificate | None]:
+        """Return tensions, violation and, if there is one, the certificate of one instant, by the exact solver."""
+        solution = solve(problem)
+        if solution.tensions is not None:
+            return solution.tensions, solution.residual, None
+        certificate = solution.certificate
+        if certificate is None:
+            return np.full(problem.m, np.nan), np.inf, None
+        closest = certificate.closest
+        violation = float(np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w))
+        if not self.few:
+            return np.full(problem.m, np.nan), violation, certificate
+        return closest, violation, certify(_inside_range(problem)) or certificate
+
+
+def in_all_winds(
+    distribute: Distribution, box: WindBox, motion: Motion, middle: AuditedTensions
+) -> tuple[AuditedTensions, Certificate | None]:
+    """Return the result of the worst wind of a box at each instant, and its certificate with its wind.
+
+    `middle` is the result of the planned tensions. At no wind is the wrench farther from the available ones than at
+    those that decide: if these pass, others in the box are tried only to check that.
+    """
+    scenario = distribute.scenario
+    without_air = scenario.dynamics.required_wrench(*motion)
+    planned, n = np.nan_to_num(middle.tensions), len(motion.pose)
+    worst, certificate = middle, middle.certificate and replace(middle.certificate, wind=box.middle)
+
+    def include(winds: np.ndarray) -> None:
+        nonlocal worst, certificate
+        push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
+        result = distribute(without_air - push, planned)
+        worse = _shortfall(result) > _shortfall(worst)
+        if worse and result.certificate is not None and result.row is not None:
+            certificate = replace(result.certificate, wind=as_wind(winds[result.row]))
+        violation = np.maximum(worst.violation, result.violation)
+        kept = result if worse else worst
+        beyond = max(worst.beyond, result.beyond)
+        worst = AuditedTensions(middle.tensions, violation, kept.certificate, kept.row, beyond)
+
+    for winds in decisive_winds_at(box, scenario.robot, motion.pose, motion.velocity):
+        include(winds)
+    if worst.violation.max() <= distribute.tolerance:
+        for winds in inner_winds(box, INNER_WINDS * n).reshape(n, INNER_WINDS, 3).swapaxes(0, 1):
+            include(winds)
+    return worst, certificate
+
+
+def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return tensions inside the limits whose wrenches are nearest to w, (n, m), and their distances, (n,) [N]."""
+    nearest = solve_batch(A, w, low, high, rho=NEAREST)
+    return nearest.tensions, nearest.residual
+
+
+def _short_in_range(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return how far the part of w in the span of A's columns is from what they give inside the limits, (n,) [N]."""
+    U, values, _ = np.linalg.svd(A, full_matrices=False)
+    U = np.where(values[:, None] > INDEPENDENT * values[:, None, :1], U, 0.0)
+    within = (U @ (U.swapaxes(1, 2) @ w[..., None]))[..., 0]
+    short = ~solve_batch(A, within, low, high).feasible
+    return np.where(short, _nearest(A, within, low, high)[1], 0.0)
+
+
+def _inside_range(problem: TensionProblem) -> TensionProblem:
+    """Return the same problem with the part of w that lies in the span of A's columns."""
+    U, values, _ = np.linalg.svd(problem.scaled_A, full_matrices=False)
+    span = U[:, values > INDEPENDENT * values[0]]
+    w = span @ (span.T @ problem.scaled_w) / problem.row_scale
+    return TensionProblem(problem.A, w, problem.t_min, problem.t_max, length=problem.length)
+
+
+def _shortfall(result: AuditedTensions) -> float:
+    return 0.0 if result.certificate is None else result.certificate.shortfall

@@ -1,0 +1,25 @@
+"""`Stage`: one step of the planner, its message and its time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+__all__ = ["Stage"]
+
+
+class Stage(NamedTuple):
+    """One step of the planner.
+
+    Attributes
+    ----------
+    name
+        What was computed: "rest along the path", "timing", "program of 100 steps".
+    message
+        Its result, as text with units; empty if it has no result worth a line.
+    seconds
+        Wall time [s].
+    """
+
+    name: str
+    message: str
+    seconds: float
