@@ -14,6 +14,8 @@ from ..tasks.named_limits import named_limits
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
+WORTH_A_NUMBER = 1e-3  # [N], of a margin
+
 Fact = tuple[str, str]  # its name, and the fact with its unit
 
 
@@ -100,6 +102,8 @@ def _up(plan: Plan) -> np.ndarray:
 
 def _decisive(plan: Plan) -> str:
     if plan.feasible:
+        if plan.margin is None or plan.margin < WORTH_A_NUMBER:
+            return "every tension inside its limits"
         return f"every tension at least {quantity(plan.margin, 'N')} inside its limits"
     certificate, count = plan.certificate, len(plan.audit.excess)
     exceeded = f"{count} other limit{'s' * (count > 1)} exceeded" if count else ""
