@@ -8,11 +8,12 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError
 
+_unfinished: set[Path] = set()
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -34,6 +35,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     except (OSError, ValueError) as error:
         raise _refusal(path, error) from None
     temporary = Path(name)
+    _unfinished.add(temporary)
     try:
         yield temporary
         temporary.chmod(_mode(target))
@@ -43,6 +45,8 @@ def whole_file(path: Path) -> Iterator[Path]:
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             raise _refusal(path, error) from None
         raise
+    finally:
+        _unfinished.discard(temporary)
 
 
 @contextmanager
@@ -61,6 +65,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
         temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix="."))
     except (OSError, ValueError) as error:
         raise _refusal(path, error) from None
+    _unfinished.add(temporary)
     try:
         yield temporary
         mask = os.umask(0)
@@ -72,6 +77,18 @@ def whole_folder(path: Path) -> Iterator[Path]:
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             raise _refusal(path, error) from None
         raise
+    finally:
+        _unfinished.discard(temporary)
+
+
+def remove_unfinished() -> None:
+    """Remove what is being written now, for a process that ends without unwinding its blocks."""
+    for temporary in tuple(_unfinished):
+        with suppress(OSError):
+            if temporary.is_dir():
+                shutil.rmtree(temporary, ignore_errors=True)
+            else:
+                temporary.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> Path:

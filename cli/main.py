@@ -13,6 +13,7 @@ import typer
 from .. import __version__
 from ..errors import TowlineError
 from . import bench, demo, export, import_, plan, reproduce, robots, tension, time, view, workspace
+from .stopping import end, requested
 
 app = typer.Typer(
     help="Optimal control and tension distribution of cable robots.",
@@ -54,14 +55,12 @@ def main() -> None:
     try:
         app()
         sys.stdout.flush()
-    except TowlineError as error:
-        typer.echo(f"towline: {error}", err=True)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        typer.echo("towline: stopped", err=True)
-        sys.exit(130)
-    except (OSError, MemoryError) as error:
-        typer.echo(f"towline: {error or 'out of memory'}", err=True)
+    except BaseException as error:
+        if requested() or isinstance(error, KeyboardInterrupt):
+            end()  # whatever the interrupt has become meanwhile
+        if not isinstance(error, (TowlineError, OSError, MemoryError)):
+            raise
+        typer.echo(f"towline: {str(error) or 'out of memory'}", err=True)
         sys.exit(2)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .options import JsonOption, print_json, robot_names
+from .stopping import unlisten
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -55,6 +56,7 @@ def view(
             typer.echo(f"{subject.title}\n{url}   (Ctrl-C ends it)")
         if host not in LOOPBACK:
             typer.echo("towline: whoever reaches this address can look and move the sliders", err=True)
+        unlisten()
         try:
             threading.Event().wait()
         except KeyboardInterrupt:

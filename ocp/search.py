@@ -10,6 +10,7 @@ from .audits.audit import Audit, audit
 from .nlp.program import build
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
+from .nlp.waiting import wait_for
 from .result import Plan
 from .stage import Stage
 from .status import MotionStatus
@@ -63,7 +64,7 @@ class Search:
         with self.stage(f"{name} of {mesh.steps} steps") as stage:
             start = time.perf_counter()
             if mesh not in self._solvers:
-                self._solvers[mesh] = Solver(build(self.scenario, mesh))
+                self._solvers[mesh] = wait_for(lambda: Solver(build(self.scenario, mesh)))
             solver = self._solvers[mesh]
             solver.prepare(guess, coarser)
             built = time.perf_counter()

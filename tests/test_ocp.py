@@ -454,8 +454,8 @@ def test_an_infeasible_plan_too_is_audited_throughout():
     assert found.certificate.shortfall == pytest.approx(7.627487150, abs=1e-8)
 
 
-def test_interrupting_stops_the_planner():
-    """Ctrl-C ends the search; it is not taken for a failure that calls for another try."""
+def test_what_progress_raises_stops_the_planner():
+    """It ends the search and is not taken for a failure that calls for another try; real signals: `test_interrupt`."""
 
     def impatient(iteration, *_):
         if iteration == 2:

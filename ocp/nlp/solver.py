@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from queue import SimpleQueue
 from typing import Any
 
 import casadi as ca
@@ -14,6 +16,7 @@ from ...errors import SolverError
 from ..tasks.scenario import Deviation
 from .guess import initial_guess
 from .program import Program
+from .waiting import Errands, wait_for
 
 __all__ = ["Outcome", "Progress", "Solver"]
 
@@ -93,10 +96,7 @@ class Solver:
     def _make(self, start: dict[str, Any]) -> ca.Function:
         name, common = self.program.scenario.task.solver, {"print_time": False, "error_on_fail": False}
         options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
-        try:
-            return ca.nlpsol("planner", name, self.program.problem, common | options)
-        except RuntimeError as error:
-            raise _broken(error) from None
+        return wait_for(lambda: _checked(ca.nlpsol, "planner", name, self.program.problem, common | options))
 
     def _ipopt(self, start: dict[str, Any]) -> dict[str, Any]:
         quiet = {"print_level": 0, "sb": "yes"}
@@ -138,7 +138,7 @@ class Solver:
         SolverError
             If CasADi or IPOPT break.
         KeyboardInterrupt
-            If a person stopped it.
+            If an interrupt arrives; the solver's thread ends at its next iteration, fatrop's when it is through.
         """
         program, watch = self.program, self._watch
         start: dict[str, Any] = {
@@ -156,20 +156,18 @@ class Solver:
             start |= {"x0": self._last["x"], "lam_x0": self._last["lam_x"], "lam_g0": self._last["lam_g"]}
         watch.begin(progress, seconds)
         try:
-            result = nlp(**start)
-        except RuntimeError as error:
-            raise _broken(error) from None
+            result = wait_for(lambda: watch.follow(nlp, start), watch.errands)
+        except BaseException:
+            self._abandon()
+            raise
         statistics = nlp.stats()
-        stopped = statistics["return_status"] == "User_Requested_Stop"
-        if watch.interrupted or (stopped and not watch.settled and not watch.late):
-            raise KeyboardInterrupt
         self._last = result if statistics["success"] else None
         x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
         message = statistics["return_status"]
         if isinstance(message, int):
             message = FATROP_STATUS.get(message, f"fatrop's status {message}")
-            # It calls nobody while it solves.
-            watch.tell(iterations, float(result["f"]), result["g"].full().ravel())
+            if progress is not None:  # it reports no iterations while it solves
+                progress(iterations, float(result["f"]), watch.infeasibility(result["g"].full().ravel()))
         met = program.violation(x, result["g"].full().ravel()) <= MET
         if watch.settled or watch.late:
             message = "time limit" if watch.late else f"no better by {BETTER:.1%} in {PATIENCE} iterations"
@@ -184,16 +182,27 @@ class Solver:
             slack=program.missing(x),
         )
 
+    def _abandon(self) -> None:
+        """Stop the run that nobody waits for; what its thread still uses is not used again."""
+        self._watch.abandoned = True
+        self._watch = _Watch(self.program)
+        self._solvers = {}
 
-def _broken(error: RuntimeError) -> SolverError:
-    return SolverError(f"planner: CasADi failed ({str(error).splitlines()[-1]})")
+
+def _checked(call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """Call CasADi; what it raises becomes a SolverError of one line."""
+    try:
+        return call(*arguments, **named)
+    except RuntimeError as error:
+        raise SolverError(f"planner: CasADi failed ({str(error).splitlines()[-1]})") from None
 
 
 class _Watch(ca.Callback):
-    """Looks at each iteration of the solver, tells a progress function, and stops it when there is no use to go on.
+    """Follow the iterations of the solver, report each, and stop it when going on is of no use.
 
-    A person may press Ctrl-C. Or the search settled: a minimum time is often found long before IPOPT is sure that there
-    is no shorter one, and where much costs nothing it wanders about between solutions that are as good as each other.
+    That is when its run is abandoned, when the time is up, or when the search has settled: a minimum time is often
+    reached long before IPOPT is sure that there is no shorter one, and where much costs nothing it moves on and on
+    between solutions that are as good as each other.
     """
 
     def __init__(self, program: Program):
@@ -206,6 +215,7 @@ class _Watch(ca.Callback):
     def begin(self, progress: Progress | None, seconds: float = np.inf) -> None:
         """Start to count anew."""
         self._progress = progress
+        self.errands: Errands = SimpleQueue()  # calls of `progress`, for the thread that waits
         self._deadline = time.perf_counter() + seconds
         self.late = False  # whether the time is up
         self._iteration = 0
@@ -213,19 +223,20 @@ class _Watch(ca.Callback):
         self._objective = np.inf  # its
         self._mark = np.inf  # the objective that a later one has to be better than
         self._since = 0  # the last iteration that was on the way to a better one
-        self.interrupted = False
+        self.abandoned = False  # whether nobody waits for the run any more
+
+    def follow(self, nlp: ca.Function, start: dict[str, Any]) -> dict[str, ca.DM]:
+        """Run `nlp`, whose callback this is: CasADi does not keep it alive, and the run may be abandoned."""
+        return _checked(nlp, **start)
 
     @property
     def settled(self) -> bool:
         """Whether `best` is as good as it gets."""
         return len(self.best) > 0 and self._iteration - self._since > PATIENCE
 
-    def tell(self, iteration: int, objective: float, g: np.ndarray) -> None:
-        """Tell whoever asked."""
-        if self._progress is not None:
-            low, high = self._program.lower_g, self._program.upper_g
-            infeasibility = float(np.maximum(np.maximum(low - g, g - high), 0).max(initial=0.0))
-            self._progress(iteration, objective, infeasibility)
+    def infeasibility(self, g: np.ndarray) -> float:
+        """Return the largest violation of the constraints' bounds by their values g."""
+        return float(np.maximum(np.maximum(self._program.lower_g - g, g - self._program.upper_g), 0).max(initial=0.0))
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -245,19 +256,17 @@ class _Watch(ca.Callback):
         return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[int]:
-        try:
-            x, g, objective = arg[0].full().ravel(), arg[2].full().ravel(), float(arg[1])
-            self._keep(x, g, objective)
-            # What making up for what g misses would change, to first order.
-            missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
-            if objective + arg[4].full().ravel() @ missed < self._better():
-                self._since = self._iteration
-            self.tell(self._iteration, objective, g)
-            self._iteration += 1
-        except KeyboardInterrupt:
-            self.interrupted = True
+        x, g, objective = arg[0].full().ravel(), arg[2].full().ravel(), float(arg[1])
+        self._keep(x, g, objective)
+        # What making up for what g misses would change, to first order.
+        missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
+        if objective + arg[4].full().ravel() @ missed < self._better():
+            self._since = self._iteration
+        if self._progress is not None:
+            self.errands.put(partial(self._progress, self._iteration, objective, self.infeasibility(g)))
+        self._iteration += 1
         self.late = time.perf_counter() > self._deadline
-        return [int(self.interrupted or self.settled or self.late)]
+        return [int(self.abandoned or self.settled or self.late)]
 
     def _better(self) -> float:
         """Objective that makes it worth to go on."""

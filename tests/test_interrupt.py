@@ -1,0 +1,101 @@
+"""Ctrl-C as a user sends it: a real signal from outside, to Python's `plan` and to the command, at any moment."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+TOWLINE = Path(sys.executable).with_name("towline")
+PROMPT = 1.0  # [s]
+TASK = """\
+name: fast
+path: {kind: line, start: [0, 0, 0], end: [2, 0, 0]}
+duration: {min: 1.5, max: 8}
+base: {kind: free, ends: exact}
+tube: {position: free, attitude: free, ends: exact}
+objective: {time: 1}
+"""
+SCRIPT = """\
+from towline.models import load
+from towline.ocp import plan
+
+robot = load("multi-quadrotor-3")
+print("ready", flush=True)
+try:
+    plan(robot, "fast.yaml", lambda iteration, *_: print("iteration", iteration, flush=True))
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "fast.yaml").write_text(TASK)
+    (tmp_path / "script.py").write_text(SCRIPT)
+    return tmp_path
+
+
+def start(command, folder):
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize("moment", ["ready", "iteration 1", "iteration 3"])
+def test_an_interrupt_from_outside_ends_plan(folder, moment):
+    """Before the first iteration the solver is made, then it solves: in neither may it go on."""
+    process = start([sys.executable, "script.py"], folder)
+    lines = iter(process.stdout.readline, "")
+    assert any(line.strip() == moment for line in lines)
+    time.sleep(0.4)  # into the next step
+    sent = time.perf_counter()
+    process.send_signal(signal.SIGINT)
+    assert any(line == "interrupted\n" for line in lines), process.stderr.read()
+    assert time.perf_counter() - sent < PROMPT
+    assert process.wait(60) == 0  # what still computed has ended, and the script goes on
+    assert process.stderr.read() == ""
+
+
+@pytest.mark.parametrize("seconds", [1.0, 2.5, 4.0, 7.0])
+def test_an_interrupt_ends_the_command_with_one_line(folder, seconds):
+    before = set(os.listdir(folder))
+    process = start([TOWLINE, "plan", "multi-quadrotor-3", "fast.yaml"], folder)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(seconds)
+    sent = time.perf_counter()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert time.perf_counter() - sent < PROMPT
+    assert (process.returncode, out, err) == (130, "", "towline: stopped\n")
+    assert set(os.listdir(folder)) == before
+
+
+def test_an_interrupt_that_a_library_swallows_ends_the_command_all_the_same(tmp_path):
+    """The thread that listens does not depend on what the main thread is doing, and leaves nothing half written."""
+    code = (
+        "import time, pathlib\n"
+        "from towline.cli import stopping\n"
+        "from towline.writing import whole_file\n"
+        "stopping.listen()\n"
+        "with whole_file(pathlib.Path('half')) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    while True:\n"
+        "        try:\n"
+        "            print('ready', flush=True)\n"
+        "            time.sleep(60)\n"
+        "        except KeyboardInterrupt:\n"
+        "            pass\n"
+    )
+    process = start([sys.executable, "-c", code], tmp_path)
+    assert process.stdout.readline() == "ready\n"
+    assert len(os.listdir(tmp_path)) == 1
+    sent = time.perf_counter()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 130
+    assert time.perf_counter() - sent < PROMPT
+    assert process.stderr.read() == "towline: stopped\n"
+    assert not os.listdir(tmp_path)
