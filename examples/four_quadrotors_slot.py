@@ -1,44 +1,39 @@
-"""Four quadrotors take their load through a slot of 1 m between two walls; `python examples/four_quadrotors_slot.py`.
+"""Fly a load on four quadrotors through a slot of 1 m; run `python examples/four_quadrotors_slot.py`.
 
-The quadrotors start 1.7 m apart, as at home, and end so: they have to draw together to pass, and to spread again behind
-the walls. No guess is given: the planner begins with a formation that keeps clear.
+The quadrotors start and end 1.7 m apart, as at home. To pass between the walls they must fly closer together, and
+spread again behind them. The user gives no initial guess: the planner starts with a formation that avoids the walls.
 """
 
-from towline.models import load
-from towline.ocp import plan
+from towline import load, plan
 
 HALF_SLOT, HALF_WALL = 0.5, 0.2  # [m]
-KEEP = {"kind": "box", "platform": 0.05, "carriers": 0.1, "cables": 0.05}  # how far off the walls [m]
+KEEP = {"kind": "box", "platform": 0.05, "carriers": 0.1, "cables": 0.05}  # distances from the walls [m]
 WALLS = [
     {**KEEP, "name": "left wall", "min": [-HALF_WALL, HALF_SLOT, -2], "max": [HALF_WALL, 3, 4]},
     {**KEEP, "name": "right wall", "min": [-HALF_WALL, -3, -2], "max": [HALF_WALL, -HALF_SLOT, 4]},
 ]
 
-WAY = 2.5  # to either side of the walls [m]
+TRAVEL = 2.5  # distance of start and end from the walls [m]
 
 robot = load("multi-quadrotor-4")
-escorts = {}  # each quadrotor beside the load, as at home
+escorts = {}  # the path of each quadrotor, at its home position relative to the load
 for carrier in robot.carriers:
     x, *rest = carrier.home
-    escorts[carrier.name] = {"kind": "line", "start": [x - WAY, *rest], "end": [x + WAY, *rest]}
-found = plan(
+    escorts[carrier.name] = {"kind": "line", "start": [x - TRAVEL, *rest], "end": [x + TRAVEL, *rest]}
+result = plan(
     robot,
     {
         "name": "four-quadrotors-slot",
-        "path": {"kind": "line", "start": [-WAY, 0, 0], "end": [WAY, 0, 0]},
-        "tube": {"position": "free", "attitude": "free", "ends": "exact"},  # the line is a first guess only
+        "path": {"kind": "line", "start": [-TRAVEL, 0, 0], "end": [TRAVEL, 0, 0]},
+        "tube": {"position": "free", "attitude": "free", "ends": "exact"},  # the line is only the initial guess
         "duration": 7,  # [s]
         "steps": 28,
-        "base": {
-            "kind": "free",
-            "around": escorts,
-            "ends": "exact",
-        },  # thrust, torque and tilt inside the limits of the robot's file
+        "base": {"kind": "free", "around": escorts, "ends": "exact"},  # within the thrust, torque and tilt limits
         "limits": {"keep_out": WALLS, "carrier_separation": 0.6},  # [m]
     },
     progress=lambda iteration, cost, missing: print(f"\r{iteration:4d} iterations", end="", flush=True),
 )
-print(f"\r{found.report()}")
-found.save("four_quadrotors_slot.nc")
-found.figures()["views"].savefig("four_quadrotors_slot.png", dpi=80)
+print(f"\r{result.report()}")
+result.save("four_quadrotors_slot.nc")
+result.figures()["views"].savefig("four_quadrotors_slot.png", dpi=80)
 print("saved: four_quadrotors_slot.nc, four_quadrotors_slot.png")

@@ -1,17 +1,16 @@
-"""Three robots, one cable each, pick up 10 kg and set it down elsewhere; `python examples/three_robots_carry.py`.
+"""Carry 10 kg with three robots and one cable each; run `python examples/three_robots_carry.py`.
 
-The robots of Wang, Zhao, Li and Ji: their ends move inside reach boxes, and winches change the cables' lengths. The
-load is lifted off a table, carried across, and set down on another, level all the way. Three cables cannot hold a load
-at will: where the robot-ends have to be for it to stay level is what the planner finds.
+These are the robots of Wang, Zhao, Li and Ji: their ends move inside reach boxes, and winches change the cable lengths.
+They lift the load off a table, carry it across, and set it down on another table. The load stays level. Three cables
+hold it level only for certain positions of the robot-ends; the planner computes them.
 """
 
-from towline.models import load
-from towline.ocp import plan
+from towline import load, plan
 
-PICK, PLACE, HIGH = (1.10, 0.90, 0.20), (1.45, 1.05, 0.30), 0.55  # where the load's centre is [m]
+PICK, PLACE, HIGH = (1.10, 0.90, 0.20), (1.45, 1.05, 0.30), 0.55  # of the load's centre [m]
 
 robot = load("wang-ctmrts")
-found = plan(
+result = plan(
     robot,
     {
         "name": "three-robots-carry",
@@ -20,11 +19,11 @@ found = plan(
             "points": [PICK, (*PICK[:2], HIGH), (*PLACE[:2], HIGH), PLACE],
         },
         "duration": 8,  # [s]
-        "base": {"kind": "free", "ends": "rest"},  # robot-ends inside reach, speed and acceleration of the robot's file
-        "margin": 5,  # every tension at least so far inside its limits [N]
+        "base": {"kind": "free", "ends": "rest"},  # inside the robot file's reach, speed and acceleration
+        "margin": 5,  # distance of every tension from its limits [N]
     },
 )
-print(found.report())
-found.save("three_robots_carry.nc")
-found.figures()["views"].savefig("three_robots_carry.png", dpi=80)
+print(result.report())
+result.save("three_robots_carry.nc")
+result.figures()["views"].savefig("three_robots_carry.png", dpi=80)
 print("saved: three_robots_carry.nc, three_robots_carry.png")

@@ -57,6 +57,13 @@ FORBIDDEN = {
     **{re.compile(rf"(?<![\w`'-])({words})(?![\w`-])", re.IGNORECASE): instead for words, instead in BANNED.items()},
     **{re.compile(words, re.MULTILINE): instead for words, instead in PHRASES.items()},
 }
+# A function's docstring begins with a verb, and so with none of these.
+NO_VERB = re.compile(
+    r"(an?|all|and|as|at|being|both|by|each|for|from|here|how|if|in|is|its?|least|largest|many|most|no|none|not|of|on"
+    r"|one|only|or|other|same|smallest|so|some|such|that|the|their|them|then|there|these|they|this|those|to|true|two"
+    r"|under|what|when|where|whether|which|who|why|with|without)[,.:]?",
+    re.IGNORECASE,
+)
 # Inline code, addresses, and quotations of what others wrote.
 NOT_OURS = re.compile(r"``[^`]+``|`[^`\n]+`|https?://\S+|“[^”]*”")
 
@@ -108,6 +115,12 @@ def literals(file):
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
         if id(node) in docstrings or " " in node.value
     ]
+
+
+def openings(file):
+    """Return line and first word of each function's docstring."""
+    functions = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.FunctionDef)]
+    return [(node.lineno, ast.get_docstring(node).split()[0]) for node in functions if ast.get_docstring(node)]
 
 
 def cells(file):
@@ -168,6 +181,12 @@ def test_pages(page):
 @pytest.mark.parametrize("module", [module for module in MODULES if not pending(module)])
 def test_docstrings_and_messages(module):
     hits = [f"{module}:{line}: {hit}" for line, text in literals(ROOT / module) for hit in offences(text)]
+    assert not hits, "\n".join(hits)
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if not pending(module)])
+def test_docstrings_of_functions_begin_with_a_verb(module):
+    hits = [f"{module}:{line}: {word} ..." for line, word in openings(ROOT / module) if NO_VERB.fullmatch(word)]
     assert not hits, "\n".join(hits)
 
 
