@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..models import Robot
-from .audits.audit import Audit, certified_at_rest, other_tensions_may_pass
+from .audits.audit import certified_at_rest, other_tensions_may_pass
 from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
@@ -31,6 +31,7 @@ from .tasks.scenario import Deviation, Scenario, lay_out
 from .tasks.task import Task, read_task
 from .time_law import BOUND, fastest
 from .timing.timing import Timing
+from .violation import relative_violation
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
@@ -144,7 +145,7 @@ def _fixed_motion(search: Search) -> Plan:
     status = MotionStatus.FEASIBLE if seen.passed else MotionStatus.INFEASIBLE
     if not seen.passed and other_tensions_may_pass(search.scenario, seen):
         chosen = _free_motion(search, None)
-        if chosen.feasible:
+        if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, seen):
             return chosen
         status = MotionStatus.NOT_FOUND
     relaxed = None if seen.passed else _longer(search, search.scenario, _durations(search, search.scenario))
@@ -246,14 +247,17 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     if not outcome.success and search.seconds_left > 0:
         closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
-            return _closest(search, closest)
+            search.audit(closest)
+            return search.best()
         outcome = search.solve("program", Mesh(steps), closest.deviation)
-    return _refined(search, outcome, search.audit(outcome))
+    _refine(search, outcome)
+    return search.best()
 
 
-def _refined(search: Search, outcome: Outcome, seen: Audit) -> Plan:
-    """Solve again, with more nodes, as long as the audit objects."""
+def _refine(search: Search, outcome: Outcome) -> None:
+    """Audit a solution, and solve again with more nodes as long as the audit reports violations."""
     scenario, steps = search.scenario, search.scenario.task.steps
+    seen = search.audit(outcome)
     reserve, shrink = 0.0, 0.0
     for attempt in range(1, REFINEMENTS + 1):
         if seen.passed or not outcome.success or search.seconds_left <= 0:
@@ -266,10 +270,3 @@ def _refined(search: Search, outcome: Outcome, seen: Audit) -> Plan:
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
         outcome = search.solve("program", mesh, outcome.deviation)
         seen = search.audit(outcome)
-    return search.plan(MotionStatus.FEASIBLE if seen.passed else MotionStatus.NOT_FOUND, outcome, seen)
-
-
-def _closest(search: Search, closest: Outcome) -> Plan:
-    """What the elastic program says: all is well after all, or none was found."""
-    seen = search.audit(closest)
-    return search.plan(MotionStatus.FEASIBLE if seen.passed else MotionStatus.NOT_FOUND, closest, seen)

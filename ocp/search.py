@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from operator import itemgetter
 
 from .audits.audit import Audit, audit
 from .nlp.program import build
@@ -15,6 +16,7 @@ from .result import Plan
 from .stage import Stage
 from .status import MotionStatus
 from .tasks.scenario import Deviation, Scenario
+from .violation import relative_violation
 
 __all__ = ["Search"]
 
@@ -33,6 +35,7 @@ class Search:
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
         self._iterates: list[tuple[int, float, float]] = []
+        self._audited: list[tuple[float, Outcome, Audit]] = []
 
     @contextmanager
     def stage(self, name: str) -> Iterator[RunningStage]:
@@ -77,16 +80,27 @@ class Search:
                 stage.message += f", short by {outcome.slack:.3g} N"
         return outcome
 
-    def plan(self, status: MotionStatus, outcome: Outcome, seen: Audit) -> Plan:
-        """What came of a program."""
-        told = (outcome.iterations, outcome.message)
-        scenario = self.scenario.lasting(outcome.duration)
-        rows = tuple(self._iterates)
-        return Plan(scenario, status, outcome.deviation, seen, self.build_s, self.solve_s, *told, iterates=rows)
-
     def audit(self, outcome: Outcome) -> Audit:
-        """What the audit says of a program's motion."""
-        return self.audit_motion(self.scenario.lasting(outcome.duration), outcome.deviation)
+        """Audit the motion of a program's solution, which `best` then chooses from."""
+        scenario = self.scenario.lasting(outcome.duration)
+        audited = self.audit_motion(scenario, outcome.deviation)
+        self._audited.append((relative_violation(scenario, audited), outcome, audited))
+        return audited
+
+    def best(self) -> Plan:
+        """Return the plan of the audited solution that violates its limits by least; the latest of equal ones."""
+        _, outcome, audited = min(reversed(self._audited), key=itemgetter(0))
+        return Plan(
+            scenario=self.scenario.lasting(outcome.duration),
+            status=MotionStatus.FEASIBLE if audited.passed else MotionStatus.NOT_FOUND,
+            deviation=outcome.deviation,
+            audit=audited,
+            build_s=self.build_s,
+            solve_s=self.solve_s,
+            iterations=outcome.iterations,
+            message=outcome.message,
+            iterates=tuple(self._iterates),
+        )
 
     def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
         """What the audit says of any motion."""

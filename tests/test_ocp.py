@@ -1,6 +1,7 @@
 """Planning: paths and integrators by differences, plans judged by code that is not the planner."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.models.statics import equilibria
-from towline.ocp import MotionStatus, Task, plan, read_task
+from towline.ocp import MotionStatus, Task, plan, read_task, search
 from towline.ocp.audits.audit import audit
+from towline.ocp.audits.excess import Excess
 from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
 from towline.ocp.tasks.scenario import Deviation, lay_out
+from towline.ocp.violation import relative_violation
 
 GRAVITY = 9.81
 HOVER = [50, 50, 100, 0, 0, 0]
@@ -565,3 +568,39 @@ def test_progress_is_told():
 def test_layout_names_owners():
     scenario = lay_out(load("wang-flying"), read_task({"path": CIRCLE, "base": FREE, "tube": {"attitude": 0.1}}))
     assert scenario.owners() == [(None, 3), (None, 4), (None, 5), (0, 0), (0, 1), (0, 2)]
+
+
+def test_the_best_audited_motion_is_returned_not_the_last(monkeypatch):
+    """Refinements need not get better: here the second solution misses least, by 1 %, and the last by 40 %."""
+    shares = iter([0.05, 0.01, 0.2, 0.3, 0.4])
+    audited = []
+
+    def harsh(scenario, deviation):
+        whole = audit(scenario, deviation)
+        value = 2.0 * (1 + next(shares))
+        excess = [Excess("platform_speed", "platform", 0.0, value, 2.0, "m/s")]
+        audited.append(replace(whole, excess=excess))
+        return audited[-1]
+
+    monkeypatch.setattr(search, "audit", harsh)
+    found = plan(load("wang-flying"), {"path": CIRCLE, "base": FREE, "steps": 10})
+    assert found.status is MotionStatus.NOT_FOUND
+    assert len(audited) == 5
+    assert found.audit is audited[1]
+    assert len(found.deviation.nodes) == 2 * 10 + 1
+
+
+def test_violations_of_different_limits_are_compared_by_their_shares():
+    found = plan(load("wang-flying"), {"path": CIRCLE, "base": FREE, "steps": 20})
+    scenario, robot = found.scenario, found.scenario.robot
+    assert relative_violation(scenario, found.audit) == 0
+
+    def share(*excess):
+        return relative_violation(scenario, replace(found.audit, excess=[Excess("limit", "platform", 0.0, *excess)]))
+
+    assert share(2.2, 2.0, "m/s") == pytest.approx(0.1)
+    assert share(0.5, 2.0, "m", "at least") == pytest.approx(0.75)
+    assert share(0.01, 0.0, "m", "exactly") == pytest.approx(0.01 / robot.length)
+    assert share(np.nan, 1.0, "N") == np.inf
+    short = np.full_like(found.audit.violation, 0.3 * robot.force_scale)
+    assert relative_violation(scenario, replace(found.audit, violation=short)) == pytest.approx(0.3)
