@@ -1,10 +1,17 @@
-"""The numbers by which this room judges, in one place. All are relative and have no unit."""
+"""The numbers by which results are judged, in one place. All are relative and have no unit."""
 
-__all__ = ["DOUBTFUL", "FEASIBILITY", "NEGLIGIBLE", "RANK", "ROUNDING", "WEIGHTS_APART"]
+__all__ = ["AT_LIMIT", "DOUBTFUL", "FEASIBILITY", "NEGLIGIBLE", "OPTIMALITY", "RANK", "ROUNDING", "WEIGHTS_APART"]
 
-# Wrench error that still counts as none, relative to what the problem asks (see `TensionProblem.tolerance`). Tensions
+# Wrench error that is accepted, relative to what the problem requires (see `TensionProblem.tolerance`). Tensions
 # are called optimal only below it and a certificate is believed only above it, so the two answers cannot both be given.
 FEASIBILITY = 1e-9
+
+# Part of the cost's gradient that the multipliers of an optimum may leave, and gap between its cost and the lower bound
+# that they give, both relative.
+OPTIMALITY = 1e-8
+
+# A limit this near, relative to the size of the tensions, may have a multiplier.
+AT_LIMIT = 1e-9
 
 # Rounding of a matrix-vector product, relative to the sum of the absolute terms: 450 machine epsilons.
 ROUNDING = 1e-13
@@ -12,7 +19,7 @@ ROUNDING = 1e-13
 # Singular values below this part of the largest count as zero.
 RANK = 1e-12
 
-# Directions with singular values between RANK and this part of the largest are asked for only if w would be missed
+# Directions with singular values between RANK and this part of the largest are required only if w would be missed
 # without them: geometry written with twelve digits makes them out of nothing, and tensions that serve them serve the
 # rounding. It is below the pivots of which `kernel` is sure, so that the kernel leaves such problems alone.
 DOUBTFUL = 1e-10

@@ -15,21 +15,22 @@ from .problem import TensionProblem
 from .projection import project
 from .standard_form import StandardForm
 
-__all__ = ["boundary_candidates", "nearest_available"]
+__all__ = ["careful_candidates"]
 
 # How much the limits give way, in units of s; every tension is put back inside its limits afterwards, so this much
 # wrench error remains.
 _ROOM = (1e-13, 1e-12, 1e-11, 1e-10)
 
 
-def boundary_candidates(problem: TensionProblem, form: StandardForm) -> Iterator[NDArray[np.float64]]:
+def careful_candidates(problem: TensionProblem, form: StandardForm) -> Iterator[NDArray[np.float64]]:
     """Yield points s, shape (k,), that give the available wrench nearest to w, the best first.
 
     The projection of w is available without doubt, its tensions are at hand, and limits with a hair of room around
     them give even an exact method something to find. Where the weights are eleven decades apart the daqp package finds
-    nothing there either, although w may be far from the boundary: then our own kernel is asked, loaded if need be.
+    nothing there either, although w may be far from the boundary: then our own kernel may.
     """
-    b = form.Q @ nearest_available(problem, form)
+    nearest = _nearest_available(problem, form)
+    b = form.Q @ nearest
     for room in _ROOM:
         upper, lower = np.append(form.upper + room, b), np.append(form.lower - room, b)
         s = bounded_least_norm(upper, lower, form.Q, equalities=b.size).s
@@ -39,9 +40,10 @@ def boundary_candidates(problem: TensionProblem, form: StandardForm) -> Iterator
         s = _by_kernel(form, side)
         if s is not None:
             yield s
+    yield nearest
 
 
-def nearest_available(problem: TensionProblem, form: StandardForm) -> NDArray[np.float64]:
+def _nearest_available(problem: TensionProblem, form: StandardForm) -> NDArray[np.float64]:
     """Return an s, shape (k,), inside the limits that gives the available wrench nearest to w, whatever its cost."""
     return (project(problem)[0] - form.origin)[form.moving] / form.unit
 
@@ -53,4 +55,4 @@ def _by_kernel(form: StandardForm, b: NDArray[np.float64]) -> NDArray[np.float64
         return None
     packed = np.concatenate([form.Q.ravel(), b, form.lower, form.upper, np.zeros(k), np.ones(k), [1.0]])
     s = np.empty(k)
-    return s if compiled.load().solve_packed(packed, rank, k, s) == 0 else None
+    return s if compiled.solve_packed(packed, rank, k, s) == 0 else None

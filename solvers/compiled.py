@@ -1,67 +1,195 @@
-"""When the Numba kernels are loaded: not before they pay.
+"""Run the kernels as plain Python until machine code pays; both give the same bits.
 
-`import numba` takes 0.2 s to 0.5 s and the machine code 0.3 s from the disk; the first time on a machine it is compiled
-in some 25 s. A call without the kernels costs about 0.07 ms more: a process that solves a handful of problems is better
-off without them, and one that would have to compile them needs many more before that pays.
+Importing Numba and loading the machine code from the disk takes about a second, compiling it (once on a machine) some
+30 s. A process pays for that once it has lost as much time to plain Python, or when it calls `load`, as a control loop
+does before it starts.
 """
 
+from __future__ import annotations
+
 import hashlib
+import shutil
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from time import perf_counter
+from types import FunctionType
+from typing import Any
 
+import numpy as np
+
+from .. import tolerances
 from ..writing import whole_file
+from .kernels import memory, single, wide
+from .kernels.codes import UNSURE
 
-__all__ = ["CALLS_WORTH_COMPILING", "CALLS_WORTH_LOADING", "count_a_call", "load", "solve_packed"]
+__all__ = ["COMPILED", "INTERPRETED", "Kernels", "current", "load", "solve_packed"]
 
-CALLS_WORTH_LOADING = 5000
-CALLS_WORTH_COMPILING = 300_000
+COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
 
-solve_packed: Callable[..., int] | None = None
-"""`kernel.solve_packed` once it is loaded."""
+_SECONDS_TO_LOAD = 1.0
+_SECONDS_TO_COMPILE = 30.0
+_DISK_SPACE = 50_000_000  # bytes; the machine code takes about 5 MB
 
-_ROOM = Path(__file__).parent / "kernels"
+_FOLDER = Path(__file__).parent / "kernels"
+_SHARED = Path(tolerances.__file__)  # its numbers are in the machine code
+_MODULES = (
+    *("codes", "dual_active_set", "lanes", "lanes_newton", "lanes_proof", "lanes_slabs", "memory", "proof"),
+    *("reduction", "row_alone", "rows", "single", "slabs", "wide"),
+)
 
-_calls = 0
-_loading = threading.Lock()
+_lock = threading.Lock()
+_lost = 0.0  # seconds spent in plain Python so far
+_patience: float | None = None
 
 
-def load() -> ModuleType:
-    """Load the kernels now, or compile them if this machine has not yet; return their module."""
-    global solve_packed
-    with _loading:
-        if solve_packed is None:
+class Kernels:
+    """The two kernels in one of their forms.
+
+    Attributes
+    ----------
+    backend :
+        `COMPILED` or `INTERPRETED`.
+    solve_packed, solve_rows :
+        See `kernels.single` and `kernels.wide`.
+    rows_at_once :
+        How many rows `solve_rows` takes together; threads share multiples of it. None: threads gain nothing.
+    """
+
+    def __init__(
+        self,
+        backend: str,
+        solve_packed: Callable[..., int],
+        solve_rows: Callable[..., None],
+        rows_at_once: int | None,
+    ) -> None:
+        self.backend = backend
+        self.solve_packed = solve_packed
+        self.solve_rows = solve_rows
+        self.rows_at_once = rows_at_once
+
+
+def current() -> Kernels:
+    """Return the kernels in the form that is loaded."""
+    return _kernels
+
+
+def solve_packed(data: Any, n: int, m: int, t: Any) -> int:
+    """Solve one problem with the kernels that are loaded; see `kernels.single.solve_packed`."""
+    return _kernels.solve_packed(data, n, m, t)
+
+
+def load() -> Kernels:
+    """Load the machine code now, or compile it if this machine has not yet; return it."""
+    global _kernels
+    with _lock:
+        if _kernels.backend != COMPILED:
             _forget_old_code()
-        from . import kernels
-
-        solve_packed = kernels.solve_packed
-    return kernels
+            _kernels = _compile()
+    return _kernels
 
 
-def count_a_call() -> Callable[..., int] | None:
-    """Count a call that had to do without the kernel, and load it if there have been enough of them."""
-    global _calls
-    _calls += 1
-    if _calls >= CALLS_WORTH_COMPILING or (_calls == CALLS_WORTH_LOADING and _on_disk()):
-        load()
-    return solve_packed
+def _interpreted(data: Any, n: int, m: int, t: Any) -> int:
+    start = perf_counter()
+    try:
+        return single.solve_packed(memoryview(data), n, m, memoryview(t))
+    except ZeroDivisionError:  # machine code goes on with inf and nan, and ends at the same answer
+        return UNSURE
+    finally:
+        _lose(perf_counter() - start)
+
+
+def _interpreted_rows(*arguments: Any) -> None:
+    start = perf_counter()
+    wide.solve_rows(*arguments)
+    _lose(perf_counter() - start)
+
+
+_kernels = Kernels(INTERPRETED, _interpreted, _interpreted_rows, None)
+
+
+def _lose(seconds: float) -> None:
+    """Count the time spent in plain Python, and load the machine code once that would have been quicker."""
+    global _lost, _patience
+    _lost += seconds
+    if _lost > _SECONDS_TO_LOAD:
+        if _patience is None:
+            _forget_old_code()
+            _patience = _SECONDS_TO_LOAD if _on_disk() else _SECONDS_TO_COMPILE
+        if _lost > _patience:
+            load()
+
+
+def _compile() -> Kernels:
+    """Hand copies of the marked functions to Numba; the plain ones stay as they are."""
+    import numba
+
+    from .kernels import simd, simd_llvm
+
+    spaces = [dict(vars(import_module(f"{__package__}.kernels.{name}"))) for name in _MODULES]
+    machine: dict[Any, Any] = {getattr(simd, name): getattr(simd_llvm, name) for name in simd.__all__}
+    del machine[simd.WIDTH]
+    machine[memory.floats] = numba.njit(lambda size: np.zeros(size))
+    machine[memory.integers] = numba.njit(lambda size: np.zeros(size, np.int64))
+    signatures = []
+    for space in spaces:
+        for function in list(space.values()):
+            signature = getattr(function, "__dict__", {}).get("signature")
+            if signature is None or function.__module__ != space["__name__"]:
+                continue
+            copy = FunctionType(function.__code__, space, function.__name__, function.__defaults__)
+            machine[function] = _jit(copy)
+            if signature:
+                signatures.append((machine[function], signature))
+    for space in spaces:
+        for name, value in space.items():
+            if isinstance(value, FunctionType) and value in machine:
+                space[name] = machine[value]
+        if "WIDTH" in space:
+            space["WIDTH"] = simd_llvm.WIDTH
+    for function, signature in signatures:
+        function.compile(signature)
+        function.disable_compile()
+    packed = machine[single.solve_packed]
+    rows = spaces[_MODULES.index("rows")]["solve_rows"]
+    return Kernels(COMPILED, packed, rows, simd_llvm.WIDTH)
+
+
+def _jit(function: FunctionType) -> Any:
+    """Mark a function for Numba, kept on the disk where there is a folder for that."""
+    import numba
+
+    options = {"nogil": True, "error_model": "numpy"}
+    try:
+        return numba.njit(function, cache=_has_space(), **options)
+    except RuntimeError:  # no folder can be written
+        return numba.njit(function, **options)
+
+
+def _has_space() -> bool:
+    """Return whether the disk has space for machine code: Numba would raise when it is full."""
+    from numba.core import config
+
+    place = Path(getattr(config, "CACHE_DIR", "") or _FOLDER)
+    try:
+        there = next(folder for folder in (place, *place.parents) if folder.exists())
+        return shutil.disk_usage(there).free > _DISK_SPACE
+    except OSError:
+        return False
 
 
 def _on_disk() -> bool:
-    """Whether Numba left the kernels' machine code beside their source, where it keeps it if it may write there."""
-    return any((_ROOM / "__pycache__").glob("rows.*.nbi"))
+    """Return whether Numba left the machine code beside the source, where it keeps it if it may write there."""
+    return any((_FOLDER / "__pycache__").glob("rows.solve_rows*.nbi"))
 
 
 def _forget_old_code() -> None:
-    """Remove machine code that is of other sources than those that lie here: Numba looks at a function's own file only.
-
-    The tolerances are such a source too: their numbers are in the machine code.
-    """
-    folder = _ROOM / "__pycache__"
-    sources = sorted((*_ROOM.glob("*.py"), *_ROOM.parent.glob("tolerances.py")))
-    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    """Remove machine code of other sources than those that lie here: Numba compares a function's own file only."""
+    folder = _FOLDER / "__pycache__"
+    sources = [*sorted(_FOLDER.glob("*.py")), _SHARED]
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources if source.exists())).hexdigest()
     seal = folder / "sources.sha256"
     with suppress(OSError):
         if not seal.exists() or seal.read_text() != digest:

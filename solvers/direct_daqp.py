@@ -30,6 +30,7 @@ class Daqp(Method):
     source: ClassVar[str] = "DAQP: D. Arnström, A. Bemporad, D. Axehill, IEEE Trans. Autom. Control 67(8), 2022"
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
+    least_squares: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

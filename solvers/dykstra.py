@@ -54,6 +54,7 @@ class Dykstra(Method):
     source: ClassVar[str] = "M. Hassan, A. Khajepour, IEEE Trans. Robotics 24(3), 2008; R. Dykstra, JASA 78, 1983"
     exact: ClassVar[bool] = False
     continuous: ClassVar[bool] = True
+    least_squares: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
     options: ClassVar[dict[str, str] | None] = {
         "max_iter": "iterations at most, a number from 1 up; 50000 if not given"

@@ -55,6 +55,10 @@ class Method(ABC):
     """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior,
     that is, can all be off their limits at once."""
 
+    least_squares: ClassVar[bool] = False
+    """True if the method's tensions solve the problem's own least squares: then `solve` calls them optimal only where
+    multipliers prove it."""
+
     seeks_reference: ClassVar[bool] = False
     """True if s = 0, tensions at t_ref, is the method's answer wherever it is a feasible one."""
 

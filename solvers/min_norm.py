@@ -30,6 +30,7 @@ class MinNorm(Method):
     source: ClassVar[str] = "Wang, Zhao, Li, Ji, cable-driven multi-robot towing system, Eq. 16-17, corrected"
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
+    least_squares: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

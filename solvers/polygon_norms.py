@@ -67,6 +67,7 @@ class TwoNorm(Method):
     source: ClassVar[str] = _SOURCE
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
+    least_squares: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

@@ -55,6 +55,7 @@ class QuadraticProgram(Method):
     source: ClassVar[str] = "qpsolvers: S. Caron et al.; OSQP: Stellato et al. 2020; Clarabel: Goulart and Chen 2024"
     exact: ClassVar[bool] = False
     continuous: ClassVar[bool] = True
+    least_squares: ClassVar[bool] = True
     seeks_reference: ClassVar[bool] = True
     options: ClassVar[dict[str, str] | None] = None
 

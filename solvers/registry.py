@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..inputs import required, shown
 from ..tolerances import DOUBTFUL
+from . import compiled
 from .active_set import ActiveSet
 from .analytic_centre import AnalyticCentre
-from .boundary import boundary_candidates, nearest_available
+from .boundary import careful_candidates
 from .centroid import Centroid
 from .certificate import Certificate, certify
 from .closed_form import ClosedForm
@@ -20,9 +21,9 @@ from .dykstra import Dykstra
 from .improved_closed_form import ImprovedClosedForm
 from .linear_programs import LargestMargin, LeastSum, MinMax
 from .log_barrier import LogBarrier
-from .margin import capacity_margin
 from .method import Method, Proposal
 from .min_norm import MinNorm
+from .optimality import is_optimal
 from .p_norm import PNorm
 from .polygon_norms import OneNorm, TwoNorm
 from .problem import TensionProblem
@@ -32,6 +33,8 @@ from .solution import Status, TensionSolution
 from .standard_form import StandardForm, standard_form
 
 __all__ = ["methods", "solve"]
+
+_CAREFUL = "at the edge of what the cables can give, or of rounding: solved with limits moved by 1e-10 or less"
 
 _ACTIVE_SET = ActiveSet()
 _METHODS: dict[str, Method] = {
@@ -95,22 +98,25 @@ def solve(
         and not options
         and type(problem) is TensionProblem
     ):
+        form_of_kernels = compiled.current().backend
         answer = _ACTIVE_SET.attempt(problem)
         if answer is not None:
             spent = time.perf_counter() - start
             proof = _ACTIVE_SET.direction
-            return TensionSolution(problem, answer[1], answer[0], "active-set", None, spent, direction=proof)
+            return TensionSolution(problem, answer[1], answer[0], "active-set", form_of_kernels, spent, direction=proof)
     chosen, used_backend = _lookup(method, backend, options)
+    if chosen is _ACTIVE_SET:
+        used_backend = "daqp"  # which the robust path of this method asks
     required("problem", problem, TensionProblem)
     form = standard_form(problem)
     proposal, verdict = None, None
     if form.sigma.size and form.sigma[-1] <= DOUBTFUL * form.sigma[0]:
         coarse = standard_form(problem, DOUBTFUL)
         proposal = _propose(chosen, coarse, used_backend, options)
-        verdict = _accept(problem, coarse, proposal)
+        verdict = _accept(problem, coarse, chosen, proposal)
     if proposal is None or verdict is None:
         proposal = _propose(chosen, form, used_backend, options)
-        verdict = _accept(problem, form, proposal) or _explain(problem, form, chosen, proposal)
+        verdict = _accept(problem, form, chosen, proposal) or _explain(problem, form, chosen, proposal)
     return TensionSolution(
         problem,
         verdict.tensions,
@@ -139,31 +145,32 @@ def _propose(method: Method, form: StandardForm, backend: str | None, options: d
     return method.propose(form, backend, **options)
 
 
-def _accept(problem: TensionProblem, form: StandardForm, proposal: Proposal) -> _Verdict | None:
-    """Return the verdict on tensions that give w, else None."""
+def _accept(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict | None:
+    """Return the verdict on tensions that give w and, of a method that solves the least squares, are optimal."""
     tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-    return _Verdict(Status.OPTIMAL, tensions) if tensions is not None and _gives_wrench(problem, tensions) else None
+    if tensions is None or not _gives_wrench(problem, tensions):
+        return None
+    return _Verdict(Status.OPTIMAL, tensions) if not method.least_squares or is_optimal(form, tensions) else None
 
 
 def _explain(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict:
-    """Decide what a proposal that does not give w is worth: a verified certificate, else what is left."""
+    """Judge a proposal that was not accepted: by a certificate, else by verified tensions from elsewhere, else less."""
     tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-    certificate = certify(problem)
+    useful = tensions if tensions is not None and _gives_wrench(problem, tensions) else None
+    certificate = None if useful is not None else certify(problem)
     if certificate is not None and method.always_answers and tensions is not None:
         return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
         return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     if method.exact and not proposal.final:
-        for s in boundary_candidates(problem, form):
-            tensions = form.tensions(problem, s)
-            if _gives_wrench(problem, tensions):
-                return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
-        tensions = form.tensions(problem, nearest_available(problem, form))
-        if _gives_wrench(problem, tensions):
-            # On the boundary there is nothing to choose; farther inside there is, and these were not chosen by cost.
-            if abs(capacity_margin(problem).value) <= problem.tolerance(tensions):
-                return _Verdict(Status.OPTIMAL, tensions, detail="on the boundary of the available wrench set")
-            return _Verdict(Status.INACCURATE, tensions, detail="gives the wrench, at what may not be the least cost")
+        for s in careful_candidates(problem, form):
+            candidate = form.tensions(problem, s)
+            if _gives_wrench(problem, candidate):
+                if is_optimal(form, candidate):
+                    return _Verdict(Status.OPTIMAL, candidate, detail=_CAREFUL)
+                useful = candidate if useful is None else useful
+    if useful is not None:
+        return _Verdict(Status.INACCURATE, useful, detail="gives the wrench, but multipliers do not prove it optimal")
     return _Verdict(Status.FAILED if tensions is None else Status.INACCURATE, tensions, detail=proposal.detail)
 
 

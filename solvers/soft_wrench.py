@@ -49,6 +49,7 @@ class SoftWrench(Method):
     )
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
+    least_squares: ClassVar[bool] = True
     always_answers: ClassVar[bool] = True
     options: ClassVar[dict[str, str] | None] = {
         "rho": "weight of the squared wrench error beside the squared tensions, 1e-12 to 1e12; infinite if not given"

@@ -1,24 +1,16 @@
 """The kernel and `solve_batch`: exact on awkward problems, the same as `solve`, and nothing lost to a bad row."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline.benchmarks.exactness import BOUNDARY, awkward_problem, check
+from towline.benchmarks.exactness import awkward_problem, check
 from towline.errors import InputError, SolverError
-from towline.solvers import Status, TensionProblem, certify, compiled, methods, solve, solve_batch
+from towline.solvers import Status, TensionProblem, certify, methods, solve, solve_batch
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
 from .references import linear_program_status, optimum_by_enumeration
-
-
-@pytest.fixture(scope="module", autouse=True)
-def kernel():
-    return compiled.load()
 
 
 def stacked(problems):
@@ -34,7 +26,7 @@ def test_a_thousand_awkward_problems_are_right():
     report = check(range(1000))
     print(report.line())
     assert set(report.statuses) == {"optimal", "infeasible", "singular"}
-    assert [d for d in report.disagreements if d.distance > BOUNDARY] == []
+    assert report.disagreements == []
     assert report.worst < 1e-8
 
 
@@ -187,15 +179,6 @@ def test_never_nan_never_outside_and_every_certificate_verifies(seed):
     else:
         assert solution.status in (Status.INFEASIBLE, Status.SINGULAR)
         assert solution.certificate.verify(problem)
-
-
-def test_a_process_that_solves_little_loads_no_numba():
-    code = (
-        "import sys; from towline.solvers import TensionProblem, solve;"
-        "print(solve(TensionProblem([[1, -1]], [3], 1, 60)).tensions, 'numba' in sys.modules)"
-    )
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert told.split() == ["[4.", "1.]", "False"]
 
 
 def nearly_unavailable(seed):

@@ -1,12 +1,14 @@
-"""The kernels: vectors compute as NumPy does, lanes answer as single problems do, stale machine code is not used."""
+"""Check that lanes answer as single problems do, machine code as plain Python, and old machine code is not used."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from towline import tolerances
 from towline.errors import InputError
 from towline.solvers import Status, TensionProblem, compiled, solve, solve_batch
 
@@ -20,11 +22,12 @@ def kernels():
 
 @pytest.fixture(scope="module")
 def arithmetic():
-    """Rows of everything that `simd` can do with two vectors and a number."""
-    from towline.solvers.kernels.jit import jit
-    from towline.solvers.kernels.simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
+    """Return what computes everything that `simd_llvm` can do with two vectors and a number."""
+    import numba
 
-    @jit()
+    from towline.solvers.kernels.simd_llvm import load, magnitude, maximum, minimum, splat, sqrt, store, where
+
+    @numba.njit
     def compute(x, y, a, result):
         u, v = load(x, 0), load(y, 0)
         zero, one = splat(0.0), splat(1.0)
@@ -206,10 +209,12 @@ def test_threads_is_a_whole_number(threads):
 
 
 def test_machine_code_of_other_sources_is_forgotten(tmp_path, monkeypatch):
-    room = tmp_path / "kernels"
-    (room / "__pycache__").mkdir(parents=True)
-    index, source = room / "__pycache__" / "rows.solve_rows-1.py311.nbi", room / "slabs.py"
-    monkeypatch.setattr(compiled, "_ROOM", room)
+    folder = tmp_path / "kernels"
+    (folder / "__pycache__").mkdir(parents=True)
+    index, source = folder / "__pycache__" / "rows.solve_rows-1.py311.nbi", folder / "slabs.py"
+    monkeypatch.setattr(compiled, "_FOLDER", folder)
+    monkeypatch.setattr(compiled, "_SHARED", tmp_path / "tolerances.py")
+    assert Path(tolerances.__file__).is_file()
     source.write_text("a = 1")
     compiled._forget_old_code()
     index.touch()
@@ -223,14 +228,12 @@ def test_machine_code_of_other_sources_is_forgotten(tmp_path, monkeypatch):
         assert not index.exists()
 
 
-def test_without_a_folder_or_room_for_machine_code_it_is_not_kept(tmp_path, monkeypatch):
-    from towline.solvers.kernels import jit
-
+def test_without_a_folder_or_space_for_machine_code_it_is_not_kept(tmp_path, monkeypatch):
     space = {}
     exec(compile("def twice(x):\n    return 2 * x", "<nowhere>", "exec"), space)  # Numba finds no place for this
-    assert jit.jit()(space["twice"])(21) == 42
+    assert compiled._jit(space["twice"])(21) == 42
     monkeypatch.setattr("shutil.disk_usage", lambda _: type("usage", (), {"free": 1000}))
-    assert not jit.has_room()
+    assert not compiled._has_space()
 
 
 def test_threads_do_not_change_a_bit():

@@ -1,7 +1,1 @@
-"""The kernels: what Numba compiles. Imported by `compiled.py` alone, since Numba takes its time."""
-
-from .rows import solve_rows
-from .simd import WIDTH
-from .single import solve_packed
-
-__all__ = ["WIDTH", "solve_packed", "solve_rows"]
+"""The kernels, in plain Python and NumPy; `compiled.py` turns them into machine code where that pays."""

@@ -2,6 +2,7 @@
 
 __all__ = [
     "CLEAR",
+    "DECISIVE",
     "DEPENDENT",
     "INACCURATE",
     "INFEASIBLE",
@@ -10,8 +11,11 @@ __all__ = [
     "PARALLEL",
     "SINGULAR",
     "SLACK",
+    "STATIONARY",
+    "STEPS",
     "SURE_PIVOT",
     "SURE_ZERO",
+    "TURNS",
     "UNSURE",
 ]
 
@@ -20,7 +24,12 @@ OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID, FAILED, UNSURE = range(7)
 # Pivots above the first part of the largest are sure to count, below the second they are rounding. RANK lies between.
 SURE_PIVOT, SURE_ZERO = 1e-9, 1e-14
 
+# After so many steps of Newton's method the problems that are left are put together, so many times; then they go alone.
+STEPS, TURNS = 5, 5
+
 SLACK = 1e-12  # how far s may pass a limit, relative to the size of s
 PARALLEL = 1e-11  # sine and length below which a slab does not cut a line
+STATIONARY = 1e-10  # part of the gradient that the multipliers may leave, relative to the size of s
+DECISIVE = 1e-5  # relative change of the cost if the limits move by the slack: above it rounding chose the tensions
 DEPENDENT = 1e-22  # square of the part of a normal outside the span of the active ones
 CLEAR = 4.0  # a shortfall is beyond doubt from this many tolerances

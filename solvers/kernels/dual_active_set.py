@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 
-from .codes import DEPENDENT, PARALLEL
-from .jit import jit
+from .codes import DECISIVE, DEPENDENT, PARALLEL, STATIONARY
+from .jit import compilable
 
 __all__ = ["dual_active_set"]
 
 
-@jit()
+@compilable()
 def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
     """Move s (mm,) to the point of least norm in s + range N, by Goldfarb and Idnani with the identity as Hessian.
 
-    N holds the basis vectors one after another. Return 0 if found, 1 and multipliers `push` if there is none, else 2.
+    N holds the basis vectors one after another. Return 0 if multipliers of the limits prove it, 1 and multipliers
+    `push` if there is no such point, else 2.
     """
     J = work[: k * k]  # orthonormal, column by column; the first q span the active normals
     R = work[k * k : 2 * k * k]  # their triangle, column by column
@@ -25,10 +26,12 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
     r = work[2 * k * k + 2 * k + 1 : 2 * k * k + 3 * k + 1]
     step = work[2 * k * k + 3 * k + 1 : 2 * k * k + 4 * k + 1]
     side = work[2 * k * k + 4 * k + 1 : 2 * k * k + 4 * k + 1 + mm]  # 0 if not active, -1 at upper, 1 at lower
-    J[:] = 0.0
+    for c in range(k * k):
+        J[c] = 0.0
     for c in range(k):
         J[c * k + c] = 1.0
-    side[:] = 0.0
+    for c in range(mm):
+        side[c] = 0.0
     q = 0
     for _ in range(10 * mm + 20):
         p, worst, sign = -1, slack, 0.0
@@ -43,7 +46,7 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
             for j in range(q):
                 i = active[j]
                 s[i] = lower[i] if side[i] > 0.0 else upper[i]
-            return 0
+            return 0 if _is_optimal(N, k, s, mm, slack, u, side, active, q) else 2
         own = 0.0  # the multiplier of p
         size = 0.0
         for c in range(k):
@@ -129,3 +132,27 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
                     J[j * k + e] = cos * x + sin * y
                     J[(j + 1) * k + e] = cos * y - sin * x
     return 2
+
+
+@compilable()
+def _is_optimal(N, k, s, mm, slack, u, side, active, q):
+    """Return whether the multipliers u (q,) of the active limits prove that s is the point of least norm."""
+    square, largest = 0.0, 0.0
+    for i in range(mm):
+        square += s[i] * s[i]
+    size = math.sqrt(square)
+    for j in range(q):
+        if u[j] < -STATIONARY * size:
+            return False
+        largest = max(largest, u[j])
+    if largest * slack > DECISIVE * square:
+        return False
+    for c in range(k):
+        rest = 0.0
+        for i in range(mm):
+            rest += N[c * mm + i] * s[i]
+        for j in range(q):
+            rest -= u[j] * side[active[j]] * N[c * mm + active[j]]
+        if abs(rest) > STATIONARY * size:
+            return False
+    return True

@@ -1,40 +1,28 @@
-"""How the kernels of this room are compiled: without the GIL, kept on the disk where Numba finds a folder for them."""
+"""Mark the functions of this package that `compiled.py` can turn into machine code; until then they are plain Python.
+
+The same source gives the same bits either way: Numba compiles it without fused or reordered arithmetic.
+"""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core import config
+__all__ = ["GIVEN", "VECTOR", "compilable"]
 
-__all__ = ["GIVEN", "VECTOR", "has_room", "jit"]
+Function = Callable[..., Any]
 
-VECTOR = numba.float64[::1]
-GIVEN = numba.types.Array(numba.float64, 1, "C", readonly=True)
-
-_ROOM = 50_000_000  # bytes; the machine code of this room takes about 5 MB
+# Types of Numba as text, so that this module does not import it.
+VECTOR = "Array(float64, 1, 'C')"
+GIVEN = "Array(float64, 1, 'C', readonly=True)"
 
 
-def has_room() -> bool:
-    """Whether the disk has room for machine code: Numba would raise when it is full."""
-    place = Path(getattr(config, "CACHE_DIR", "") or __file__)
-    try:
-        return shutil.disk_usage(next(folder for folder in (place, *place.parents) if folder.exists())).free > _ROOM
-    except OSError:
-        return False
+def compilable(*signature: str) -> Callable[[Function], Function]:
+    """Mark a function; a signature (result, arguments) is compiled at once, and no other one."""
 
+    def mark(function: Function) -> Function:
+        text = f"{signature[0]}({', '.join(signature[1:])})" if signature else ""
+        function.__dict__["signature"] = text
+        return function
 
-def jit(*arguments: Any, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Compile as `numba.njit` does; division by zero gives inf or nan, as in NumPy."""
-    settings = {"nogil": True, "error_model": "numpy", **options}
-
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        try:
-            return numba.njit(*arguments, cache=has_room(), **settings)(function)
-        except RuntimeError:  # no folder can be written
-            return numba.njit(*arguments, **settings)(function)
-
-    return decorate
+    return mark

@@ -1,4 +1,4 @@
-"""Sixteen problems at once: how they lie in the work array, how they get there, and how their answers are judged.
+"""Many problems at once: how they lie in the work array, how they get there, and how their answers are judged.
 
 Each row of the work array is a vector of `simd`, one lane for each problem. There are single rows, rows for each cable,
 rows for each wrench row, and two matrices: S A, and B, that is S A with columns scaled to equal weights, which a solver
@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
-from .codes import INACCURATE, INFEASIBLE, OPTIMAL, SLACK, UNSURE
-from .jit import jit
+from .codes import INACCURATE, OPTIMAL, SLACK, UNSURE
+from .jit import compilable
 from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "PER_LENGTH",
     "PROVEN",
     "REF",
+    "ROUNDED",
     "SA",
     "SHORTFALL",
     "SIZE",
@@ -42,10 +43,10 @@ __all__ = [
     "D",
     "Y",
     "cable",
+    "judge",
     "lane_size",
     "matrix",
     "prepare",
-    "report",
     "wrench",
 ]
 
@@ -63,31 +64,31 @@ SA, B_ = range(2)
 _MATRIX = 2
 
 
-@jit()
+@compilable()
 def cable(kind, m):
     """Return the first of the rows of a kind that has one for each cable."""
     return _SINGLE + kind * m
 
 
-@jit()
+@compilable()
 def wrench(kind, n, m):
     """Return the first of the rows of a kind that has one for each wrench row."""
     return _SINGLE + _CABLE * m + kind * n
 
 
-@jit()
+@compilable()
 def matrix(kind, n, m):
     """Return the first row of a matrix; its element (r, c) is r m + c rows on."""
     return _SINGLE + _CABLE * m + _WRENCH * n + kind * n * m
 
 
-@jit()
+@compilable()
 def lane_size(n, m):
     """Return how many numbers the work array has."""
     return WIDTH * (_SINGLE + _CABLE * m + _WRENCH * n + _MATRIX * n * m)
 
 
-@jit()
+@compilable()
 def _gather(source, each, size, members, W, row):
     """Put `size` numbers of each problem into rows."""
     if each == 0:
@@ -99,9 +100,9 @@ def _gather(source, each, size, members, W, row):
         store(W, row + i, gather(source, starts, i))
 
 
-@jit()
+@compilable()
 def prepare(given, per, n, m, members, keep, W):
-    """Bring the problems of sixteen rows into lanes; with `keep`, their matrices are there already.
+    """Bring the problems of so many rows into lanes; with `keep`, their matrices are there already.
 
     `given` are the arrays of `rows.solve_rows`, from A to length.
     """
@@ -119,7 +120,7 @@ def prepare(given, per, n, m, members, keep, W):
     _prepare_limits(n, m, W)
 
 
-@jit()
+@compilable()
 def _prepare_matrix(weighted, n, m, W):
     """Scale the matrix, and its columns to equal weights."""
     length = load(W, PER_LENGTH)
@@ -161,7 +162,7 @@ def _prepare_matrix(weighted, n, m, W):
     store(W, GOOD_MATRIX, where(good, splat(1.0), splat(0.0)))
 
 
-@jit()
+@compilable()
 def _prepare_limits(n, m, W):
     """State limits and right-hand side for s, and sum up what the problem asks."""
     required, per_length = splat(0.0), load(W, PER_LENGTH)
@@ -196,9 +197,12 @@ def _prepare_limits(n, m, W):
     store(W, PROVEN, splat(0.0))
 
 
-@jit()
-def report(soft, n, m, members, W, t, d, info, residual, status):
-    """Make tensions of s and judge them: optimal, with `soft` also inaccurate; infeasible if proven; else unsure."""
+@compilable()
+def judge(soft, n, m, W):
+    """Make tensions of s, in its rows, and judge them: their code goes to GOOD and their wrench error to ROUNDED.
+
+    The code is optimal, with `soft` also inaccurate, else unsure; where PROVEN is one the problem is infeasible.
+    """
     error, rounded = splat(0.0), load(W, ROUNDED)
     for c in range(m):
         x = load(W, cable(REF, m) + c) + load(W, cable(UNIT, m) + c) * load(W, cable(S_, m) + c)
@@ -216,17 +220,3 @@ def report(soft, n, m, members, W, t, d, info, residual, status):
     code = where(met, splat(1.0 * OPTIMAL), splat(1.0 * (INACCURATE if soft else UNSURE)))
     store(W, GOOD, where(good, code, splat(1.0 * UNSURE)))
     store(W, ROUNDED, error)
-    for e in range(WIDTH):
-        row = members[e]
-        proven = W[PROVEN * WIDTH + e] > 0.0
-        status[row] = INFEASIBLE if proven and not soft else int(W[GOOD * WIDTH + e])
-        if proven:
-            info[row * 2], info[row * 2 + 1] = W[SUPPORT * WIDTH + e], W[SHORTFALL * WIDTH + e]
-            for i in range(n):
-                d[row * n + i] = W[(wrench(D, n, m) + i) * WIDTH + e]
-        elif status[row] == INACCURATE:
-            info[row * 2], info[row * 2 + 1] = np.nan, np.nan
-        if status[row] == OPTIMAL or status[row] == INACCURATE:
-            residual[row] = W[ROUNDED * WIDTH + e]
-            for c in range(m):
-                t[row * m + c] = W[(cable(S_, m) + c) * WIDTH + e]

@@ -1,4 +1,4 @@
-r"""Sixteen problems at once with any number of cables: Newton's method on the dual.
+r"""Many problems at once with any number of cables: Newton's method on the dual.
 
 The dual of the bounded least norm has one unknown for each equation: with multipliers y the best s is
 $s(y) = clip(B^T y)$, and y is right where
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import jit
+from .jit import compilable
 from .lanes import ASKED, B_, GOOD, HIGH, LOW, NORM, S_, UNIT, Y, cable, matrix, wrench
 from .lanes_proof import prove_in_lanes
 from .simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, store, where
@@ -29,19 +29,19 @@ _DAMPING = 1e-12  # relative to the mean of H's diagonal
 _SMALL_PIVOT = 1e-8  # relative to the same
 
 
-@jit()
+@compilable()
 def _rows(n, m):
     """Return the first rows of the scratch: y, step, r, B^T y, the change of it, one where a cable is free, and H."""
     return 0, n, 2 * n, 3 * n, 3 * n + m, 3 * n + 2 * m, 3 * n + 3 * m
 
 
-@jit()
+@compilable()
 def newton_size(n, m):
     """Return how many numbers of scratch `newton_in_lanes` needs."""
     return WIDTH * (3 * n + 3 * m + n * n)
 
 
-@jit()
+@compilable()
 def newton_in_lanes(soft, steps, again, n, m, W, V):
     """Take `steps` steps at the prepared problems.
 
@@ -88,14 +88,15 @@ def newton_in_lanes(soft, steps, again, n, m, W, V):
             going = going & ~_prove(going, n, m, W, V, step, change)
         length = where(going, _length(soft, n, m, W, V), splat(0.0))
         for i in range(n):
-            store(V, y + i, load(V, y + i) + length * load(V, step + i))
+            x = load(V, y + i)
+            store(V, y + i, where(going, x + length * load(V, step + i), x))
     if soft > 0.0 and any_of(found):  # r = y / rho is what is missing of the wrench: more than there is, or a trade
         _pulls(n, m, W, V, y, pull)
         _prove(found, n, m, W, V, y, pull)
     store(W, GOOD, where(found, splat(1.0), splat(0.0)))
 
 
-@jit()
+@compilable()
 def _pulls(n, m, W, V, d, into):
     """Put B^T d into rows."""
     for c in range(m):
@@ -105,7 +106,7 @@ def _pulls(n, m, W, V, d, into):
         store(V, into + c, total)
 
 
-@jit()
+@compilable()
 def _evaluate(soft, found, n, m, W, V):
     """Find s, r and the free cables for y; s stays as it is where `found`. Return where r is rounding."""
     y, _, r, pull, _, free, _ = _rows(n, m)
@@ -129,7 +130,7 @@ def _evaluate(soft, found, n, m, W, V):
     return error <= _MET * terms
 
 
-@jit()
+@compilable()
 def _prove(going, n, m, W, V, d, pulls):
     """Return where d, with B^T d in `pulls`, proves that the wrench is out of reach."""
     gap = splat(0.0)
@@ -143,7 +144,7 @@ def _prove(going, n, m, W, V, d, pulls):
     return prove_in_lanes(promising, n, m, W, V, d) if any_of(promising) else promising
 
 
-@jit()
+@compilable()
 def _factor(n, m, W, V, damping):
     """Make H of the free cables, factor it as L D L^T and return its least pivot.
 
@@ -168,7 +169,7 @@ def _factor(n, m, W, V, damping):
     return smallest
 
 
-@jit()
+@compilable()
 def _make_H(n, m, W, V):
     """Make B_F B_F^T, the lower triangle, in blocks of two by three that do not wait for each other."""
     free, H = _rows(n, m)[-2:]
@@ -195,7 +196,7 @@ def _make_H(n, m, W, V):
             store(V, H + next_row * n + third, b2)
 
 
-@jit()
+@compilable()
 def _solve(n, m, V):
     """Put H^-1 r into step."""
     _, step, r, _, _, _, H = _rows(n, m)
@@ -211,7 +212,7 @@ def _solve(n, m, V):
         store(V, step + i, total)
 
 
-@jit()
+@compilable()
 def _length(soft, n, m, W, V):
     """Return how far to go along the step: all of it, or to where the dual function is largest."""
     y, step, _, pull, change, _, _ = _rows(n, m)

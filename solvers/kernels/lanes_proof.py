@@ -1,10 +1,10 @@
-"""Sixteen directions at once: which of them prove their wrench out of reach. As `proof.proves`, but for rank."""
+"""Many directions at once: which of them prove their wrench out of reach. As `proof.proves`, but for rank."""
 
 from __future__ import annotations
 
 from ...tolerances import FEASIBILITY, NEGLIGIBLE, ROUNDING
 from .codes import CLEAR
-from .jit import jit
+from .jit import compilable
 from .lanes import (
     ASKED,
     NORM,
@@ -27,7 +27,7 @@ from .simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
 __all__ = ["prove_in_lanes"]
 
 
-@jit()
+@compilable()
 def prove_in_lanes(chosen, n, m, W, V, d):
     """Keep the directions in rows d of V, in the units of S w, where `chosen` and proven; return where.
 

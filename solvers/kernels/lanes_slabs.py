@@ -1,4 +1,4 @@
-"""Sixteen problems at once with at most two more cables than equations: reduction, then one slab after another.
+"""Many problems at once with at most two more cables than equations: reduction, then one slab after another.
 
 The same steps as `reduction` and `slabs`, without branches and without pivoting: a matrix that would need it, or one
 that lacks rank, is left to `single`. For a problem without tensions the limits that exclude them give the direction
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .codes import PARALLEL, SLACK
-from .jit import jit
+from .codes import DECISIVE, PARALLEL, SLACK, STATIONARY
+from .jit import compilable
 from .lanes import (
     B_,
     DIAG,
@@ -37,7 +37,7 @@ __all__ = ["reduce_lanes", "slabs_in_lanes", "slabs_size"]
 _STEEP, _NEAR = 1e-6, 1e6  # sine, and distance in units of what a limit may be passed by
 
 
-@jit()
+@compilable()
 def reduce_lanes(n, m, W):
     """Reduce B to L and reflectors, and make the basis of its null space."""
     B, diag, tau = matrix(B_, n, m), wrench(DIAG, n, m), wrench(TAU, n, m)
@@ -76,7 +76,7 @@ def reduce_lanes(n, m, W):
     _reflect_back(n, m, W, cable(N1, m))
 
 
-@jit()
+@compilable()
 def _reflect_back(n, m, W, row):
     """Apply Q_1^T to the vector in the rows from `row`."""
     B, tau = matrix(B_, n, m), wrench(TAU, n, m)
@@ -89,13 +89,13 @@ def _reflect_back(n, m, W, row):
             store(W, row + c, load(W, row + c) - dot * load(W, B + j * m + c))
 
 
-@jit()
+@compilable()
 def slabs_size(n, m):
-    """Return how many numbers of scratch `slabs_in_lanes` needs: push and d, then five vectors to take apart."""
-    return WIDTH * (m + n + 5)
+    """Return how many numbers of scratch `slabs_in_lanes` needs: push and d."""
+    return WIDTH * (m + n)
 
 
-@jit()
+@compilable()
 def slabs_in_lanes(n, m, W, V):
     """Solve the prepared problems after `reduce_lanes`."""
     _least_norm(n, m, W)
@@ -103,6 +103,7 @@ def slabs_in_lanes(n, m, W, V):
     slack = load(W, SLACKS)
     excluded = good & ~good
     z0, z1 = splat(0.0), splat(0.0)
+    pull, length, pull_other = splat(0.0), splat(0.0), splat(0.0)  # multipliers of the limits that z rests on
     for i in range(m):
         a, b, s = load(W, cable(N0, m) + i), load(W, cable(N1, m) + i), load(W, cable(S_, m) + i)
         low, high = load(W, cable(LOW, m) + i), load(W, cable(HIGH, m) + i)
@@ -126,7 +127,7 @@ def slabs_in_lanes(n, m, W, V):
         base0, base1 = a * edge, b * edge
         start, stop = splat(-np.inf), splat(np.inf)
         at_start, at_stop = splat(-1.0), splat(-1.0)
-        den_start, den_stop = splat(0.0), splat(0.0)
+        den_start, den_stop, dot_start, dot_stop = splat(1.0), splat(1.0), splat(0.0), splat(0.0)
         for j in range(i):
             a_j, b_j = load(W, cable(N0, m) + j), load(W, cable(N1, m) + j)
             here = load(W, cable(S_, m) + j) + a_j * base0 + b_j * base1
@@ -145,6 +146,8 @@ def slabs_in_lanes(n, m, W, V):
             at_start, at_stop = where(later, splat(1.0 * j), at_start), where(earlier, splat(1.0 * j), at_stop)
             den_start, den_stop = where(later, den, den_start), where(earlier, den, den_stop)
             start, stop = where(later, first_j, start), where(earlier, last_j, stop)
+            dot = a_j * a + b_j * b
+            dot_start, dot_stop = where(later, dot, dot_start), where(earlier, dot, dot_stop)
         empty = moves & good & (start - stop > slack)
         if any_of(empty):
             # The limit that stops from below and the one from above, such that their pulls along the edge cancel.
@@ -158,16 +161,27 @@ def slabs_in_lanes(n, m, W, V):
         shift = where(start > stop, 0.5 * (start + stop), shift)
         z0 = where(moves, base0 + shift * along0, z0)
         z1 = where(moves, base1 + shift * along1, z1)
+        # z is the sum of the two normals, each times its multiplier; see `slabs`.
+        other = where(shift > 0.0, shift / den_start, where(shift < 0.0, shift / den_stop, splat(0.0)))
+        dot = where(shift > 0.0, dot_start, dot_stop)
+        own = ((a * z0 + b * z1) - other * dot) / where(cuts, square, splat(1.0))
+        pull = where(moves, where(below, own, -own), pull)
+        length = where(moves, square, length)
+        pull_other = where(moves, magnitude(other), pull_other)
+    total = splat(0.0)
     for c in range(m):
         s = load(W, cable(S_, m) + c) + load(W, cable(N0, m) + c) * z0 + load(W, cable(N1, m) + c) * z1
         store(W, cable(S_, m) + c, s)
+        total = total + s * s
+    good = good & (pull * sqrt(length) >= -STATIONARY * sqrt(total))
+    good = good & (maximum(pull, pull_other) * slack <= DECISIVE * total)
     store(W, GOOD, where(good, splat(1.0), splat(0.0)))
     if any_of(excluded):
         _direction(n, m, W, V)
         prove_in_lanes(excluded, n, m, W, V, m)
 
 
-@jit()
+@compilable()
 def _least_norm(n, m, W):
     """Put the s of least norm that gives the wrench into S_, and its size into SLACKS."""
     B, y, own = matrix(B_, n, m), wrench(Y, n, m), cable(S_, m)
@@ -185,36 +199,29 @@ def _least_norm(n, m, W):
     store(W, SLACKS, SLACK * maximum(load(W, SIZE), sqrt(square)))
 
 
-@jit()
+@compilable()
 def _clear(m, V):
     """Set the multipliers, the first m rows of V, to zero."""
     for c in range(m):
         store(V, c, splat(0.0))
 
 
-@jit()
+@compilable()
 def _push(n, m, W, V, i, empty, at_start, at_stop, f, g):
     """Put the multipliers of three limits that exclude each other into the rows of V, where `empty`."""
-    apart = m + n
-    store(V, apart, where(empty, splat(1.0), splat(0.0)))
-    store(V, apart + 1, at_start)
-    store(V, apart + 2, at_stop)
-    store(V, apart + 3, f)
-    store(V, apart + 4, g)
-    row0, row1, apart = cable(N0, m) * WIDTH, cable(N1, m) * WIDTH, apart * WIDTH
-    for e in range(WIDTH):
-        if V[apart + e] > 0.0:
-            a, b = W[row0 + i * WIDTH + e], W[row1 + i * WIDTH + e]
-            toward = 0.0
-            for side in range(2):
-                at = int(V[apart + (1 + side) * WIDTH + e])
-                pull = V[apart + (3 + side) * WIDTH + e]
-                V[at * WIDTH + e] += pull
-                toward += pull * (W[row0 + at * WIDTH + e] * a + W[row1 + at * WIDTH + e] * b)
-            V[i * WIDTH + e] -= toward / (a * a + b * b)
+    a, b = load(W, cable(N0, m) + i), load(W, cable(N1, m) + i)
+    toward, none = splat(0.0), splat(0.0)
+    for j in range(i):
+        pull = where((at_start >= 1.0 * j) & (at_start <= 1.0 * j), f, none)
+        pull = pull + where((at_stop >= 1.0 * j) & (at_stop <= 1.0 * j), g, none)
+        pull = where(empty, pull, none)
+        store(V, j, load(V, j) + pull)
+        toward = toward + pull * (load(W, cable(N0, m) + j) * a + load(W, cable(N1, m) + j) * b)
+    toward = toward / where(empty, a * a + b * b, splat(1.0))
+    store(V, i, load(V, i) - toward)
 
 
-@jit()
+@compilable()
 def _direction(n, m, W, V):
     """Solve B^T d = push; push is in the row space of B."""
     B, diag, tau = matrix(B_, n, m), wrench(DIAG, n, m), wrench(TAU, n, m)

@@ -8,12 +8,13 @@ import numpy as np
 
 from ...tolerances import FEASIBILITY, NEGLIGIBLE, RANK, ROUNDING
 from .codes import CLEAR, INFEASIBLE, SINGULAR, UNSURE
-from .jit import jit
+from .jit import compilable
+from .memory import integers
 
 __all__ = ["outside_range", "proves"]
 
 
-@jit()
+@compilable()
 def proves(A, w, lower, upper, ref, n, m, per_length, d, info):
     """Whether the scaled direction d (n,), made unit and unscaled here, proves w out of reach.
 
@@ -62,16 +63,16 @@ def proves(A, w, lower, upper, ref, n, m, per_length, d, info):
     return status
 
 
-@jit()
+@compilable()
 def outside_range(A, w, n, m, per_length, d, work):
     """Put the part of S w outside the range of S A into d (n,); False if it is rounding. By Gram-Schmidt, twice."""
     Q, x = work[: n * n], work[n * n : n * n + n]
-    used = np.zeros(m, np.bool_)
+    used = integers(m)
     largest, rank = 0.0, 0
     for _ in range(min(n, m)):
         best, most = -1, 0.0
         for c in range(m):
-            if used[c]:
+            if used[c] == 1:
                 continue
             for i in range(n):
                 x[i] = A[i * m + c] * (per_length if n == 6 and i >= 3 else 1.0)
@@ -86,7 +87,7 @@ def outside_range(A, w, n, m, per_length, d, work):
         most = math.sqrt(_without(Q, rank, n, x))
         for i in range(n):
             Q[rank * n + i] = x[i] / most
-        used[best] = True
+        used[best] = 1
         rank += 1
     before = 0.0
     for i in range(n):
@@ -97,7 +98,7 @@ def outside_range(A, w, n, m, per_length, d, work):
     return _without(Q, rank, n, d) > 1e-20 * before
 
 
-@jit()
+@compilable()
 def _without(Q, rank, n, x):
     """Remove from x (n,) its parts along the rows of Q, in place, and return the square of what is left."""
     for _ in range(2):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from .codes import SURE_PIVOT, SURE_ZERO
-from .jit import jit
+from .jit import compilable
 
 __all__ = ["reduce", "reflect"]
 
 
-@jit()
+@compilable()
 def reflect(B, tau, j, mm, x, at):
     """x[at : at + mm] -= tau v v^T x with the reflector v = B[j, j:]."""
     dot = 0.0
@@ -21,7 +21,7 @@ def reflect(B, tau, j, mm, x, at):
         x[at + c] -= dot * B[j * mm + c]
 
 
-@jit()
+@compilable()
 def reduce(B, n, mm, order, diag, tau, norms):
     """Reduce B (n, mm) in place to L and reflectors, largest remaining row first; return the rank, or -1 if unsure."""
     for i in range(n):

@@ -12,22 +12,20 @@ dual active-set method (Goldfarb and Idnani 1983) adds the most violated limit a
 change sign.
 
 Nothing here is believed that the data do not confirm. Tensions count only if, inside their limits, their wrench error
-is below `TensionProblem.tolerance`; a direction only if its support value falls short of the demand by more than that.
-Near the boundary, near the rank cut, or if rounding makes the iteration lose its way, the answer is UNSURE and whoever
-asked goes to the robust path of `registry.py`.
+is below `TensionProblem.tolerance` and the multipliers of the limits prove that they are optimal; a direction only if
+its support value falls short of the demand by more than the tolerance. Near the boundary, near the rank cut, or where
+rounding leads the iteration astray, the answer is UNSURE and the robust path of `registry.py` follows.
 """
 
 from __future__ import annotations
 
 import math
 
-import numba
-import numpy as np
-
 from ...tolerances import FEASIBILITY, ROUNDING
 from .codes import INFEASIBLE, OPTIMAL, SINGULAR, SLACK, UNSURE
 from .dual_active_set import dual_active_set
-from .jit import GIVEN, VECTOR, jit
+from .jit import GIVEN, VECTOR, compilable
+from .memory import floats, integers
 from .proof import outside_range, proves
 from .reduction import reduce, reflect
 from .slabs import nearest_in_slabs
@@ -35,13 +33,13 @@ from .slabs import nearest_in_slabs
 __all__ = ["solve_one", "solve_packed", "what_counts", "work_size"]
 
 
-@jit()
+@compilable()
 def work_size(n: int, m: int) -> int:
     """Return how many numbers of scratch one problem needs."""
     return n * m + 6 * n + 6 * m + (m * m + 2 * m) + (2 * m * m + 6 * m + 2) + n * n + n
 
 
-@jit()
+@compilable()
 def what_counts(A, w, lower, upper, ref, t, length, n, m):
     """Return what the problem asks, and the sum of terms that rounding is a part of: see `TensionProblem.tolerance`."""
     per_length = 1.0 / length
@@ -62,7 +60,7 @@ def what_counts(A, w, lower, upper, ref, t, length, n, m):
 
 
 # One signature, so that Numba does not compile it once more for arrays that may be written.
-@jit(numba.int64(*[GIVEN] * 6, numba.float64, numba.int64, numba.int64, *[VECTOR] * 4))
+@compilable("int64", *[GIVEN] * 6, "float64", "int64", "int64", *[VECTOR] * 4)
 def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     """Solve one problem of flat arrays; A (n m,) row by row. Return the status.
 
@@ -86,8 +84,8 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     N = work[at : at + m * m + 2 * m]
     at += m * m + 2 * m
     rest = work[at:]
-    integers = np.empty(n + 2 * m, np.int64)
-    order, moving, active = integers[:n], integers[n : n + m], integers[n + m :]
+    counts = integers(n + 2 * m)
+    order, moving, active = counts[:n], counts[n : n + m], counts[n + m :]
 
     heaviest = 0.0
     for c in range(m):
@@ -139,24 +137,20 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
         push[c] = 0.0
         if s[c] < low[c] - slack or s[c] > high[c] + slack:
             outside = True
-    found = 0
+    outcome = 0
     k = mm - rank
     if outside:
-        N[: max(k, 2) * mm] = 0.0
+        for c in range(max(k, 2) * mm):
+            N[c] = 0.0
         for c in range(k):
             N[c * mm + rank + c] = 1.0
             for j in range(rank - 1, -1, -1):
                 reflect(B, tau, j, mm, N, c * mm)
         if k <= 2:
-            z = rest[:2]
-            if nearest_in_slabs(N[:mm], N[mm : 2 * mm], s, low, high, mm, slack, z, push):
-                for c in range(mm):
-                    s[c] += N[c] * z[0] + N[mm + c] * z[1]
-            else:
-                found = 1
+            outcome = nearest_in_slabs(N[:mm], N[mm : 2 * mm], s, low, high, mm, slack, push)
         else:
-            found = dual_active_set(N, k, s, low, high, mm, slack, push, rest, active)
-    if found == 0:
+            outcome = dual_active_set(N, k, s, low, high, mm, slack, push, rest, active)
+    if outcome == 0:
         for c in range(mm):
             i = moving[c]
             t[i] += unit[c] * s[c]
@@ -174,12 +168,12 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
         info[2] = math.sqrt(error)
         if info[2] <= FEASIBILITY * asked + ROUNDING * rounding:
             return OPTIMAL
-    if found == 2:
+    if outcome == 2:
         return UNSURE
     # A part of w outside the range of A makes the problem singular, whatever else is wrong with it.
     if rank < n and outside_range(A, w, n, m, per_length, d, rest):
         return SINGULAR if proves(A, w, lower, upper, ref, n, m, per_length, d, info) == SINGULAR else UNSURE
-    if found == 0:
+    if outcome == 0:
         return UNSURE
     # push = B^T d, and push is in the row space of B.
     for j in range(rank):
@@ -195,7 +189,7 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     return INFEASIBLE if verdict == INFEASIBLE else UNSURE
 
 
-@jit(numba.int64(GIVEN, numba.int64, numba.int64, VECTOR))
+@compilable("int64", GIVEN, "int64", "int64", VECTOR)
 def solve_packed(data, n, m, t):
     """Solve one problem given as one array: A row by row, w, t_min, t_max, t_ref, weights, length. Return its status.
 
@@ -209,7 +203,7 @@ def solve_packed(data, n, m, t):
         Gets the tensions, shape (m,).
     """
     at = n * m + n
-    work = np.empty(work_size(n, m) + n + 3)
+    work = floats(work_size(n, m) + n + 3)
     return solve_one(
         data[: n * m],
         data[n * m : at],
