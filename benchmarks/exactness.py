@@ -100,7 +100,8 @@ def check(seeds: range) -> Report:
 
 def _compare(seed: int, data: tuple[Array, ...], answer: BatchSolution, row: int) -> Report:
     """Compare one row with the references."""
-    problem = TensionProblem(*data)
+    A, w, low, high, wish, weights = data
+    problem = TensionProblem(A, w, low, high, wish, weights)
     status = str(answer.status[row])
     if answer.feasible[row]:
         error = optimality_error(problem, answer.tensions[row])
