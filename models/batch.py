@@ -18,6 +18,7 @@ import numpy as np
 
 from .. import processors
 from ..errors import InputError, SolverError
+from ..inputs import shown
 from .kernel import Kernel, compile_kernel
 from .tape import dense, translate
 
@@ -28,7 +29,7 @@ ROWS_OF_MAP = 64  # to make a map of n costs as much as to evaluate it, so one o
 
 
 def is_symbolic(value: Any) -> bool:
-    """Whether `value` is a CasADi expression."""
+    """Return whether `value` is a CasADi expression."""
     return isinstance(value, ca.SX | ca.MX)
 
 
@@ -45,8 +46,8 @@ def call(
         Arrays of shape (..., *shape of the input), where a column (n, 1) counts as (n,); they broadcast as in NumPy.
         If one is a CasADi expression all are taken as they are and the outputs are expressions too.
     threads
-        How many threads share the rows of a kernel; None: as many as there are processors, one for each 50 000 rows at
-        most. The result does not depend on it.
+        How many threads share the rows of a kernel; default: as many as there are processors, at most one for each
+        50 000 rows. The result does not depend on it.
     matrices
         Outputs that are matrices also when they happen to have one column, as the wrench matrix of one cable.
 
@@ -55,17 +56,30 @@ def call(
     InputError
         Naming the argument whose shape or value does not fit.
     SolverError
-        If the Function itself fails, which one of plain operations never does.
+        If CasADi cannot evaluate the Function, which happens only with external or iterative functions.
     """
     if any(is_symbolic(value) for value in arguments.values()):
         return function(**_as_symbols(function, arguments))
     if threads is not None and (not isinstance(threads, int) or threads < 1):
-        raise InputError(f"threads: is {threads}; accepted: 1 and more, or None")
+        raise InputError(f"threads must be a whole number from 1, or None, got {shown(threads)}")
     outputs = _evaluator(function)(arguments, threads)
     for name in matrices:
         if function.size_out(name)[1] == 1:
             outputs[name] = outputs[name][..., None]
     return outputs
+
+
+def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
+    """Check arguments, each a value and its shape without leading dimensions, and return them as arrays of floats.
+
+    Raises
+    ------
+    InputError
+        Naming the argument whose shape or value does not fit; also if the leading dimensions do not broadcast.
+    """
+    checked = {name: _as_array(name, value, core) for name, (value, core) in values.items()}
+    _leading(checked, {name: core for name, (_, core) in values.items()})
+    return list(checked.values())
 
 
 def compiled(function: ca.Function) -> Kernel:
@@ -86,7 +100,7 @@ def compiled(function: ca.Function) -> Kernel:
 
 
 class _Evaluator:
-    """What the calls of one Function with numbers share."""
+    """What the numeric calls of one Function share."""
 
     def __init__(self, function: ca.Function):
         self._function = ca.Function(dense(function))  # a handle of its own: see _evaluators
@@ -104,7 +118,7 @@ class _Evaluator:
         arrays = self._arrays(arguments)
         if all(array.shape == core for array, core in zip(arrays.values(), self._cores.values(), strict=True)):
             return self._single(arrays)
-        batch = self._batch(arrays)
+        batch = _leading(arrays, self._cores)
         count = math.prod(batch)
         rows = [_rows(arrays[name], batch, size) for name, size in self.inputs.items()]
         outputs = {name: np.empty((count, *size)) for name, size in self.outputs.items()}
@@ -130,23 +144,14 @@ class _Evaluator:
         return self._kernel
 
     def _arrays(self, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
-        """All inputs in their order, as arrays of shape (..., *core) with finite values."""
+        """Return all inputs in their order, as arrays of shape (..., *core) with finite values."""
         for name in arguments:
             if name not in self.inputs:
-                raise InputError(f"{name}: is no input of {self.name}; accepted: {', '.join(self.inputs)}")
+                raise InputError(f"{name} must be an input of {self.name}, which has {', '.join(self.inputs)}")
         return {
             name: _as_array(name, arguments[name], core) if name in arguments else np.full(core, self._defaults[name])
             for name, core in self._cores.items()
         }
-
-    def _batch(self, arrays: dict[str, np.ndarray]) -> tuple[int, ...]:
-        """The common leading dimensions."""
-        leading = {name: array.shape[: array.ndim - len(self._cores[name])] for name, array in arrays.items()}
-        try:
-            return np.broadcast_shapes(*leading.values())
-        except ValueError:
-            told = ", ".join(f"{name} {shape}" for name, shape in leading.items())
-            raise InputError(f"leading dimensions do not broadcast: {told}; accepted: equal ones, or 1") from None
 
     def _single(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         buffers = self._buffers(1)
@@ -159,7 +164,7 @@ class _Evaluator:
         }
 
     def _map(self, count: int, rows: list[np.ndarray], outputs: list[np.ndarray]) -> None:
-        """Whole blocks through a map, the rest row by row."""
+        """Evaluate whole blocks through a map, and the rest row by row."""
         done = 0
         while done < count:
             step = ROWS_OF_MAP if count - done >= ROWS_OF_MAP else 1
@@ -172,7 +177,7 @@ class _Evaluator:
             done += step
 
     def _buffers(self, count: int) -> _Buffers:
-        """Those of the calling thread, for so many rows at once."""
+        """Return the buffers of the calling thread, for so many rows at once."""
         name = f"of_{count}"
         if not hasattr(self._own, name):
             function = self._function if count == 1 else self._function.map(count)
@@ -237,25 +242,36 @@ def _core(size: tuple[int, int]) -> tuple[int, ...]:
 
 
 def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, Any]:
-    """Arguments for a call with expressions: each of the shape that the input has, of one kind, numbers finite."""
+    """Check the arguments of a call with expressions: their shapes, one kind of expression, finite numbers."""
     kinds = {type(value).__name__ for value in arguments.values() if is_symbolic(value)}
     if len(kinds) > 1:
-        raise InputError(f"{', '.join(arguments)}: SX and MX in one call; accepted: expressions of one kind")
-    found = {}
+        raise InputError(f"{', '.join(arguments)} must be expressions of one kind, got SX and MX in one call")
+    result = {}
     for name, value in arguments.items():
         size = function.size_in(name)
         if is_symbolic(value):
             if value.shape != size:
-                raise InputError(f"{name}: is an expression of shape {value.shape}; accepted: {size}")
-            found[name] = value
+                raise InputError(f"{name} must have the shape {size}, got an expression of shape {value.shape}")
+            result[name] = value
         else:
             array = _as_array(
                 name, value.full().reshape(_core(size)) if isinstance(value, ca.DM) else value, _core(size)
             )
             if array.shape != _core(size):
-                raise InputError(f"{name}: has shape {array.shape} beside expressions; accepted: {_core(size)}")
-            found[name] = ca.DM(array)
-    return found
+                raise InputError(f"{name} must have the shape {_core(size)} beside expressions, got {array.shape}")
+            result[name] = ca.DM(array)
+    return result
+
+
+def _leading(arrays: dict[str, np.ndarray], cores: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the common leading dimensions."""
+    leading = {name: array.shape[: array.ndim - len(cores[name])] for name, array in arrays.items()}
+    try:
+        return np.broadcast_shapes(*leading.values())
+    except ValueError:
+        shapes = ", ".join(str(shape) for shape in leading.values())
+        message = f"{', '.join(leading)} must have leading dimensions that are equal or 1, got {shapes}"
+        raise InputError(message) from None
 
 
 def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
@@ -265,26 +281,24 @@ def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
             raise TypeError
         array = given.astype(float, copy=False)
     except (TypeError, ValueError):
-        raise InputError(
-            f"{name}: {value!r} is not an array of numbers; accepted: shape (..., {_told(core)})"
-        ) from None
+        raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
-        raise InputError(f"{name}: has shape {array.shape}; accepted: (..., {_told(core)})")
+        raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")
     # A sum is finite, unless an element is not finite or near the largest float. That of squares is the quickest of few
     # elements; of many, BLAS would share it among threads.
     total = np.vdot(array, array) if array.size < ELEMENTS_OF_ONE_THREAD else array.sum()
     if not math.isfinite(total) and not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{name}: is {array[index]} at index {index}; accepted: finite numbers")
+        raise InputError(f"{name} must be finite numbers, got {array[index]} at index {index}")
     return array
 
 
-def _told(core: tuple[int, ...]) -> str:
-    return ", ".join(str(size) for size in core)
+def _shape(core: tuple[int, ...]) -> str:
+    return f"(..., {', '.join(str(size) for size in core)})"
 
 
 def _rows(array: np.ndarray, batch: tuple[int, ...], size: tuple[int, int]) -> np.ndarray:
-    """(..., *core) to (N, r, c), in place if it can be: one row for all of a batch is not repeated."""
+    """Bring (..., *core) to (N, r, c) without a copy where possible: one row for all of a batch is not repeated."""
     count = math.prod(batch)
     array = np.require(array, requirements="A")
     if array.size == math.prod(size):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, overload
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from . import elasticity, forward, kinematics, rigid_body, wind
-from .batch import call
+from . import elasticity, forward, kinematics, points, rigid_body, wind
+from .arrays import Array, Symbol
+from .batch import arrays, call, is_symbolic
 from .cables.pulley import Exit
-from .relative_dynamics import Array, RelativeDynamics
+from .files import as_robot
+from .relative_dynamics import RelativeDynamics
 from .robot import QuadrotorCarrier, Robot
 
 
@@ -28,53 +32,117 @@ def _dynamics_of(robot: Any) -> Dynamics:
 
 
 class Dynamics:
-    """What a motion needs and what the cables can give, for one robot.
+    """Compute what a motion needs and what the cables can give, for one robot.
 
-    All of it is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Every argument may
-    have leading batch dimensions, which broadcast; a CasADi SX or MX in gives one out.
+    Everything is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Arguments may have
+    leading batch dimensions, which broadcast, and give arrays. If `pose` is a CasADi SX or MX, the result is one too.
 
     Parameters
     ----------
     robot
-        From `load` or `Robot.model_validate`.
+        A `Robot`, the name of one in the library, or the path of a robot file.
 
     Attributes
     ----------
     functions
         The CasADi Functions by name, with named inputs and outputs, to build on.
+
+    Raises
+    ------
+    InputError
+        If `robot` is none of these. Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
-    def __init__(self, robot: Robot):
-        self.robot = robot
-        self.functions: dict[str, ca.Function] = _world_functions(robot)
+    def __init__(self, robot: Robot | str | os.PathLike[str]):
+        self.robot = as_robot(robot)
+        self.functions: dict[str, ca.Function] = _world_functions(self.robot)
 
+    @overload
+    def wrench_matrix(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
+    @overload
+    def wrench_matrix(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray: ...
     def wrench_matrix(self, pose: Array, carrier_pose: Array | None = None) -> Array:
-        """Wrench matrix A: force [N per N] and moment about the platform's CoM [N m per N] of each cable, in {G}.
+        """Return the wrench matrix A, (..., 6, m), in {G}.
+
+        Each column is the force [N per N] and the moment about the platform's CoM [N m per N] of one cable.
 
         Parameters
         ----------
         pose
             (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6).
         carrier_pose
-            The same of each carrier, (..., c, 6); None: at home.
-
-        Returns
-        -------
-        (..., 6, m)
-
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or a value that is not finite.
+            The same of each carrier, (..., c, 6); default: at home.
         """
         arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
         return call(self.functions["wrench_matrix"], arguments, matrices=("A",))["A"]
 
+    @overload
+    def cable_lengths(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
+    @overload
+    def cable_lengths(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray: ...
     def cable_lengths(self, pose: Array, carrier_pose: Array | None = None) -> Array:
-        """Distance from anchor to attachment of each cable [m], (..., m). Arguments as in `wrench_matrix`."""
+        """Return the distance from anchor to attachment of each cable [m], (..., m). Arguments as in `wrench_matrix`.
+
+        Over a pulley it is the length of the cable from the anchor around the sheave to the attachment.
+        """
         arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
         return call(self.functions["cable_lengths"], arguments)["lengths"]
 
+    @overload
+    def points(self, pose: Symbol, carrier_pose: Array | None = None) -> tuple[Symbol, Symbol]: ...
+    @overload
+    def points(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]: ...
+    def points(self, pose: Array, carrier_pose: Array | None = None) -> tuple[Array, Array]:
+        """Return the anchors and the attachments of the cables in {G}, (..., m, 3) each [m].
+
+        Arguments as in `wrench_matrix`.
+        """
+        carriers = self._carriers(carrier_pose)
+        if is_symbolic(pose) or is_symbolic(carriers):
+            result = call(self._points, {"pose": pose, "carrier_pose": carriers})
+            return result["anchors"], result["attachments"]
+        pose, carriers = arrays({"pose": (pose, (6,)), "carrier_pose": (carriers, (self._count, 6))})
+        both = points.anchors(self.robot, carriers), points.attachments(self.robot, pose)
+        if both[0].shape == both[1].shape:
+            return both
+        shape = np.broadcast_shapes(both[0].shape, both[1].shape)
+        return np.broadcast_to(both[0], shape).copy(), np.broadcast_to(both[1], shape).copy()
+
+    @overload
+    def exits(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
+    @overload
+    def exits(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray: ...
+    def exits(self, pose: Array, carrier_pose: Array | None = None) -> Array:
+        """Return where each cable leaves its pulley in {G}, (..., m, 3) [m]; the anchor of a cable without a pulley.
+
+        Arguments as in `wrench_matrix`. The exit is nan for an attachment inside the sheave, where no cable is tangent.
+        """
+        if is_symbolic(pose) or self.robot.pulley_radii.any():
+            return call(self._exits, {"pose": pose, "carrier_pose": self._carriers(carrier_pose)})["exits"]
+        return self.points(pose, carrier_pose)[0]
+
+    @overload
+    def required_wrench(
+        self,
+        pose: Symbol,
+        velocity: Array,
+        acceleration: Array,
+        carrier_pose: Array | None = None,
+        carrier_velocity: Array | None = None,
+        carrier_acceleration: Array | None = None,
+        wind: Array | None = None,
+    ) -> Symbol: ...
+    @overload
+    def required_wrench(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        carrier_pose: ArrayLike | None = None,
+        carrier_velocity: ArrayLike | None = None,
+        carrier_acceleration: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> np.ndarray: ...
     def required_wrench(
         self,
         pose: Array,
@@ -85,20 +153,20 @@ class Dynamics:
         carrier_acceleration: Array | None = None,
         wind: Array | None = None,
     ) -> Array:
-        """Wrench w that the cables have to give so that the platform moves as stated: A t = w.
+        """Return the wrench w that the cables have to give so that the platform moves as stated: A t = w.
 
-        Inertia and velocity terms less gravity and wind: force [N] and moment about the CoM [N m], in {G}, (..., 6).
-        In {G} the carriers act on the platform only through A, so their motion does not enter w; it is checked, so
-        that one call serves this form and `relative`, where it is the disturbance D_B.
+        It is force [N] and moment about the CoM [N m], in {G}, (..., 6): inertia and velocity terms less gravity and
+        wind. In {G} the carriers act on the platform only through A, so their motion does not enter w; it is checked,
+        so that one call serves this form and `relative`, where it is the disturbance D_B.
 
         Parameters
         ----------
         pose, velocity, acceleration
             (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivatives, (..., 6).
         carrier_pose, carrier_velocity, carrier_acceleration
-            The same of each carrier, (..., c, 6); None: at home and at rest.
+            The same of each carrier, (..., c, 6); default: at home and at rest.
         wind
-            Velocity of the air in {G} [m/s], (..., 3); None: no air at all, also no drag of the motion.
+            Velocity of the air in {G} [m/s], (..., 3); default: no air at all, also no drag of the motion.
 
         Raises
         ------
@@ -116,14 +184,36 @@ class Dynamics:
             return call(self.functions["required_wrench"], arguments)["w"]
         return call(self._in_wind, arguments | {"wind": wind})["w"]
 
+    @overload
+    def aerodynamic_wrench(self, pose: Symbol, velocity: Array, wind: Array) -> Symbol: ...
+    @overload
+    def aerodynamic_wrench(self, pose: ArrayLike, velocity: ArrayLike, wind: ArrayLike) -> np.ndarray: ...
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
-        """W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`.
+        """Return W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`.
 
         Arguments as in `required_wrench`.
         """
         arguments = {"pose": pose, "velocity": velocity, "wind": wind}
         return call(self._aerodynamic, arguments)["W_e"]
 
+    @overload
+    def acceleration(
+        self,
+        pose: Symbol,
+        velocity: Array,
+        tensions: Array,
+        carrier_pose: Array | None = None,
+        wind: Array | None = None,
+    ) -> Symbol: ...
+    @overload
+    def acceleration(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        tensions: ArrayLike,
+        carrier_pose: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> np.ndarray: ...
     def acceleration(
         self,
         pose: Array,
@@ -132,7 +222,7 @@ class Dynamics:
         carrier_pose: Array | None = None,
         wind: Array | None = None,
     ) -> Array:
-        """Forward dynamics: the second time derivative of `pose` under the tensions, (..., 6) [m/s^2, rad/s^2].
+        """Return the second time derivative of `pose` under the tensions, (..., 6) [m/s^2, rad/s^2].
 
         Parameters
         ----------
@@ -141,9 +231,9 @@ class Dynamics:
         tensions
             (..., m) [N]; taken as they are, also beyond their limits.
         carrier_pose
-            (..., c, 6); None: at home.
+            (..., c, 6); default: at home.
         wind
-            Velocity of the air in {G} [m/s], (..., 3); None: no air at all.
+            Velocity of the air in {G} [m/s], (..., 3); default: no air at all.
         """
         arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
         arguments["carrier_pose"] = self._carriers(carrier_pose)
@@ -151,6 +241,28 @@ class Dynamics:
             return call(self.functions["acceleration"], arguments)["acceleration"]
         return call(self._acceleration_in_wind, arguments | {"wind": wind})["acceleration"]
 
+    @overload
+    def coupled_acceleration(
+        self,
+        pose: Symbol,
+        velocity: Array,
+        carrier_pose: Array,
+        carrier_velocity: Array,
+        tensions: Array,
+        thrust: Array,
+        torque: Array,
+    ) -> tuple[Symbol, Symbol]: ...
+    @overload
+    def coupled_acceleration(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        carrier_pose: ArrayLike,
+        carrier_velocity: ArrayLike,
+        tensions: ArrayLike,
+        thrust: ArrayLike,
+        torque: ArrayLike,
+    ) -> tuple[np.ndarray, np.ndarray]: ...
     def coupled_acceleration(
         self,
         pose: Array,
@@ -161,7 +273,7 @@ class Dynamics:
         thrust: Array,
         torque: Array,
     ) -> tuple[Array, Array]:
-        """Forward dynamics of platform and quadrotor carriers as one system: each cable pulls at both of its ends.
+        """Compute the accelerations of platform and quadrotor carriers as one system: a cable pulls at both its ends.
 
         Parameters
         ----------
@@ -192,10 +304,18 @@ class Dynamics:
         result = call(self._coupled, arguments)
         return result["acceleration"], result["carrier_acceleration"]
 
+    @overload
+    def linearise(
+        self, pose: Symbol, velocity: Array, tensions: Array, carrier_pose: Array | None = None
+    ) -> tuple[Symbol, Symbol]: ...
+    @overload
+    def linearise(
+        self, pose: ArrayLike, velocity: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray]: ...
     def linearise(
         self, pose: Array, velocity: Array, tensions: Array, carrier_pose: Array | None = None
     ) -> tuple[Array, Array]:
-        """Linearised forward dynamics, d(dx)/dt = A dx + B dt about a state x = (pose, velocity) and tensions.
+        """Linearise the dynamics, d(dx)/dt = A dx + B dt, about a state x = (pose, velocity) and tensions.
 
         Arguments as in `acceleration`.
 
@@ -209,10 +329,19 @@ class Dynamics:
         result = call(self._linearisation, arguments, matrices=("B",))
         return result["A"], result["B"]
 
+    @overload
+    def stiffness(
+        self, pose: Symbol, tensions: Array, carrier_pose: Array | None = None, elastic: bool = True
+    ) -> Symbol: ...
+    @overload
+    def stiffness(
+        self, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None, elastic: bool = True
+    ) -> np.ndarray: ...
     def stiffness(self, pose: Array, tensions: Array, carrier_pose: Array | None = None, elastic: bool = True) -> Array:
-        """Stiffness K about the CoM in {G}, (..., 6, 6) [N/m, N, N m]: a small displacement delta makes -K delta.
+        """Return the stiffness K about the CoM in {G}, (..., 6, 6) [N/m, N, N m].
 
-        delta is (translation of the CoM [m], rotation vector [rad]).
+        A small displacement delta, the translation of the CoM [m] and a rotation vector [rad], makes the wrench
+        -K delta.
 
         Parameters
         ----------
@@ -232,30 +361,39 @@ class Dynamics:
             for index, cable in enumerate(self.robot.cables):
                 if cable.stiffness is None:
                     raise InputError(
-                        f"cables[{index}].stiffness: robot {self.robot.name!r} has none; accepted: E A > 0 [N] for "
-                        "every cable, or elastic=False"
+                        f"cables[{index}].stiffness must be E A > 0 [N] for every cable, got none in robot "
+                        f"{self.robot.name!r}; elastic=False needs no stiffness"
                     )
         arguments = {"pose": pose, "tensions": tensions, "carrier_pose": self._carriers(carrier_pose)}
         return call(self._stiffness if elastic else self._tension_stiffness, arguments)["K"]
 
     def natural_frequencies(
-        self, pose: np.ndarray, tensions: np.ndarray, carrier_pose: np.ndarray | None = None, elastic: bool = False
+        self, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None, elastic: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Natural frequencies of small motions about an equilibrium, undamped.
+        """Compute the natural frequencies of small undamped motions about an equilibrium.
 
         Parameters
         ----------
         pose, tensions, carrier_pose
             An equilibrium: (6,), (m,) [N] and (c, 6). Cables with zero tension are slack and do not count.
         elastic
-            False: inextensible cables, which leave 6 - rank motions (none if the platform is held on all sides).
+            False: inextensible cables, which leave 6 - rank motions, or no motion if they hold the platform fast.
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong shape or value, or `elastic` and a cable has no stiffness.
 
         Returns
         -------
         Frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
         translation of the CoM [m] and rotation vector [rad] in {G}.
         """
-        tensions = np.asarray(tensions, dtype=float)
+        cores = {"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,))}
+        pose, tensions = arrays(cores)
+        for name, array in (("pose", pose), ("tensions", tensions)):
+            if array.ndim != 1:
+                raise InputError(f"{name} must have the shape ({array.shape[-1]},), got {array.shape}")
         K = self.stiffness(pose, tensions, carrier_pose, elastic=elastic)
         rows = np.flatnonzero(self.robot.dof_mask)
         free = np.eye(6)[:, rows]
@@ -265,11 +403,11 @@ class Dynamics:
             U, sigma, _ = np.linalg.svd(A)
             rank = int((sigma > 1e-9 * sigma.max(initial=1e-300)).sum())
             free = free @ U[:, rank:]
-        return elasticity.frequencies(K, elasticity.spatial_inertia(self.robot, np.asarray(pose, dtype=float)), free)
+        return elasticity.frequencies(K, elasticity.spatial_inertia(self.robot, pose), free)
 
     @cached_property
     def relative(self) -> RelativeDynamics:
-        """The form of paper F, in the frame {A} of the robot's only carrier.
+        """Return the form of paper F, in the frame {A} of the robot's only carrier.
 
         Raises
         ------
@@ -284,6 +422,20 @@ class Dynamics:
 
     def _carriers(self, carrier_pose: Array | None) -> Array:
         return self.robot.carrier_home if carrier_pose is None else carrier_pose
+
+    @cached_property
+    def _points(self) -> ca.Function:
+        symbols = _symbols(self.robot, ["pose", "carrier_pose"])
+        pose, carriers = symbols
+        anchors = kinematics.anchors(self.robot.anchors, self.robot.carrier_of_cable, carriers)
+        outputs = [anchors.T, kinematics.transform(pose, self.robot.attachments).T]
+        return ca.Function("points", symbols, outputs, ["pose", "carrier_pose"], ["anchors", "attachments"])
+
+    @cached_property
+    def _exits(self) -> ca.Function:
+        symbols = _symbols(self.robot, ["pose", "carrier_pose"])
+        exits = _run(self.robot, *symbols).points.T
+        return ca.Function("exits", symbols, [exits], ["pose", "carrier_pose"], ["exits"])
 
     @cached_property
     def _acceleration_in_wind(self) -> ca.Function:
@@ -371,14 +523,14 @@ class Dynamics:
 
 
 def _symbols(robot: Robot, names: list[str]) -> list[ca.SX]:
-    """Symbols of the shapes that these arguments have."""
+    """Make symbols of the shapes that these arguments have."""
     count = len(robot.carriers)
     shapes = {"tensions": (robot.m, 1)}
     return [ca.SX.sym(name, *shapes.get(name, (count, 6) if name.startswith("carrier") else (6, 1))) for name in names]
 
 
 def _run(robot: Robot, pose: ca.SX, carriers: ca.SX) -> Exit:
-    """How the cables run in {G}."""
+    """Compute how the cables run in {G}."""
     anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
     axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, carriers)
     return kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii)

@@ -51,17 +51,3 @@ def wrench_matrix(attachments: np.ndarray, com: np.ndarray, pose: Matrix, direct
     arms = rotation(pose[3:6]) @ ca.DM((attachments - com).T)  # (3, m)
     moments = [ca.cross(arms[:, i], directions[:, i]) for i in range(len(attachments))]
     return ca.vertcat(directions, ca.horzcat(*moments))
-
-
-def default_home(anchor_points: np.ndarray, attachments: np.ndarray) -> np.ndarray:
-    """A home pose in {G} for anchors (m, 3) in {G}: level, amid them, or below them if the platform hangs.
-
-    It hangs if the anchors' heights differ by less than a tenth of their horizontal spread; then it is placed as far
-    below their centre as they are wide, where a suspended platform has room.
-    """
-    centre = anchor_points.mean(axis=0)
-    spread = np.linalg.norm(anchor_points[:, :2] - centre[:2], axis=1).max()
-    reach = max(spread, np.linalg.norm(attachments, axis=1).max(), 1e-3)
-    if np.ptp(anchor_points[:, 2]) < 0.1 * reach:
-        centre[2] -= reach
-    return np.concatenate([centre, np.zeros(3)])

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import overload
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from . import kinematics, relative, wind
+from .arrays import Array, Symbol
 from .batch import call
 from .robot import Robot
 
-Array: TypeAlias = Any  # NumPy arrays with leading batch dimensions in and out, or CasADi expressions in and out
-
 
 class RelativeDynamics:
-    """Paper F's form of the dynamics: everything in {A}, the carrier's motion apart in D_B (paper F, Eq. 38).
+    """Compute the dynamics as paper F does: in {A}, with the carrier's motion in a term of its own, D_B (Eq. 38).
 
-    `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, as seen in {A};
-    `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, None: at home and at rest.
+    `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, in the axes of {A};
+    `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], a single carrier having no row of its own.
 
     Attributes
@@ -37,10 +37,32 @@ class RelativeDynamics:
         self.robot = robot
         self.functions: dict[str, ca.Function] = _relative_functions(robot)
 
+    @overload
+    def wrench_matrix(self, pose: Symbol) -> Symbol: ...
+    @overload
+    def wrench_matrix(self, pose: ArrayLike) -> np.ndarray: ...
     def wrench_matrix(self, pose: Array) -> Array:
-        """Wrench matrix A in {A}, (..., 6, m) [N and N m per N]; it depends on the relative pose alone."""
+        """Return the wrench matrix A in {A}, (..., 6, m) [N and N m per N]; it depends on the relative pose alone."""
         return call(self.functions["wrench_matrix"], {"pose": pose}, matrices=("A",))["A"]
 
+    @overload
+    def base_disturbance(
+        self,
+        pose: Symbol,
+        velocity: Array,
+        carrier_pose: Array | None = None,
+        carrier_velocity: Array | None = None,
+        carrier_acceleration: Array | None = None,
+    ) -> Symbol: ...
+    @overload
+    def base_disturbance(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        carrier_pose: ArrayLike | None = None,
+        carrier_velocity: ArrayLike | None = None,
+        carrier_acceleration: ArrayLike | None = None,
+    ) -> np.ndarray: ...
     def base_disturbance(
         self,
         pose: Array,
@@ -49,14 +71,36 @@ class RelativeDynamics:
         carrier_velocity: Array | None = None,
         carrier_acceleration: Array | None = None,
     ) -> Array:
-        """D_B, the coupled quadrotor-disturbance term: force [N] and moment about the CoM [N m] in {A}, (..., 6).
+        """Return D_B, the quadrotor-disturbance term, (..., 6): force [N] and moment about the CoM [N m] in {A}.
 
-        The weight is part of it (D_F has - m R_A^T g), as in paper F. None: carrier at home and at rest.
+        The weight is part of it (D_F has - m R_A^T g), as in paper F.
         """
         arguments = {"pose": pose, "velocity": velocity}
         arguments |= self._carrier(carrier_pose, carrier_velocity, carrier_acceleration)
         return call(self.functions["base_disturbance"], arguments)["D_B"]
 
+    @overload
+    def required_wrench(
+        self,
+        pose: Symbol,
+        velocity: Array,
+        acceleration: Array,
+        carrier_pose: Array | None = None,
+        carrier_velocity: Array | None = None,
+        carrier_acceleration: Array | None = None,
+        wind: Array | None = None,
+    ) -> Symbol: ...
+    @overload
+    def required_wrench(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        carrier_pose: ArrayLike | None = None,
+        carrier_velocity: ArrayLike | None = None,
+        carrier_acceleration: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> np.ndarray: ...
     def required_wrench(
         self,
         pose: Array,
@@ -67,9 +111,9 @@ class RelativeDynamics:
         carrier_acceleration: Array | None = None,
         wind: Array | None = None,
     ) -> Array:
-        """M_B ddX_b + F_B + D_B - W_e: force [N] and moment about the CoM [N m] in {A}, (..., 6).
+        """Return M_B ddX_b + F_B + D_B - W_e: force [N] and moment about the CoM [N m] in {A}, (..., 6).
 
-        `wind` is the velocity of the air in {G} [m/s], (..., 3); None: no air at all.
+        `wind` is the velocity of the air in {G} [m/s], (..., 3); default: no air at all.
         """
         arguments = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
         arguments |= self._carrier(carrier_pose, carrier_velocity, carrier_acceleration)
@@ -77,6 +121,26 @@ class RelativeDynamics:
             return call(self.functions["required_wrench"], arguments)["w"]
         return call(self._in_wind, arguments | {"wind": wind})["w"]
 
+    @overload
+    def motion_in_world(
+        self,
+        pose: Symbol,
+        velocity: Array,
+        acceleration: Array,
+        carrier_pose: Array | None = None,
+        carrier_velocity: Array | None = None,
+        carrier_acceleration: Array | None = None,
+    ) -> tuple[Symbol, Symbol, Symbol]: ...
+    @overload
+    def motion_in_world(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        carrier_pose: ArrayLike | None = None,
+        carrier_velocity: ArrayLike | None = None,
+        carrier_acceleration: ArrayLike | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
     def motion_in_world(
         self,
         pose: Array,
@@ -86,7 +150,7 @@ class RelativeDynamics:
         carrier_velocity: Array | None = None,
         carrier_acceleration: Array | None = None,
     ) -> tuple[Array, Array, Array]:
-        """Pose, velocity and acceleration of the platform frame in {G}, (..., 6) each [m, rad] and per s, s^2.
+        """Return pose, velocity and acceleration of the platform frame in {G}, (..., 6) each [m, rad] and per s, s^2.
 
         The Euler angles lie in (-pi, pi], so that a series of them may jump by 2 pi; `numpy.unwrap` undoes it.
         """

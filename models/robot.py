@@ -22,6 +22,7 @@ from pydantic import (
 )
 
 from ..errors import InputError
+from . import points
 
 LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
 
@@ -315,11 +316,9 @@ class Robot(Part):
         return self
 
     def _check_pulleys(self) -> None:
-        from . import kinematics
-
         offsets = self.home_attachments - self.home_anchors
-        home = kinematics.ca.DM(self.carrier_home)
-        axes = kinematics.axes(self.pulley_axes, self.carrier_of_cable, home).full().T
+        turned = points.rotations(self.carrier_home[self.carrier_of_cable, 3:])
+        axes = np.einsum("mij,mj->mi", turned, self.pulley_axes)
         up = np.sum(offsets * axes, axis=1)
         across = np.linalg.norm(offsets - up[:, None] * axes, axis=1)
         outside = (across > 1e-9) & (across**2 - 2 * across * self.pulley_radii + up**2 > 0)
@@ -387,32 +386,22 @@ class Robot(Part):
         """Home pose of the platform in {G}, (6,) [m, rad], from the file or else amid or below the anchors."""
         if self.platform.home is not None:
             return np.array(self.platform.home)  # (6,)
-        from . import kinematics
-
-        return kinematics.default_home(self.home_anchors, self.attachments)
+        return points.default_home(self.home_anchors, self.attachments)
 
     @property
     def home_anchors(self) -> np.ndarray:
         """Anchors in {G} with the carriers at home, (m, 3) [m]."""
-        from . import kinematics
-
-        at_home = kinematics.ca.DM(self.carrier_home)
-        return kinematics.anchors(self.anchors, self.carrier_of_cable, at_home).full().T  # (m, 3)
+        return points.anchors(self, self.carrier_home)  # (m, 3)
 
     @property
     def home_attachments(self) -> np.ndarray:
         """Attachments in {G} with the platform at home, (m, 3) [m]."""
-        from . import kinematics
-
-        return kinematics.transform(kinematics.ca.DM(self.home), self.attachments).full().T  # (m, 3)
+        return points.attachments(self, self.home)  # (m, 3)
 
     @property
     def home_com(self) -> np.ndarray:
         """CoM in {G} with the platform at home, (3,) [m]."""
-        from . import kinematics
-
-        com = np.array([self.platform.com])
-        return kinematics.transform(kinematics.ca.DM(self.home), com).full().ravel()  # (3,)
+        return points.placed(self.home, np.array([self.platform.com]))[0]  # (3,)
 
     @property
     def inertia(self) -> np.ndarray:

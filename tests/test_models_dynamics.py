@@ -283,10 +283,13 @@ def test_wrong_symbols_are_named():
     dynamics = Dynamics(load("wang-flying"))
     pose = ca.MX.sym("pose", 6)
     for arguments, message in (
-        ({"pose": ca.MX.sym("x")}, r"pose: is an expression of shape \(1, 1\); accepted: \(6, 1\)"),
+        ({"pose": ca.MX.sym("x")}, r"pose must have the shape \(6, 1\), got an expression of shape \(1, 1\)"),
         ({"pose": pose, "carrier_pose": ca.SX.sym("c", 1, 6)}, "SX and MX in one call"),
-        ({"pose": pose, "carrier_pose": np.zeros((4, 1, 6))}, "beside expressions; accepted"),
-        ({"pose": pose, "carrier_pose": np.full((1, 6), np.nan)}, "carrier_pose: is nan"),
+        (
+            {"pose": pose, "carrier_pose": np.zeros((4, 1, 6))},
+            "carrier_pose must have the shape .* beside expressions, got",
+        ),
+        ({"pose": pose, "carrier_pose": np.full((1, 6), np.nan)}, "carrier_pose must be finite numbers, got nan"),
     ):
         with pytest.raises(InputError, match=message):
             dynamics.wrench_matrix(**arguments)
@@ -295,14 +298,17 @@ def test_wrong_symbols_are_named():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"pose": [0, 0, 1]}, r"pose: has shape \(3,\); accepted: \(\.\.\., 6\)"),
-        ({"pose": [0, 0, np.nan, 0, 0, 0]}, r"pose: is nan at index \(2,\)"),
-        ({"pose": "home"}, r"pose: 'home' is not an array of numbers"),
+        ({"pose": [0, 0, 1]}, r"pose must have the shape \(\.\.\., 6\), got \(3,\)"),
+        ({"pose": [0, 0, np.nan, 0, 0, 0]}, r"pose must be finite numbers, got nan at index \(2,\)"),
+        ({"pose": "home"}, r"pose must be numbers of shape .*, got 'home'"),
         (
             {"pose": np.zeros(6), "carrier_pose": np.zeros(6)},
-            r"carrier_pose: has shape \(6,\); accepted: \(\.\.\., 1, 6\)",
+            r"carrier_pose must have the shape \(\.\.\., 1, 6\), got \(6,\)",
         ),
-        ({"pose": np.zeros((2, 6)), "carrier_pose": np.zeros((3, 1, 6))}, "leading dimensions do not broadcast"),
+        (
+            {"pose": np.zeros((2, 6)), "carrier_pose": np.zeros((3, 1, 6))},
+            "must have leading dimensions that are equal or 1",
+        ),
     ],
 )
 def test_wrong_arguments_are_named(arguments, message):
@@ -340,3 +346,54 @@ def test_pulleys_lead_the_cables():
     small = Dynamics(robot.model_copy(update={"cables": tuple(cables)})).wrench_matrix(pose)
     bare = Dynamics(robot.model_copy(update={"cables": tuple(points)})).wrench_matrix(pose)
     np.testing.assert_allclose(small, bare, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "caroca-pulleys", "wang-ctmrts", "flycrane", "planar-4"])
+def test_points_are_where_scipy_puts_them(name):
+    """Anchors and attachments in {G}: arrays with batch dimensions and symbols agree with scipy's rotations."""
+    robot = load(name)
+    dynamics = Dynamics(robot)
+    rng = np.random.default_rng(GENERATOR_SEED)
+    pose = robot.home + rng.normal(size=(3, 1, 6))
+    carriers = robot.carrier_home + rng.normal(size=(1, 4, len(robot.carriers), 6))
+    anchors, attachments = dynamics.points(pose, carriers)
+    assert anchors.shape == attachments.shape == (3, 4, robot.m, 3)
+    p, c = ca.SX.sym("pose", 6), ca.SX.sym("carriers", len(robot.carriers), 6)
+    symbolic = ca.Function("points", [p, c], list(dynamics.points(p, c)))
+    for i, j in np.ndindex(3, 4):
+        at, frames = pose[i, 0], carriers[0, j][robot.carrier_of_cable]
+        on_platform = robot.attachments @ rotation_of(at).T + at[:3]
+        on_carriers = np.einsum("mij,mj->mi", rotation_of(frames), robot.anchors) + frames[:, :3]
+        np.testing.assert_allclose(attachments[i, j], on_platform, atol=1e-12)
+        np.testing.assert_allclose(anchors[i, j], on_carriers, atol=1e-12)
+        for ours, theirs in zip(symbolic(at, carriers[0, j]), (on_carriers, on_platform), strict=True):
+            np.testing.assert_allclose(ours.full(), theirs, atol=1e-12)
+    anchors, attachments = dynamics.points(robot.home)
+    np.testing.assert_array_equal(anchors, robot.home_anchors)
+    np.testing.assert_array_equal(attachments, robot.home_attachments)
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "cogiro", "wang-flying"])
+def test_a_cable_pulls_from_its_attachment_to_its_exit(name):
+    robot = load(name)
+    dynamics = Dynamics(robot)
+    pose = robot.home + np.random.default_rng(GENERATOR_SEED).uniform(-0.05, 0.05, size=(7, 6))
+    along = dynamics.exits(pose) - dynamics.points(pose)[1]
+    directions = np.moveaxis(dynamics.wrench_matrix(pose)[..., :3, :], -1, -2)
+    np.testing.assert_allclose(along / np.linalg.norm(along, axis=-1, keepdims=True), directions, atol=1e-12)
+
+
+def test_points_refuse_what_does_not_fit():
+    dynamics = Dynamics("wang-ctmrts")
+    for arguments in ((np.zeros(5),), ("home",), (np.full(6, np.nan),), (np.zeros((2, 6)), np.zeros((5, 3, 6)))):
+        with pytest.raises(InputError) as caught:
+            dynamics.points(*arguments)
+        assert "\n" not in str(caught.value)
+
+
+def test_dynamics_load_a_robot_by_name_and_refuse_what_is_none(tmp_path):
+    assert Dynamics("cogiro").robot == load("cogiro")
+    for wrong in (3, None, {"name": "x"}, "cogyro", tmp_path / "none.yaml"):
+        with pytest.raises(InputError, match=r"robot|none\.yaml") as caught:
+            Dynamics(wrong)
+        assert "\n" not in str(caught.value)

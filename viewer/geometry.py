@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from ..models import Robot, kinematics
-from ..models.batch import call
+from ..models import Robot
+from ..models.dynamics import dynamics_of
+from ..models.points import placed
 from ..workspace.region import reach_boxes, surrounding_box
 
 
@@ -62,23 +62,13 @@ class Geometry:
         self.robot = robot
         low, high = surrounding_box(robot, reach_boxes(robot))
         self.room = Room.of(low, high, robot.home_anchors, robot.home_attachments, robot.carrier_home[:, :3])
-        pose, carriers = ca.SX.sym("pose", 6), ca.SX.sym("carrier_pose", len(robot.carriers), 6)
-        anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
-        axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, carriers)
-        exits = kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii).points
-        outputs = {
-            "anchors": anchors.T,
-            "exits": exits.T,
-            "attachments": kinematics.transform(pose, robot.attachments).T,
-            "com": kinematics.transform(pose, np.array([robot.platform.com])),
-        }
-        self._function = ca.Function(
-            "points", [pose, carriers], list(outputs.values()), ["pose", "carrier_pose"], list(outputs)
-        )
 
     def __call__(self, pose: np.ndarray, carrier_pose: np.ndarray) -> Points:
         """The points at poses (..., 6) of the platform and (..., c, 6) of the carriers in {G} [m, rad].
 
         Inside a sheave no cable is tangent to it: its exit is nan there.
         """
-        return Points(**call(self._function, {"pose": pose, "carrier_pose": carrier_pose}))
+        dynamics = dynamics_of(self.robot)
+        anchors, attachments = dynamics.points(pose, carrier_pose)
+        com = placed(np.asarray(pose, dtype=float), np.array([self.robot.platform.com]))[..., 0, :]
+        return Points(anchors, dynamics.exits(pose, carrier_pose), attachments, com)

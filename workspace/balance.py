@@ -17,10 +17,7 @@ from ..solvers import solve_batch
 from .places import Places
 
 __all__ = [
-    "anchors",
-    "attachments",
     "can_give",
-    "in_platform",
     "lacking",
     "make_ready",
     "matrices",
@@ -112,33 +109,3 @@ def lacking(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray
             short = np.where(solved.feasible, 0.0, np.nan_to_num(solved.shortfall, nan=np.inf))
             missing[part] = np.maximum(missing[part], short)
     return missing
-
-
-def anchors(robot: Robot, places: Places) -> np.ndarray:
-    """Anchors in {G}, (n, m, 3) [m]."""
-    frames = places.carriers[:, robot.carrier_of_cable]
-    if not robot.anchors.any():
-        return frames[..., :3]
-    turned = np.einsum("nmij,mj->nmi", _rotations(frames[..., 3:]), robot.anchors)
-    return frames[..., :3] + turned
-
-
-def attachments(robot: Robot, places: Places) -> np.ndarray:
-    """Attachments in {G}, (n, m, 3) [m]."""
-    turned = np.einsum("nij,mj->nmi", _rotations(places.pose[:, 3:]), robot.attachments)
-    return places.pose[:, None, :3] + turned
-
-
-def in_platform(places: Places, points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) of {G} in the platform frame, (n, 3) [m]."""
-    return np.einsum("nij,ni->nj", _rotations(places.pose[:, 3:]), points - places.pose[:, :3])
-
-
-def _rotations(angles: np.ndarray) -> np.ndarray:
-    """R = Rz(yaw) Ry(pitch) Rx(roll) of angles (..., 3), (..., 3, 3)."""
-    (sr, sp, sy), (cr, cp, cy) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
-    R = np.empty((*angles.shape[:-1], 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -sp, cp * sr, cp * cr
-    return R

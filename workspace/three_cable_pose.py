@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..models import Robot
-from .balance import anchors, attachments
-from .places import Places
+from ..models.points import anchors, attachments
 
 __all__ = ["three_cable_pose"]
 
@@ -32,8 +31,8 @@ def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, l
     -------
     In {G}, (n, 3) [m]; nan where the cables do not meet.
     """
-    turned = Places(np.concatenate([np.zeros_like(attitude), attitude], axis=1), carriers)
-    centres = anchors(robot, turned) - attachments(robot, turned)  # (n, 3, 3)
+    turned = np.concatenate([np.zeros_like(attitude), attitude], axis=1)
+    centres = anchors(robot, carriers) - attachments(robot, turned)  # (n, 3, 3)
     to_second, to_third = centres[:, 1] - centres[:, 0], centres[:, 2] - centres[:, 0]
     squares = np.broadcast_to(lengths, (len(attitude), 3)) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -13,14 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import casadi as ca
 import numpy as np
 
 from ...errors import InputError
-from ..batch import call
 from ..dynamics import Dynamics
+from ..points import rotations
 from ..robot import Robot
-from ..rotation import rotation
 from . import checks, element_chain
 
 SINGULAR = 1e-9  # of the largest singular value of A: what is below counts as zero
@@ -145,10 +143,10 @@ def driving_force(
         raise InputError(f"the arguments broadcast to {w.shape[:-1]} instants; accepted: {instants}, as pose has")
     A = dynamics.wrench_matrix(pose)
 
-    arms = robot.attachments @ _rotations(pose[:, 3:]).transpose(0, 2, 1)  # R b, (N, m, 3), in {A}
+    arms = robot.attachments @ rotations(pose[:, 3:]).transpose(0, 2, 1)  # R b, (N, m, 3), in {A}
     vectors = robot.anchors - (pose[:, None, :3] + arms)  # A - B, (N, m, 3), in {A}
     lengths = np.linalg.norm(vectors, axis=-1)
-    to_A = _rotations(base[:, 3:]).transpose(0, 2, 1)
+    to_A = rotations(base[:, 3:]).transpose(0, 2, 1)
     in_A = np.concatenate([np.einsum("nij,nj->ni", to_A, part) for part in np.split(vibration, 2, axis=1)], axis=1)
     displacements = element_chain.attachment_displacements(arms, in_A)
     dT_C = element_chain.damping_increment(vectors, damping, displacements, time_step)
@@ -188,12 +186,6 @@ def _pretension(value: Any, shape: tuple[int, int]) -> np.ndarray:
     if not (array >= 0).all():
         raise InputError(f"pretension: has {array.min():g} in it; accepted: numbers >= 0")
     return array
-
-
-def _rotations(angles: np.ndarray) -> np.ndarray:
-    """R of each row of (N, 3), (N, 3, 3)."""
-    symbols = ca.SX.sym("angles", 3)
-    return call(ca.Function("rotation", [symbols], [rotation(symbols)], ["angles"], ["R"]), {"angles": angles})["R"]
 
 
 def _unwound(lengths: np.ndarray) -> np.ndarray:

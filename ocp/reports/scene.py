@@ -6,7 +6,6 @@ import numpy as np
 
 from ...figures.animation import Scene
 from ...figures.robot import box_edges
-from ...models import kinematics
 from ...models.robot import MobileCarrier
 from ..result import Plan
 from ..tasks.task_limits import AnyKeepOut, Block, Sphere
@@ -23,11 +22,11 @@ def scene(plan: Plan, times: np.ndarray) -> Scene:
     poses, carriers = audit.motion.pose[rows], audit.carriers.pose[rows]
     of_cable = robot.carrier_of_cable
     shown = [index for index, carrier in enumerate(robot.carriers) if carrier.kind != "ground"]
-    dm = kinematics.ca.DM
+    anchors, attachments = plan.scenario.dynamics.points(poses, carriers)
     return Scene(
         title=f"{robot.name}, {plan.scenario.task.name}: {plan.status.value}",
-        anchors=np.stack([kinematics.anchors(robot.anchors, of_cable, dm(base)).full().T for base in carriers]),
-        attachments=np.stack([kinematics.transform(dm(pose), robot.attachments).full().T for pose in poses]),
+        anchors=anchors,
+        attachments=attachments,
         path=audit.motion.pose[::TRAIL, :3],
         path_times=audit.times[::TRAIL],
         carriers=carriers[:, shown, :3],

@@ -16,8 +16,8 @@ from pydantic import Field
 
 from ...errors import InputError
 from ...models import Robot
+from ...models.points import anchors, attachments
 from ...models.robot import MobileCarrier, NonNegative
-from ..balance import anchors, attachments
 from ..condition import AnyCondition, Condition
 from ..places import Places
 
@@ -102,7 +102,7 @@ class ExistsPlacement(Condition):
         placed = Places(pose, carriers)
         beyond = np.zeros(len(places))
         if robot.fixed_lengths is not None:
-            ends, starts = attachments(robot, placed), anchors(robot, placed)
+            ends, starts = attachments(robot, pose), anchors(robot, carriers)
             for cable, i in enumerate(robot.carrier_of_cable):
                 away, length = starts[:, cable] - ends[:, cable], robot.fixed_lengths[cable]
                 shift = _onto_sphere(away, length) - away

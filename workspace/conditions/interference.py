@@ -13,9 +13,9 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
+from ...models.points import anchors, attachments, in_frame
 from ...models.robot import Box, NonNegative, Positive
 from ...models.shapes import Block, Capsule, Sphere
-from ..balance import anchors, attachments, in_platform
 from ..condition import Condition
 from ..places import Places
 
@@ -46,7 +46,7 @@ class Interference(Condition):
             return self._free(robot, places)
 
     def _free(self, robot: Robot, places: Places) -> np.ndarray:
-        starts, ends = anchors(robot, places), attachments(robot, places)
+        starts, ends = anchors(robot, places.carriers), attachments(robot, places.pose)
         free = np.ones(len(places), dtype=bool)
         if self.between_cables is not None:
             for i, j in _apart(robot):
@@ -55,7 +55,7 @@ class Interference(Condition):
         if self.platform is not None:
             low, high = np.array(self.platform.min), np.array(self.platform.max)
             for cable in range(robot.m):
-                free &= ~_enters(low, high, robot.attachments[cable], in_platform(places, starts[:, cable]))
+                free &= ~_enters(low, high, robot.attachments[cable], in_frame(places.pose, starts[:, cable]))
         for obstacle in self.obstacles:
             for cable in range(robot.m):
                 distance = _outside(obstacle, starts[:, cable], ends[:, cable])
