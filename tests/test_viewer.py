@@ -211,10 +211,10 @@ def test_what_cannot_be_shown_is_one_line(folder):
     wanted = {
         "text.nc": "cannot be read",
         "cut.nc": "cannot be read",
-        "gone.nc": "is not there",
-        "folder.nc": "is a folder",
-        "half.nc": "has no 'tensions'",
-        "few.nc": "tensions: has the shape",
+        "gone.nc": "does not exist",
+        "folder.nc": "got a folder",
+        "half.nc": "without 'tensions'",
+        "few.nc": "tensions must have the shape",
         "other.nc": "neither a plan nor a workspace",
         "mine.nc": "--robot",
     }
@@ -223,7 +223,7 @@ def test_what_cannot_be_shown_is_one_line(folder):
             read(str(folder / name))
         assert "\n" not in str(error.value)
     assert read(str(folder / "mine.nc"), robot=str(folder / "mine.yaml")).kind == "workspace"
-    with pytest.raises(InputError, match="'cogiro'; accepted: the file of 'mine'"):
+    with pytest.raises(InputError, match="must be the file of 'mine', .* got 'cogiro'"):
         read(str(folder / "mine.nc"), robot="cogiro")
     for target in ("wang-flying", str(folder / "line.nc")):
         with pytest.raises(InputError, match="--robot"):

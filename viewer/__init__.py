@@ -1,11 +1,11 @@
-"""Robots, plans and workspaces in a browser: live with sliders, or as one HTML page that plays without a server.
+"""Show robots, plans and workspaces in a browser: live with sliders, or as one HTML page that needs no server.
 
     subject = read("circle.nc")               # a robot, a plan or a workspace
     save_page(subject, "circle.html")
     with serve(subject) as url: ...
 
-What is shown is computed without a browser (`instant`, `replay`, `cloud`, `sliders`, `colours`, `words`); viser, which
-draws it, is imported by `server` alone (extra `viewer`).
+The modules `instant`, `replay`, `cloud`, `sliders`, `colours` and `words` compute what is shown, without a browser.
+Only `server` imports viser, which draws it (extra `viewer`).
 """
 
 from .server import save_page, serve

@@ -1,8 +1,8 @@
-"""The colour of a tension between its limits.
+"""Choose the colour of a tension between its limits.
 
 A cable fails at both of its limits, and t_max is often a hundred times t_min: a linear scale would show one colour for
-all that matters near t_min. So the place between the limits is logarithmic, with a hundredth of t_max as the smallest
-step, so that t_min = 0 has a place too:
+all tensions near t_min. The scale is therefore logarithmic, with a hundredth of t_max added so that t_min = 0 has a
+place too:
 
     place(t) = log((t + e) / (t_min + e)) / log((t_max + e) / (t_min + e)),   e = t_max / 100
 """
@@ -17,7 +17,7 @@ NO_TENSION = "#999999"
 
 
 def place(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
-    """Where tensions (..., m) [N] lie between their limits (m,): 0 at t_min, 1 at t_max, nan where there are none."""
+    """Return the place of tensions (..., m) [N] between their limits (m,): 0 at t_min, 1 at t_max; nan stays."""
     step = FINEST * t_max
     span = np.log((t_max + step) / (t_min + step))
     above = np.log((np.clip(tensions, t_min, t_max) + step) / (t_min + step))
@@ -26,7 +26,7 @@ def place(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndar
 
 
 def shades(places: np.ndarray) -> np.ndarray:
-    """RGB of places between the limits, bytes (..., 3): pale near t_min, dark near t_max, grey for nan."""
+    """Return the RGB of places between the limits, bytes (..., 3): pale near t_min, dark near t_max, grey for nan."""
     from matplotlib import colormaps
     from matplotlib.colors import to_rgba
 
@@ -37,5 +37,5 @@ def shades(places: np.ndarray) -> np.ndarray:
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """Bytes of a colour such as "#0072B2"."""
+    """Return the bytes of a colour such as "#0072B2"."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -1,4 +1,4 @@
-"""`Instant`: a robot as it is at one time: where its points are, its tensions, or the proof that there are none."""
+"""Describe a robot at one instant: its points, and its tensions or a certificate."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FORCELESS = 0.05  # shorter force parts are no arrow: the certificate is about m
 
 @dataclass(frozen=True)
 class Instant:
-    """One instant.
+    """A robot at one instant.
 
     Attributes
     ----------
@@ -28,14 +28,14 @@ class Instant:
     tensions
         (m,) [N], nan where there are none.
     status
-        Of the tensions, a word.
+        The status of the tensions.
     margin
         Smallest distance of a tension from its limits [N], and the index of that cable; nan and -1 without tensions.
     reserve
-        Capacity margin at rest [N]: how far the wrench is from the boundary of what the cables can give, negative
-        outside; nan where it was not asked for.
+        Capacity margin at rest [N]: the distance of the wrench from the boundary of the available wrench set, negative
+        outside; nan if it was not computed.
     certificate
-        Why there are no tensions; None if there are.
+        The proof that no tensions exist; None if they do.
     time
         [s]; None at rest.
     """
@@ -53,12 +53,12 @@ class Instant:
 
 
 def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Instant:
-    """The robot at rest at `pose` (6,) with its carriers at (c, 6), and the tensions of least norm that hold it there.
+    """Return the robot at rest at `pose` (6,) with its carriers at (c, 6), and the tensions of least norm that hold it.
 
     Raises
     ------
     InputError
-        If a cable has no length there, or no way over its pulley.
+        If a cable has no length there, or cannot pass over its pulley.
     """
     robot = dynamics.robot
     problem = pose_problem(dynamics, pose, carrier_pose=carriers)
@@ -79,7 +79,7 @@ def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: 
 
 
 def least_distance(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> tuple[float, int]:
-    """Smallest distance of tensions (m,) from their limits [N], and whose; nan and -1 if one is nan."""
+    """Return the smallest distance of tensions (m,) from their limits [N], and the cable; nan and -1 if one is nan."""
     inside = np.minimum(tensions - t_min, t_max - tensions)
     if not np.isfinite(inside).all():
         return float("nan"), -1
@@ -87,10 +87,10 @@ def least_distance(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -
 
 
 def arrow(instant: Instant, size: float) -> np.ndarray | None:
-    """The force part of the certificate's direction as an arrow from the CoM, start and tip (2, 3) in {G} [m].
+    """Return the force part of the certificate's direction as an arrow from the CoM, start and tip (2, 3) in {G} [m].
 
-    Its length is `ARROW` of `size` [m] times the share of force in the direction; None if there is no certificate, or
-    hardly any force in it.
+    Its length is `ARROW` of `size` [m] times the share of force in the direction. Return None if there is no
+    certificate, or almost no force in it.
     """
     if instant.certificate is None:
         return None

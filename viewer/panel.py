@@ -1,4 +1,4 @@
-"""`Panel`: the controls and readouts beside the picture: sliders for a robot, a time line for a plan."""
+"""Show controls and readouts beside the scene: sliders for a robot, a time line for a plan."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
 
 
 class Panel:
-    """What a person can do with a subject on a viser server; closed by `close`."""
+    """The controls of a subject on a viser server, until `close`."""
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, stage: Stage):
         self._subject, self._stage, self._geometry = subject, stage, geometry
@@ -119,7 +119,7 @@ class Panel:
         threading.Thread(target=keep_playing, daemon=True).start()
 
     def _update(self, values: Callable[[], tuple[float, ...]], instant: Callable[[tuple[float, ...]], Instant]) -> None:
-        """Show what the controls say now. Events that waited for the one before find their values shown already."""
+        """Show the current values of the controls; return early if a previous event has already shown them."""
         with self._busy:
             wanted = values()
             if wanted == self._shown:
@@ -135,5 +135,5 @@ class Panel:
 
 
 def _whole(length: float, step: float) -> float:
-    """The whole steps that cover a length, at least one, so that the end reads well."""
+    """Return the number of whole steps that cover a length, at least one, so that the end is a round number."""
     return round(max(math.ceil(length / step - 1e-6), 1) * step, 6)

@@ -1,4 +1,4 @@
-"""`Replay`: a saved plan, instant by instant. Nothing is interpolated: what is shown was audited."""
+"""Replay a saved plan instant by instant, without interpolation: every instant shown was audited."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Replay:
 
     Parameters
     ----------
-    found
-        The dataset.
+    dataset
+        The contents of the file.
     where
-        The file, for errors.
+        The file name, for errors.
 
     Attributes
     ----------
@@ -40,69 +40,69 @@ class Replay:
     Raises
     ------
     InputError
-        If what a plan has is not there, or is not of its robot.
+        If a variable of a plan is missing, or does not fit its robot.
     """
 
-    def __init__(self, found: xr.Dataset, where: str):
+    def __init__(self, dataset: xr.Dataset, where: str):
         for name in (*NEEDED, "time"):
-            if name not in found.variables:
-                raise InputError(f"{where}: has no {name!r}; accepted: a plan as `towline plan` saves it")
+            if name not in dataset.variables:
+                raise InputError(f"{where} must be a plan saved by `towline plan`, got one without {name!r}")
         for name in ("robot", "task"):
-            if not isinstance(found.attrs.get(name), str):
-                raise InputError(f"{where}: does not tell its {name}; accepted: a plan as `towline plan` saves it")
-        self.robot = parse_yaml(found.attrs["robot"], Robot, f"{where}, robot")
-        self._task = parse_yaml(found.attrs["task"], Task, f"{where}, task")
-        self.title = f"{self.robot.name}, {self._task.name}: {found.attrs.get('status', 'a plan')}"
+            if not isinstance(dataset.attrs.get(name), str):
+                raise InputError(f"{where} must be a plan saved by `towline plan`, got one without its {name}")
+        self.robot = parse_yaml(dataset.attrs["robot"], Robot, f"{where}, robot")
+        self._task = parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
+        self.title = f"{self.robot.name}, {self._task.name}: {dataset.attrs.get('status', 'a plan')}"
         self.geometry = Geometry(self.robot)
-        self.times = _array(found, "time", (-1,), where)
+        self.times = _array(dataset, "time", (-1,), where)
         n, c = len(self.times), len(self.robot.carriers)
         self._pose, self._velocity, self._acceleration = (
-            _array(found, name, (n, 6), where) for name in ("pose", "velocity", "acceleration")
+            _array(dataset, name, (n, 6), where) for name in ("pose", "velocity", "acceleration")
         )
-        self._carriers = _array(found, "carrier_pose", (n, c, 6), where)
-        self._tensions = _array(found, "tensions", (n, self.robot.m), where, gaps=True)
+        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where)
+        self._tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
         if n == 0 or not (np.diff(self.times) > 0).all():
-            raise InputError(f"{where}: time: has {n} instants, not one after another; accepted: times that rise")
+            raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
         self._points = self.geometry(self._pose, self._carriers)
 
     @property
     def room(self) -> Room:
-        """What the robot passes through."""
+        """Return the smallest box around the motion."""
         return Room.of(self._points.anchors, self._points.attachments, self._carriers[..., :3])
 
     @property
     def duration(self) -> float:
-        """From the first to the last instant [s]."""
+        """Return the time from the first to the last instant [s]."""
         return float(self.times[-1] - self.times[0])
 
     @property
     def path(self) -> np.ndarray:
-        """Origin of the platform's frame at each instant, (n, 3) in {G} [m]."""
+        """Return the origin of the platform's frame at each instant, (n, 3) in {G} [m]."""
         return self._pose[:, :3]
 
     @property
     def carrier_paths(self) -> list[np.ndarray]:
-        """Those of the carriers' frames that move, (n, 3) each."""
+        """Return the origins of the carriers' frames that move, (n, 3) each in {G} [m]."""
         paths = np.moveaxis(self._carriers[:, :, :3], 1, 0)
         return [path for path in paths if np.ptp(path, axis=0).max() > 1e-9]
 
     @property
     def obstacles(self) -> list[np.ndarray]:
-        """Lines (k, 3) in {G} [m] that outline the places to keep out of."""
+        """Return lines (k, 3) in {G} [m] that outline the regions to keep out of."""
         return [line for place in self._task.limits.keep_out if place.frame == "world" for line in outline(place)]
 
     def index_at(self, time: float) -> int:
-        """The instant nearest to `time` [s]."""
+        """Return the index of the instant nearest to `time` [s]."""
         return int(np.abs(self.times - time).argmin())
 
     def frames(self, rate: float) -> np.ndarray:
-        """The instants nearest to equal times, `rate` a second, fewer if that were more than `MOST_FRAMES`."""
+        """Return the indices of instants at equal intervals, `rate` per second, at most `MOST_FRAMES` in all."""
         count = min(int(self.duration * rate) + 1, MOST_FRAMES, len(self.times))
-        wanted = np.linspace(self.times[0], self.times[-1], count)
-        return np.unique([self.index_at(time) for time in wanted])
+        instants = np.linspace(self.times[0], self.times[-1], count)
+        return np.unique([self.index_at(time) for time in instants])
 
     def at(self, index: int) -> Instant:
-        """The `index`-th instant: its audited tensions, or where there are none the certificate of that instant."""
+        """Return the `index`-th instant with its audited tensions, or with a certificate if there are none."""
         tensions = self._tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self.robot.t_min, self.robot.t_max)
@@ -120,7 +120,7 @@ class Replay:
         )
 
     def _certificate(self, index: int) -> Certificate | None:
-        """Of the winds in which tensions have to exist, the certificate with the largest shortfall."""
+        """Return the certificate with the largest shortfall of all winds in which tensions must exist."""
         scenario, pose, velocity = self._scenario, self._pose[index], self._velocity[index]
         t_min, t_max = scenario.bounds()
         A = scenario.dynamics.wrench_matrix(pose, self._carriers[index])
@@ -135,17 +135,17 @@ class Replay:
         return lay_out(self.robot, self._task)
 
 
-def _array(found: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False) -> np.ndarray:
-    """A variable as numbers of the expected shape, -1 for any length; `gaps`: nan is one of them."""
+def _array(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False) -> np.ndarray:
+    """Return a variable as numbers of the expected shape, -1 for any length; `gaps` permits nan."""
     try:
-        values = found[name].to_numpy().astype(float)
+        values = dataset[name].to_numpy().astype(float)
     except (TypeError, ValueError):
-        raise InputError(f"{where}: {name}: is {found[name].dtype}; accepted: numbers") from None
+        raise InputError(f"{where}: {name} must be an array of numbers, got {dataset[name].dtype}") from None
     fits = len(values.shape) == len(shape) and all(
         want in (-1, have) for want, have in zip(shape, values.shape, strict=True)
     )
     if not fits:
-        raise InputError(f"{where}: {name}: has the shape {values.shape}; accepted: {shape}, as its robot has")
+        raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")
     if not gaps and not np.isfinite(values).all():
-        raise InputError(f"{where}: {name}: has numbers that are not finite; accepted: finite ones")
+        raise InputError(f"{where}: {name} must have finite numbers, got nan or infinity")
     return values

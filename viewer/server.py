@@ -1,4 +1,4 @@
-"""The one place that knows viser: a live server, and a recording as one HTML page that needs none."""
+"""Serve a subject live, or record it as one HTML page; the only module that imports viser."""
 
 from __future__ import annotations
 
@@ -33,21 +33,22 @@ FRAME_RATE = 25.0  # [1/s] of a page
 
 @contextlib.contextmanager
 def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[str]:
-    """Show a subject in the browser for as long as the block lasts; the address comes out.
+    """Serve a subject until the block ends; yield the address to open in a browser.
 
     Parameters
     ----------
     subject
         From `read`.
     host
-        Who can look: 127.0.0.1 this machine only. There is no password; beyond this machine that is everybody.
+        The address to listen on: 127.0.0.1 for this machine only. There is no password: on any other address, everyone
+        who reaches it can look.
     port
-        Where; if it is taken, one of those that follow. 0: any that is free.
+        The port; if it is in use, one of the next. 0 selects any free port.
 
     Raises
     ------
     InputError
-        If viser is not installed, or host or port are none that can be.
+        If viser is not installed, or host or port are not possible.
     """
     _check_address(host, port)
     server = _start(host, port)
@@ -65,21 +66,21 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
 
 
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
-    """Write a subject as one HTML file that loads nothing and plays without a server, whole or not at all.
+    """Write a subject as one HTML file that loads nothing and needs no server; a failure leaves no partial file.
 
-    A plan plays; a robot stands at home with the tensions that hold it there, in a workspace's points if it has some.
+    A plan plays; a robot is shown at home with its tensions, with the points of its workspace if there are any.
 
     Parameters
     ----------
     subject
         From `read`.
     file
-        Where to write it.
+        The file to write.
 
     Raises
     ------
     InputError
-        If viser is not installed, or the place cannot be written to.
+        If viser is not installed, or the file cannot be written.
     """
     path = Path(file)
     with whole_file(path) as temporary:
@@ -121,9 +122,9 @@ def _page(subject: Subject) -> str:
 
 
 def _check_address(host: str, port: int) -> None:
-    """Refuse where no server could ever be: viser would wait for ever."""
+    """Raise InputError if no server can listen on the address, because viser would wait for ever."""
     if not 0 <= port <= 65535:
-        raise InputError(f"--port: {port}; accepted: 0 to 65535")
+        raise InputError(f"--port must be a number from 0 to 65535, got {port}")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind, protocol) as trial:
@@ -131,7 +132,7 @@ def _check_address(host: str, port: int) -> None:
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"--host: {host!r} cannot be listened on ({reason}); accepted: {LOOPBACK}, or an address of this machine"
+            f"--host must be {LOOPBACK} or another address of this machine, got {host!r} ({reason})"
         ) from None
 
 
@@ -139,10 +140,10 @@ def _start(host: str, port: int) -> viser.ViserServer:
     try:
         import viser
     except ImportError:
-        raise InputError("viewer: viser is not installed; accepted: pip install 'towline[viewer]'") from None
+        raise InputError("viser is not installed; install the extra viewer: pip install 'towline[viewer]'") from None
 
     class Unshared(viser.ViserServer):
-        """No client can have it open a tunnel through a server of somebody else."""
+        """A server that refuses to open a tunnel through a third party's server."""
 
         def request_share_url(self, verbose: bool = True) -> str | None:
             return None
@@ -157,5 +158,5 @@ def _stop(server: viser.ViserServer) -> None:
 
 
 def _quiet() -> contextlib.AbstractContextManager[object]:
-    """Nothing is printed: viser does when it starts and stops, and --json may not have that."""
+    """Suppress what viser prints when it starts and stops, because --json prints JSON only."""
     return contextlib.redirect_stdout(io.StringIO())

@@ -1,4 +1,4 @@
-"""Which poses sliders can reach: a range for each coordinate of platform and carriers that can move."""
+"""Choose the range of a slider for each coordinate of platform and carriers that can move."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ TILT = 0.6  # [rad] of carriers that have no limit of their own
 
 
 class Slider(NamedTuple):
-    """One coordinate that can be set.
+    """A slider for one coordinate.
 
     Attributes
     ----------
     carrier
-        Index of the carrier that it belongs to; None: the platform.
+        Index of its carrier, or None for the platform.
     coordinate
         Index in (x, y, z, roll, pitch, yaw).
     low, high, home, step
@@ -37,15 +37,16 @@ class Slider(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name and unit."""
+        """Return name and unit."""
         return f"{COORDINATES[self.coordinate]} [{'m' if self.coordinate < 3 else 'rad'}]"
 
 
 def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
-    """First those of the platform, then carrier by carrier.
+    """Return the sliders of the platform, then those of each carrier.
 
-    The platform goes through the robot's room and a little beyond; mobile carriers go through their reach boxes, unless
-    the drive keeps them; what flies goes half the robot's size to each side, and tilts as far as its file allows.
+    The platform can move through the box around the robot and a little beyond. Mobile carriers can move through their
+    reach boxes, unless the drive mode fixes them. Flying carriers can move by half the robot's size to each side, and
+    tilt up to the limit of the robot file.
     """
     home = robot.home
     found = []
@@ -70,7 +71,7 @@ def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
 
 
 def poses(robot: Robot, settings: list[Slider], values: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Platform (6,) and carriers (c, 6) in {G} with `values` for the sliders and the rest at home [m, rad]."""
+    """Return the poses of platform (6,) and carriers (c, 6) in {G} for slider `values`, all else at home [m, rad]."""
     pose, carriers = robot.home.copy(), robot.carrier_home.copy()
     for slider, value in zip(settings, values, strict=True):
         owner = pose if slider.carrier is None else carriers[slider.carrier]
@@ -79,7 +80,7 @@ def poses(robot: Robot, settings: list[Slider], values: list[float]) -> tuple[np
 
 
 def _slider(carrier: int | None, coordinate: int, low: float, high: float, home: float) -> Slider:
-    """With ends on whole steps inside of the range, so that they read well."""
+    """Return a slider whose ends are whole steps inside the range, so that they are round numbers."""
     if not high > low:
         return Slider(carrier, coordinate, float(home), float(home), float(home), 1.0)
     digits = int(np.ceil(-np.log10((high - low) / 200)))

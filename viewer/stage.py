@@ -1,4 +1,4 @@
-"""`Stage`: a robot as a viser scene: what stands still is drawn once, `show` moves the rest."""
+"""Draw a robot as a viser scene: fixed parts once, moving parts by `show`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..figures import style
 from ..figures.hull import faces
 from ..figures.robot import box_edges
 from ..models.robot import MobileCarrier
+from ..text import quantity
 from . import words
 from .colours import place, rgb, shades
 from .geometry import Geometry
@@ -37,13 +38,13 @@ class Stage:
     Parameters
     ----------
     server
-        Of which only scene and camera are used.
+        Only its scene and camera are used.
     subject
-        What is shown.
+        The robot, plan or workspace to show.
     geometry
-        Of its robot.
+        The geometry of its robot.
     captioned
-        Whether time, status and margin stand in the picture: for a page, which has no panel.
+        Show time, status and margin in the scene, for a page without a panel.
     """
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
@@ -57,7 +58,7 @@ class Stage:
 
     @property
     def cell(self) -> float:
-        """Edge of the grid's cells [m]: 1, 2 or 5 times a power of ten."""
+        """Return the edge of the grid's cells [m]: 1, 2 or 5 times a power of ten."""
         wanted = self._size / CELLS
         power = 10.0 ** np.floor(np.log10(wanted))
         return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
@@ -83,24 +84,24 @@ class Stage:
             label.position = middles[index]
             _write(
                 label,
-                f"{index + 1}: {words.newtons(round(float(tension), 3))}" if np.isfinite(tension) else f"{index + 1}",
+                f"{index + 1}: {quantity(tension, 'N', 3)}" if np.isfinite(tension) else f"{index + 1}",
             )
         self._point(instant)
         if self._caption is not None:
             _write(self._caption, words.caption(instant))
 
     def show_cloud(self, shown: bool) -> None:
-        """Whether the points of a workspace are there."""
+        """Show or hide the points of a workspace."""
         if self._cloud is not None:
             self._cloud.visible = shown
 
     def show_numbers(self, shown: bool) -> None:
-        """Whether number and tension stand at the cables."""
+        """Show or hide number and tension at the cables."""
         for label in self._numbers:
             label.visible = shown
 
     def _point(self, instant: Instant) -> None:
-        """The certificate's arrow."""
+        """Draw the arrow of the certificate."""
         ends = arrow(instant, self._size)
         self._arrow.visible = self._short.visible = ends is not None
         if ends is not None:
@@ -109,7 +110,7 @@ class Stage:
             _write(self._short, words.shortfall(instant))
 
     def _look(self, server: viser.ViserServer) -> None:
-        """The camera sees the whole robot from the front, a little from the side and above."""
+        """Point the camera at the whole robot from the front, a little from the side and above."""
         camera = server.initial_camera
         along = np.array([0.45, -1.0, 0.45])
         away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2)
@@ -157,7 +158,7 @@ class Stage:
             )
 
     def _lines(self, name: str, lines: list[np.ndarray], colour: tuple[int, int, int], width: float = THIN) -> None:
-        """Lines (k, 3) each, [m]."""
+        """Draw lines, (k, 3) each [m]."""
         parts = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
         if parts:
             points = np.concatenate(parts).astype(np.float32)
@@ -212,7 +213,7 @@ class Stage:
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
     def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
-        """The hull of corners (k, 3) [m] in the frame above `name`, if they have one."""
+        """Draw the convex hull of corners (k, 3) [m] in the frame above `name`, if it has a volume or an area."""
         triangles = [[face[0], *pair] for face in faces(corners) for pair in pairwise(face[1:])]
         if triangles:
             self._scene.add_mesh_simple(
@@ -230,7 +231,7 @@ class Stage:
 
 
 def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:
-    """An arrow as line segments (1 + BARBS, 2, 3): its shaft, and a head of lines around it."""
+    """Return an arrow as line segments (1 + BARBS, 2, 3): its shaft, and a head of lines around it."""
     along = tip - start
     _, _, axes = np.linalg.svd(along[None])
     angles = np.linspace(0.0, 2 * np.pi, BARBS, endpoint=False)[:, None]

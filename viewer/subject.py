@@ -1,4 +1,4 @@
-"""`Subject`: what is looked at: a robot, a plan, or a workspace; `read` finds out which."""
+"""Read what to show: a robot, a plan or a workspace."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ ACCEPTED = "a robot, or a file that `towline plan` or `towline workspace` wrote"
 
 @dataclass(frozen=True)
 class Subject:
-    """What is looked at.
+    """A robot, a plan or a workspace to show.
 
     Attributes
     ----------
     title
-        One line.
+        Its title, one line.
     robot
-        Whose it is.
+        The robot, or that of the plan or workspace.
     replay
-        Of a plan, else None.
+        The instants of a plan, or None.
     cloud
-        Of a workspace, else None.
+        The points of a workspace, or None.
     """
 
     title: str
@@ -42,58 +42,56 @@ class Subject:
 
     @property
     def kind(self) -> str:
-        """Robot, plan or workspace."""
+        """Return "robot", "plan" or "workspace"."""
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
 
 def read(target: str, robot: str | None = None) -> Subject:
-    """Read what there is to look at.
+    """Read a robot, a plan or a workspace.
 
     Parameters
     ----------
     target
         A robot of the library or a robot file; a plan or a workspace as NetCDF, or a workspace as a Zarr folder.
     robot
-        Of a workspace, if it is not one of the library: the file has its name only.
+        The robot of a workspace, if it is not in the library: a workspace file has only the name.
 
     Raises
     ------
     InputError
-        If it is none of these, or is of another robot: one line.
+        If it is none of these, or belongs to another robot.
     """
     path = Path(target)
     if path.suffix == ".zarr" or _is_netcdf(path):
         return _of_dataset(_open(path), target, robot)
     if robot is not None:
-        raise InputError(f"--robot: {robot!r} beside {target}; accepted: with a workspace, whose file does not hold it")
+        raise InputError(f"--robot must be left out unless a workspace is shown, got {robot!r} with {target}")
     loaded = load(target)
     return Subject(loaded.name, loaded)
 
 
-def _of_dataset(found: xr.Dataset, where: str, robot: str | None) -> Subject:
-    if "pose" in found and "time" in found.variables:
+def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
+    if "pose" in dataset and "time" in dataset.variables:
         from .replay import Replay
 
         if robot is not None:
-            raise InputError(f"--robot: {robot!r} beside {where}; accepted: none, a plan holds its robot")
-        replay = Replay(found, where)
+            raise InputError(f"--robot must be left out for a plan, which has its robot, got {robot!r} for {where}")
+        replay = Replay(dataset, where)
         return Subject(replay.title, replay.robot, replay=replay)
-    if "reached" not in found and "position" not in found:
-        raise InputError(f"{where}: is neither a plan nor a workspace; accepted: {ACCEPTED}")
+    if "reached" not in dataset and "position" not in dataset:
+        raise InputError(f"{where} must be {ACCEPTED}, got a dataset that is neither a plan nor a workspace")
     from .cloud import cloud
 
-    name = str(found.attrs.get("robot"))
+    name = str(dataset.attrs.get("robot"))
     try:
         loaded = load(robot if robot is not None else name)
     except InputError:
         if robot is not None:
             raise
-        raise InputError(f"{where}: is of robot {name!r}, not of the library; accepted: --robot FILE with it") from None
+        raise InputError(f"--robot must be the file of {name!r}, which is not in the library, for {where}") from None
     if loaded.name != name:
-        raise InputError(
-            f"--robot: {robot!r} is {loaded.name!r}; accepted: the file of {name!r}, whose workspace this is"
-        )
-    return Subject(f"{loaded.name}, workspace", loaded, cloud=cloud(found, where))
+        raise InputError(f"--robot must be the file of {name!r}, whose workspace this is, got {loaded.name!r}")
+    return Subject(f"{loaded.name}, workspace", loaded, cloud=cloud(dataset, where))
 
 
 def _is_netcdf(path: Path) -> bool:
@@ -110,16 +108,18 @@ def _open(path: Path) -> xr.Dataset:
     import xarray as xr
 
     if not path.exists():
-        raise InputError(f"{path}: is not there; accepted: {ACCEPTED}")
+        raise InputError(f"{path} does not exist; it must be {ACCEPTED}")
     if path.is_dir() and path.suffix != ".zarr":
-        raise InputError(f"{path}: is a folder; accepted: {ACCEPTED}")
+        raise InputError(f"{path} must be {ACCEPTED}, got a folder")
     try:
         if path.suffix == ".zarr":
             return xr.open_zarr(path).load()
         return xr.load_dataset(path, engine="h5netcdf")
     except ImportError:
-        raise InputError(f"{path}: zarr is not installed; accepted: pip install 'towline[cluster]'") from None
+        raise InputError(
+            f"zarr is not installed; install the extra cluster to read {path}: pip install 'towline[cluster]'"
+        ) from None
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        # HDF5 puts its own account of the matter, of several lines, where others have a few words.
+        # HDF5 has its own message of several lines, where others have a few words.
         reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
-        raise InputError(f"{path}: cannot be read ({reason}); accepted: {ACCEPTED}") from None
+        raise InputError(f"{path} must be {ACCEPTED}, got a file that cannot be read ({reason})") from None

@@ -1,6 +1,6 @@
-"""What is told beside the picture: readouts of an instant and the legend, as HTML, and a caption as plain text.
+"""Write the texts beside the scene: readouts of an instant and the legend as HTML, a caption as plain text.
 
-Names come from files: whatever is not a number passes `html.escape`.
+Names come from files, so every text that is not a number passes `html.escape`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from ..figures import style
 from ..models import Robot
 from ..models.robot import COORDINATES
+from ..text import quantity, quantity_range
 from .colours import NO_TENSION, place, shades
 from .instant import Instant, arrow
 from .subject import Subject
@@ -23,7 +24,7 @@ BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:ta
 
 
 def readout(instant: Instant, robot: Robot) -> str:
-    """Status, margins, the proof if there are no tensions, and a row for each cable."""
+    """Return status, margins, the certificate if there are no tensions, and a row for each cable."""
     feasible = instant.certificate is None and np.isfinite(instant.tensions).all()
     colour = style.colour(0) if feasible else style.colour(1)
     facts = [f'<b style="color:{colour}">{escape(instant.status)}</b>']
@@ -35,24 +36,24 @@ def readout(instant: Instant, robot: Robot) -> str:
         words = escape(instant.certificate.describe()).replace("\n", "<br>")
         lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
         if arrow(instant, 1.0) is None:
-            lines.append(f'<div style="color:{MUTED}">There is hardly any force in it, so it has no arrow.</div>')
+            lines.append(f'<div style="color:{MUTED}">The direction has almost no force, so it has no arrow.</div>')
     pose = ", ".join(f"{value:.3f}" for value in instant.pose + 0.0)
     lines.append(f'<div style="color:{MUTED}">({", ".join(COORDINATES)}) = ({pose}) m, rad</div>')
     return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{_table(instant, robot)}</div>'
 
 
 def _margins(instant: Instant) -> list[str]:
-    """How far the tensions are from their limits and the wrench from the boundary."""
-    told = []
+    """Return the smallest margin of the tensions and the capacity margin."""
+    lines = []
     if np.isfinite(instant.margin):
-        told.append(f"smallest margin {instant.margin:.4g} N, of cable {instant.nearest + 1}")
+        lines.append(f"smallest margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
     if np.isfinite(instant.reserve):
-        told.append(f"capacity margin {instant.reserve:.4g} N")
-    return told
+        lines.append(f"capacity margin {quantity(instant.reserve, 'N')}")
+    return lines
 
 
 def _table(instant: Instant, robot: Robot) -> str:
-    """For each cable its colour, its tension, and where that is between its limits."""
+    """Return a table of the cables: colour, tension, and its place between the limits."""
     places = place(instant.tensions, robot.t_min, robot.t_max)
     rows = []
     for index, (tension, at, shade) in enumerate(zip(instant.tensions, places, shades(places), strict=True)):
@@ -62,11 +63,11 @@ def _table(instant: Instant, robot: Robot) -> str:
             f'<div style="width:64px;height:8px;background:#e8e8e8">'
             f'<div style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}"></div></div>'
         )
-        told = f"{tension:.2f} N" if there else "none"
+        shown = f"{tension:.2f} N" if there else "none"
         limits = f"{robot.t_min[index]:g} to {robot.t_max[index]:g}"
         rows.append(
             f'<tr><td>{index + 1}</td><td style="text-align:right;padding:0 10px" '
-            f'class="towline-tension">{told}</td><td>{bar}</td>'
+            f'class="towline-tension">{shown}</td><td>{bar}</td>'
             f'<td style="color:{MUTED};padding-left:10px">{limits}</td></tr>'
         )
     heads = "".join(
@@ -76,22 +77,22 @@ def _table(instant: Instant, robot: Robot) -> str:
 
 
 def caption(instant: Instant) -> str:
-    """Time, status, margin or shortfall in two or three short lines of plain text, for the picture itself."""
+    """Return time, status, margin or shortfall in two or three lines of plain text, for the scene."""
     lines = [instant.status if instant.time is None else f"t = {instant.time:.2f} s, {instant.status}"]
     if np.isfinite(instant.margin):
-        lines.append(f"smallest margin {newtons(instant.margin)}, of cable {instant.nearest + 1}")
+        lines.append(f"smallest margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
     if instant.certificate is not None:
         lines.append(shortfall(instant))
     return "\n".join(lines)
 
 
 def shortfall(instant: Instant) -> str:
-    """What stands at the certificate's arrow; empty if there is none."""
-    return "" if instant.certificate is None else f"short by {newtons(instant.certificate.shortfall)}"
+    """Return the label of the certificate's arrow; empty if there is no certificate."""
+    return "" if instant.certificate is None else f"short by {quantity(instant.certificate.shortfall, 'N')}"
 
 
 def legend(subject: Subject, cell: float) -> str:
-    """What colours and marks mean, as HTML; `cell` is the edge of the grid's cells [m]."""
+    """Return the meaning of colours and marks as HTML; `cell` is the edge of the grid's cells [m]."""
     robot = subject.robot
     stops = ", ".join(f"rgb({r},{g},{b})" for r, g, b in shades(np.linspace(0.0, 1.0, STOPS)))
     bar = f'<div style="height:10px;background:linear-gradient(to right, {stops})"></div>'
@@ -106,25 +107,20 @@ def legend(subject: Subject, cell: float) -> str:
     marks += [("direction of the wrench that is missing (its force)", style.colour(1))]
     marks += subject.cloud.legend if subject.cloud else []
     rows = [f'<div><span style="color:{hue}">&#9632;</span> {escape(name)}</div>' for name, hue in marks]
-    told = f'<div style="color:{MUTED}">{escape(subject.cloud.told)}</div>' if subject.cloud else ""
+    summary = f'<div style="color:{MUTED}">{escape(subject.cloud.summary)}</div>' if subject.cloud else ""
     return (
         f'<div class="towline-legend" style="{BODY}">'
         f"<div>cable tension between its limits, logarithmic</div>{bar}{ends}"
-        f'{"".join(rows)}{told}<div style="color:{MUTED}">cells of the grid: {cell:g} m</div></div>'
+        f'{"".join(rows)}{summary}<div style="color:{MUTED}">cells of the grid: {cell:g} m</div></div>'
     )
 
 
 def _limit(name: str, limits: np.ndarray) -> str:
-    """A limit, or from where to where if the cables' differ."""
+    """Return a limit, or the range of the limits if those of the cables differ."""
     low, high = float(limits.min()), float(limits.max())
-    return f"{name} = {newtons(low, 6)}" if low == high else f"{name} = {newtons(low, 6)} to {newtons(high, 6)}"
-
-
-def newtons(force: float, digits: int = 3) -> str:
-    """A force in N, or in kN where it has five figures and more."""
-    return f"{force:.{digits}g} N" if abs(force) < 1e4 else f"{force / 1e3:.{digits}g} kN"
+    return f"{name} = {quantity_range((low, high), 'N', 6)}"
 
 
 def refusal(message: str) -> str:
-    """Why there is nothing to show where the sliders are."""
+    """Return the reason why the pose of the sliders cannot be shown, as HTML."""
     return f'<div class="towline-readout" style="{BODY};color:{style.colour(1)}">{escape(message)}</div>'
