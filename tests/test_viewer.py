@@ -223,7 +223,7 @@ def test_what_cannot_be_shown_is_one_line(folder):
             read(str(folder / name))
         assert "\n" not in str(error.value)
     assert read(str(folder / "mine.nc"), robot=str(folder / "mine.yaml")).kind == "workspace"
-    with pytest.raises(InputError, match="must be the file of 'mine', .* got 'cogiro'"):
+    with pytest.raises(InputError, match=r"must be the file of 'mine', .* got 'cogiro'"):
         read(str(folder / "mine.nc"), robot="cogiro")
     for target in ("wang-flying", str(folder / "line.nc")):
         with pytest.raises(InputError, match="--robot"):
