@@ -197,7 +197,7 @@ def test_resting_mobile_robots_cannot_hold_the_load_level():
     robot = load("wang-ctmrts")
     found = plan(robot, {"path": {"kind": "rest", "pose": list(robot.home)}, "duration": 1, "steps": 10})
     assert found.status is MotionStatus.INFEASIBLE
-    assert found.certificate.binding == []
+    assert found.certificate.binding.tolist() == []
 
 
 def test_a_load_too_heavy_for_three_cables_is_not_feasible():
@@ -211,7 +211,7 @@ def test_a_load_too_heavy_for_three_cables_is_not_feasible():
     assert found.status is MotionStatus.INFEASIBLE
     assert found.audit.to_dict()["worst_violation"] > 30
     assert found.certificate.shortfall > 30
-    assert found.certificate.binding == [0, 1, 2]
+    assert found.certificate.binding.tolist() == [0, 1, 2]
 
 
 def test_circle_in_the_frame_of_a_moving_and_pitching_base():
@@ -487,24 +487,27 @@ def test_audit_sees_carriers_out_of_their_limits(circle_free):
 
 
 WRONG = {
-    "frame": ({"path": {**CIRCLE, "frame": "drone"}}, "path.frame: 'drone' is unknown; accepted: world, quad"),
+    "frame": ({"path": {**CIRCLE, "frame": "drone"}}, "path.frame must be one of world, quad, got 'drone'"),
     "carrier": (
         {"path": CIRCLE, "base": {"kind": "hold", "poses": {"drone": HOVER}}},
-        "base.poses: carrier 'drone' is unknown; accepted: quad",
+        "base.poses must name carriers of the robot .quad., got 'drone'",
     ),
-    "margin": ({"path": CIRCLE, "margin": 30}, "margin: 30 N leaves nothing.*accepted: at most 29.75 N"),
-    "duration": ({"path": {"kind": "rest", "pose": [0, 0, -1]}}, "duration: is missing"),
+    "margin": ({"path": CIRCLE, "margin": 30}, "margin must be at most 29.75 N, .*got 30 N"),
+    "duration": (
+        {"path": {"kind": "rest", "pose": [0, 0, -1]}},
+        "duration must be a number > 0 .s. or a range, got nothing",
+    ),
     "too long": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 1]}, "duration": 2},
-        "duration: 2 s is longer than path, whose times end at 1 s",
+        "duration must be at most 1 s, where the times of path end, got 2 s",
     ),
     "too short": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 3]}, "duration": 2},
-        "duration: 2 s is shorter than path, whose times end at 3 s",
+        "duration must be at least 3 s, where the times of path end, got 2 s",
     ),
     "for ever": (
         {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1e5},
-        "duration: 100000 s; accepted: at most",
+        "duration must be at most 1000 s, .*got 100000 s",
     ),
     "at an anchor": (
         {"path": {"kind": "rest", "pose": [0.395, -0.216506350946, -0.1]}, "duration": 1},
@@ -517,12 +520,12 @@ WRONG = {
     ),
     "same point twice": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -1], [0, 0, -2]]}, "duration": 2},
-        r"path: points\[1\] is points\[0\] again",
+        r"path: points\[1\] must differ from points\[0\]",
     ),
     "kind": ({"path": {"kind": "spiral"}}, "path.kind: 'spiral' is unknown; accepted"),
     "times": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 0]}},
-        r"path: times must rise, but times\[1\] = 0 s follows 0 s",
+        r"path: times must increase, got times\[1\] = 0 s after 0 s",
     ),
     "NaN": ({"path": {**CIRCLE, "radius": float("nan")}}, "path.radius: .*got nan"),
     "key": ({"path": CIRCLE, "marign": 1}, "marign: is not a known key, did you mean 'margin'"),

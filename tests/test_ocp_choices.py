@@ -115,20 +115,20 @@ def test_a_plan_to_start_from_saves_iterations():
 
 
 WRONG = {
-    "range": ({"duration": {"min": 2, "max": 1}}, "task: duration: min: 2 s is more than max: 1 s"),
+    "range": ({"duration": {"min": 2, "max": 1}}, "task: duration: min must be at most max, 1, got 2"),
     "range of a circle": (
         {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
-        "duration: is to be chosen, but path of kind circle has times of its own",
+        "duration must be a number .s., got a range, while path of kind circle has times of its own",
     ),
     "tube": ({"tube": {"position": "loose"}}, "tube.position: accepted: a number, not text, or .*'free', got 'loose'"),
     "range of what": (
         {"duration": {"min": 2, "mx": 3}},
         "duration.(max: is missing|mx: is not a known key, did you mean 'max')",
     ),
-    "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min: 2 is more than max: 1"),
+    "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min must be at most max, 1, got 2"),
     "soft": (
         {"limits": {"cable_speed": 1, "soft": {"cable_sped": 0.1}}},
-        "soft: 'cable_sped' is none of this task's limits; accepted: cable_speed",
+        "soft must name limits of this task .cable_speed, .*got 'cable_sped' .did you mean 'cable_speed'",
     ),
     "box": (
         {"limits": {"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [1, 0, 1]}]}},

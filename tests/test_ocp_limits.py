@@ -176,7 +176,7 @@ def test_quadrotors_move_as_forward_dynamics_moves_them():
         ({"soft": {"cable_speed": 1}}, "soft: 'cable_speed' is none of this task's limits"),
         ({"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [0, 1, 1]}]}, "is not below max"),
         ({"keep_out": [{"kind": "cone"}]}, "limits.keep_out"),
-        ({"cable_length": {"min": 2, "max": 1}}, "is more than max"),
+        ({"cable_length": {"min": 2, "max": 1}}, "min must be at most max"),
     ],
 )
 def test_wrong_limits_are_one_line(limit, message):

@@ -81,7 +81,7 @@ def test_report_of_a_feasible_plan_tells_what_the_audit_saw(free):
     assert "(limit 3 m/s^2)" in told["Carriers", "quad"]
     assert "1000 Hz, 10 001 instants" in told["Audit", "rate"]
     assert seen.violation.max() < 1e-12
-    assert told["Audit", "worst violation"] == f"0 N at t = {seen.times[seen.worst]:.3f} s (tolerance 1e-6 N)"
+    assert told["Audit", "worst violation"] == "0 N (tolerance 1e-6 N)"
     assert number(told["Computation", "solve"]) == pytest.approx(free.solve_s, rel=1e-2)
     assert str(free.iterations) in told["Computation", "solver"]
     assert "Why it is infeasible" not in free.report()

@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..models import Robot
-from ..models.robot import Box, MobileCarrier, Name, Part, Positive, Vector3
+from ..models.ranges import PositiveRange
+from ..models.robot import Box, MobileCarrier, Name, Part, Vector3
 
 
 class AngleBox(Part):
@@ -22,19 +23,6 @@ class AngleBox(Part):
         for angle, low, high in zip(("roll", "pitch", "yaw"), self.min, self.max, strict=True):
             if low > high:
                 raise ValueError(f"min must not exceed max, but of {angle} min is {low:g} and max is {high:g}")
-        return self
-
-
-class LengthRange(Part):
-    """A range of cable lengths [m]."""
-
-    min: Positive
-    max: Positive
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.min > self.max:
-            raise ValueError(f"min must not exceed max, but min is {self.min:g} and max is {self.max:g}")
         return self
 
 
@@ -54,7 +42,7 @@ class Region(Part):
         default="home",
         description="home; reach: each mobile carrier anywhere in its reach box; or boxes of carriers in {G} by name",
     )
-    lengths: LengthRange | None = Field(
+    lengths: PositiveRange | None = Field(
         default=None,
         description="of each of three cables [m]; the position then follows from carriers, attitude and lengths, and "
         "is the lower of the two there are",

@@ -77,7 +77,7 @@ class Program:
     def read(self, x: np.ndarray) -> Deviation:
         """The deviation that a solution x stands for."""
         layout, columns, scheme = self.layout, self.columns(x), self.scenario.scheme
-        asked = scheme.asked(self.mesh.steps)
+        asked = scheme.balance_points(self.mesh.steps)
         tensions = columns[asked, layout.tensions] * self.scenario.robot.force_scale
         if len(asked) < len(columns):
             tensions = np.stack([np.interp(self.shares, self.shares[asked], t) for t in tensions.T], axis=1)
@@ -122,7 +122,7 @@ class Program:
 def build(scenario: Scenario, mesh: Mesh) -> Program:
     """The nonlinear program of `scenario` on `mesh`."""
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
-    shares, asked = scheme.shares(steps), scheme.asked(steps)
+    shares, asked = scheme.shares(steps), scheme.balance_points(steps)
     times = shares * scenario.duration
     parameters = ca.DM(_parameters(scenario, times))
     node, node_rows = node_function(scenario, mesh, layout)

@@ -68,7 +68,7 @@ def _exists(scenario: Scenario, layout: Layout, steps: int) -> np.ndarray:
     """(points, width): where the balance is not asked there are neither tensions nor slacks."""
     scheme = scenario.scheme
     there = np.zeros((steps * scheme.size + 1, layout.width), dtype=bool)
-    there[scheme.asked(steps)] = True
+    there[scheme.balance_points(steps)] = True
     there[:, layout.motion] = there[:, layout.shared] = True
     return there
 

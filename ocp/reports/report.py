@@ -58,7 +58,7 @@ def sections(plan: Plan) -> list[Section]:
 def spans_table(plan: Plan) -> Table | None:
     """Return the table of the spans without tensions, with what is needed and available at the worst instant of each.
 
-    None for a motion without such spans.
+    None for a motion with fewer than two: a single one is described by the certificate of the plan.
     """
     rows = []
     for certificate in plan.infeasible_spans:
@@ -70,7 +70,7 @@ def spans_table(plan: Plan) -> Table | None:
         rows.append((*times, along, *(quantity(number) for number in numbers), text.limits))
     columns = ("from [s]", "to [s]", "worst at [s]", "along")
     columns += ("needed [N]", "available [N]", "short by [N]", "limits")
-    return Table("Spans without tensions", columns, rows) if rows else None
+    return Table("Spans without tensions", columns, rows) if len(rows) > 1 else None
 
 
 def as_text(plan: Plan) -> str:
@@ -125,7 +125,7 @@ def _reasons(plan: Plan) -> list[Fact]:
             ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}"),
             *([("wind", _wind(certificate.wind))] if certificate.wind is not None else []),
             ("along", text.along),
-            ("as a vector", _vector(certificate)),
+            ("direction", _vector(certificate)),
             ("needed", text.needed),
             ("available", text.available),
             ("short by", text.short_by),
@@ -256,14 +256,18 @@ def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarr
 
 def _audit(plan: Plan) -> list[Fact]:
     audit = plan.audit
-    worst = f"{quantity(audit.violation.max(), 'N')} at t = {audit.times[audit.worst]:.3f} s"
+    worst = quantity(audit.violation.max(), "N")
+    if not worst.startswith("0 "):
+        worst += f" at t = {audit.times[audit.worst]:.3f} s"
     facts = [
         ("rate", f"{quantity(audit.rate, 'Hz', digits=6)}, {quantity(len(audit.times))} instants"),
         ("worst violation", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
-        ("tensions, carriers", "checked by code that the planner does not use"),
+        ("tensions, carriers", "computed by code that the planner does not use"),
     ]
     if names := list(dict.fromkeys(limit.name for limit in named_limits(plan.scenario).all)):
-        facts.append(("other limits", f"{', '.join(names)}: by the planner's expressions, on the audit's instants"))
+        facts.append(
+            ("other limits", f"{', '.join(names)}: the planner's expressions, evaluated at the audit's instants")
+        )
     if (drift := audit.drift) is not None:
         window = f"{_millimetres(drift.window_position)}, {quantity(drift.window_attitude * 1e3, 'mrad')}"
         facts.append((f"drift in {quantity(drift.window, digits=2)} s", f"{window} at most, without feedback"))

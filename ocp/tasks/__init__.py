@@ -1,1 +1,1 @@
-"""What is asked: a task, its path and limits, laid out for one robot (`scenario`), and how motions run in between."""
+"""Tasks: path, limits and objective as data, laid out for one robot (`scenario`), and the schemes of transcription."""

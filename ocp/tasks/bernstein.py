@@ -26,33 +26,33 @@ Values: TypeAlias = Any  # np.ndarray or a CasADi expression
 
 
 def basis(degree: int, shares: np.ndarray | Sequence[float]) -> np.ndarray:
-    """B_i at each share of an interval, (k, degree + 1)."""
+    """Return B_i at each share of an interval, (k, degree + 1)."""
     s = np.asarray(shares, dtype=float)[:, None]
     i = np.arange(degree + 1)
     return np.array([comb(degree, j) for j in i]) * s**i * (1 - s) ** (degree - i)
 
 
 def integral(h: Values, start: Values, points: Sequence[Values]) -> list[Values]:
-    """Points of the integral that begins at `start`."""
-    found = [start]
+    """Return the points of the integral that begins at `start`."""
+    integrated = [start]
     for point in points:
-        found.append(found[-1] + h / len(points) * point)
-    return found
+        integrated.append(integrated[-1] + h / len(points) * point)
+    return integrated
 
 
 def derivative(h: Values, points: Sequence[Values]) -> list[Values]:
-    """Points of the time derivative."""
+    """Return the points of the time derivative."""
     degree = len(points) - 1
     return [degree / h * (after - before) for before, after in pairwise(points)]
 
 
 def value(points: Sequence[Values], share: float) -> Values:
-    """The polynomial at one share of the interval."""
+    """Return the value of the polynomial at one share of the interval."""
     return sum(float(b) * point for b, point in zip(basis(len(points) - 1, [share])[0], points, strict=True) if b != 0)
 
 
 def joined(h: Values, points: Sequence[Values], speed: Values, end: Values, end_speed: Values) -> list[Values]:
-    """Points of a position whose last two are told by where it ends, not by integration over the whole interval.
+    """Return the points of a position whose last two follow from its end, not from integration over the whole interval.
 
     On a motion they are the same; in a program they depend on fewer unknowns, and the limits at both sides of a node
     are the same ones.
@@ -64,7 +64,7 @@ def joined(h: Values, points: Sequence[Values], speed: Values, end: Values, end_
 
 
 def mean_square(points: Sequence[Values], square: Any) -> Values:
-    """Mean over the interval of a polynomial's square; `square(a, b)` is the product of two points."""
+    """Return the mean over the interval of a polynomial's square; `square(a, b)` is the product of two points."""
     n = len(points) - 1
     total: Values = 0.0
     for i, a in enumerate(points):

@@ -1,4 +1,4 @@
-"""Paths of carriers, given by their names: whose they are, and whether they can be followed."""
+"""`by_index`: the paths that a task gives to carriers, checked, by the index of the carrier."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ Framed = TypeVar("Framed", bound=_Framed)
 
 
 def by_index(robot: Robot, paths: Mapping[str, Framed], field: str) -> dict[int, Framed]:
-    """The same paths by the index of their carrier; `field` is what a message names.
+    """Return paths given by the names of carriers by the index of their carrier; a message names `field`.
 
     Raises
     ------
     InputError
-        If a name is unknown or that of a carrier that never moves, or a path is not one in {G}.
+        If a name is unknown or that of a carrier that never moves, or if a path is not given in {G}.
     """
     names = [carrier.name for carrier in robot.carriers]
-    found = {}
+    paths_by_index = {}
     for name, path in paths.items():
         if name not in names:
-            raise InputError(f"{field}: carrier {name!r} is unknown; accepted: {', '.join(names)}")
+            raise InputError(f"{field} must name carriers of the robot ({', '.join(names)}), got {name!r}")
         if robot.carriers[names.index(name)].kind == "ground":
-            raise InputError(f"{field}: carrier {name!r} is of kind ground and never moves")
+            raise InputError(f"{field} must name carriers that move, got {name!r}, which is of kind ground")
         if path.frame != "world":
-            raise InputError(f"{field}.{name}.frame: {path.frame!r}; accepted: world")
-        found[names.index(name)] = path
-    return found
+            raise InputError(f"{field}.{name}.frame must be world, got {path.frame!r}")
+        paths_by_index[names.index(name)] = path
+    return paths_by_index

@@ -1,7 +1,7 @@
 """Distances between points, cables and obstacles, as expressions that a nonlinear program can differentiate.
 
-Points are (3, 1), CasADi SX or DM. Distances are the true ones, but for a hair (1e-6 m) where things touch: round
-about the corners of a box, so that a program can pass them. Inside a box what counts is how far the nearest face is.
+Points are (3, 1), CasADi SX or DM. Distances are the true ones, except within 1e-6 m where things touch. Around the
+corners of a box they are rounded, so that a program can pass them. Inside a box the nearest face counts.
 """
 
 from __future__ import annotations
@@ -20,16 +20,19 @@ Point: TypeAlias = Any  # (3, 1), SX or DM
 
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
 _BISECTIONS = 20
-_STILL = 1e-9  # [m], of a cable along an axis: what changes less counts as this much
+_STILL = 1e-9  # [m], of a cable along an axis: the least change that is used
 
 
 def between_points(p: Point, q: Point) -> Any:
-    """|p - q| [m]."""
+    """Return |p - q| [m]."""
     return ca.sqrt(ca.sumsqr(p - q) + _TINY)
 
 
 def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
-    """Distance of the segments p to p_end and q to q_end [m] (Ericson, Real-Time Collision Detection, 5.1.9)."""
+    """Return the distance of the segments p to p_end and q to q_end [m].
+
+    Source: Ericson, Real-Time Collision Detection, 5.1.9.
+    """
     along, across, between = p_end - p, q_end - q, p - q
     a, e, f = ca.sumsqr(along), ca.sumsqr(across), ca.dot(across, between)
     b, c = ca.dot(along, across), ca.dot(along, between)
@@ -41,7 +44,7 @@ def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
 
 
 def point_outside(place: KeepOut, p: Point) -> Any:
-    """How far p is outside an obstacle [m], negative inside."""
+    """Return the distance of p from an obstacle [m], negative inside."""
     if isinstance(place, Sphere):
         return between_points(p, ca.DM(place.centre)) - place.radius
     if isinstance(place, Capsule):
@@ -49,11 +52,11 @@ def point_outside(place: KeepOut, p: Point) -> Any:
     if isinstance(place, Block):
         beyond = _beyond(place, p)
         return ca.if_else(_inside(beyond), _largest(beyond), ca.sqrt(_squared(beyond) + _TINY))
-    raise TypeError(f"{type(place).__name__} is no obstacle")
+    raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 
 def cable_outside(place: KeepOut, p: Point, p_end: Point) -> Any:
-    """How far the segment from p to p_end is outside an obstacle [m], negative inside."""
+    """Return the distance of the segment from p to p_end from an obstacle [m], negative inside."""
     if isinstance(place, Sphere):
         return _from_segment(ca.DM(place.centre), p, p_end) - place.radius
     if isinstance(place, Capsule):
@@ -63,18 +66,18 @@ def cable_outside(place: KeepOut, p: Point, p_end: Point) -> Any:
         shares = [0.0, 1.0, *_corners(place, p, p_end)]
         through = -_largest([-_largest(_beyond(place, p + share * (p_end - p))) for share in shares])
         return ca.if_else(_squared(nearest) > _TINY, ca.sqrt(_squared(nearest) + _TINY), through)
-    raise TypeError(f"{type(place).__name__} is no obstacle")
+    raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 
 def _beyond(place: Block, p: Point) -> list[Any]:
-    """How far p is beyond the faces of a box along each axis [m]; all negative inside."""
+    """Return how far p is beyond the faces of a box along each axis [m]; all negative inside."""
     low, high = np.array(place.min), np.array(place.max)
     beyond = ca.fabs(p - ca.DM((low + high) / 2)) - ca.DM((high - low) / 2)
     return [beyond[i] for i in range(3)]
 
 
 def _squared(beyond: list[Any]) -> Any:
-    """Squared distance from a box [m^2], zero inside."""
+    """Return the squared distance from a box [m^2], zero inside."""
     return sum(ca.fmax(value, 0.0) ** 2 for value in beyond)
 
 
@@ -83,10 +86,10 @@ def _inside(beyond: list[Any]) -> Any:
 
 
 def _nearest_share(place: Block, p: Point, p_end: Point) -> Any:
-    """Where a segment is nearest to a box.
+    """Return the share of a segment at which it is nearest to a box.
 
-    The squared distance is convex along it and its slope piecewise linear: bisection finds the piece, with nothing to
-    differentiate, and a step of Newton's the place in it, with its true derivatives.
+    The squared distance is convex along it and its slope piecewise linear: bisection selects the piece, with nothing to
+    differentiate, and a Newton step the place in it, with its true derivatives.
     """
     low, high, along = ca.DM(place.min), ca.DM(place.max), p_end - p
     rate = ca.sumsqr(along) * _TINY
@@ -107,7 +110,7 @@ def _nearest_share(place: Block, p: Point, p_end: Point) -> Any:
 
 
 def _corners(place: Block, p: Point, p_end: Point) -> list[Any]:
-    """Where on a segment the distance from a box may be least.
+    """Return the shares of a segment at which its distance from a box may be least.
 
     It is the largest of the six distances from the faces, each linear along the segment: convex with corners, where two
     of them are equal.

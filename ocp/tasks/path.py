@@ -29,14 +29,14 @@ class Motion(NamedTuple):
         return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))
 
     def timed(self, sd: np.ndarray, sdd: np.ndarray) -> Motion:
-        """The motion over time of a curve by s, from ds/dt [1/s] and d2s/dt2 [1/s^2] at each of its points, (n,)."""
+        """Return the motion over time of a curve by s, from ds/dt [1/s] and d2s/dt2 [1/s^2] at its points, (n,)."""
         shape = (-1, *[1] * (self.pose.ndim - 1))
         sd, sdd = np.reshape(sd, shape), np.reshape(sdd, shape)
         return Motion(self.pose, self.velocity * sd, self.velocity * sdd + self.acceleration * sd**2)
 
 
 def _with_level_attitude(value: object) -> object:
-    """Let (x, y, z) stand for a level pose."""
+    """Complete (x, y, z) to a level pose."""
     return (*value, 0.0, 0.0, 0.0) if isinstance(value, list | tuple) and len(value) == 3 else value
 
 
@@ -44,28 +44,28 @@ PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]
 
 
 class PathBase(Part):
-    """What all paths share."""
+    """The base of all paths."""
 
-    frame: str = Field(default="world", description="what the path is given in: world, or the name of the only carrier")
+    frame: str = Field(default="world", description="frame of the path: world, or the name of the only carrier")
 
     @property
     def natural_duration(self) -> float | None:
-        """How long the path takes by its own numbers [s]; None: as long as the task says."""
+        """Return the duration by the path's own numbers [s]; None: the task gives it."""
         return None
 
     @property
     def stretches(self) -> bool:
-        """Whether another duration means the same places, later or sooner."""
+        """Return whether another duration means the same places, later or sooner."""
         return False
 
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        """Pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
-        raise TypeError(f"{type(self).__name__} is no path")
+        """Return pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
+        raise TypeError(f"{type(self).__name__} is not a path")
 
     def by_fraction(self, s: np.ndarray, until: float | None = None) -> Motion:
-        """Pose and derivatives by s, the fraction of the path's own time: from 0 to 1.
+        """Return pose and derivatives by s, the fraction of the path's own time, from 0 to 1.
 
-        `until` is when the path ends by its own time [s]; None: after its natural duration, or 1 s.
+        `until` is the end of the path by its own time [s]; None: its natural duration, or 1 s.
         """
         whole = until or self.natural_duration or 1.0
         motion = self.at(np.asarray(s) * whole, whole)
@@ -73,7 +73,7 @@ class PathBase(Part):
 
 
 class RestPath(PathBase):
-    """Stays where it is."""
+    """A pose that is held."""
 
     kind: Literal["rest"]
     pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
@@ -125,7 +125,7 @@ class CirclePath(PathBase):
     kind: Literal["circle"]
     centre: Vector3 = Field(description="[m]")
     radius: NonNegative = Field(description="[m]")
-    rate: Finite = Field(description="[rad/s], positive: counter-clockwise seen from above")
+    rate: Finite = Field(description="[rad/s], positive: counter-clockwise from above")
     phase: Finite = Field(default=0.0, description="angle at the start, from the x axis [rad]")
     drift: Vector3 = Field(default=(0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
     attitude: Vector3 = Field(default=(0.0, 0.0, 0.0), description="constant (roll, pitch, yaw) [rad]")
@@ -160,12 +160,13 @@ class WaypointPath(PathBase):
     kind: Literal["waypoints"]
     points: tuple[PoseOrPosition, ...] = Field(min_length=2, description="two poses or positions or more [m, rad]")
     times: tuple[Finite, ...] | None = Field(
-        default=None, description="when to be there, from 0 on, rising [s]; none: by distance over the duration"
+        default=None,
+        description="time of each point, from 0 on, increasing [s]; default: by distance over the duration",
     )
     timing: Literal["smooth", "uniform"] = Field(
         default="smooth",
         description="smooth: of degree 7, from rest to rest, acceleration and jerk zero there; uniform: the natural "
-        "cubic, which does not rest anywhere",
+        "cubic, which rests nowhere",
     )
 
     @model_validator(mode="after")
@@ -174,7 +175,7 @@ class WaypointPath(PathBase):
             _check_times(self.times, len(self.points))
         for index, (before, after) in enumerate(pairwise(self.points)):
             if before == after and self.times is None:
-                raise ValueError(f"points[{index + 1}] is points[{index}] again; accepted: different points, or times")
+                raise ValueError(f"points[{index + 1}] must differ from points[{index}] unless there are times")
         return self
 
     @property
@@ -200,7 +201,7 @@ class WaypointPath(PathBase):
         return Motion(spline(times), spline(times, 1), spline(times, 2))
 
     def knots(self, duration: float) -> np.ndarray:
-        """When the path is at its points [s]."""
+        """Return the times at which the path is at its points [s]."""
         if self.times is not None:
             return np.array(self.times)
         steps = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)  # a radian counts as a metre
@@ -208,10 +209,10 @@ class WaypointPath(PathBase):
 
 
 class SamplePath(PathBase):
-    """A quintic spline through samples, with whatever speed they have at their ends."""
+    """A quintic spline through samples; speeds at its ends are those of the samples."""
 
     kind: Literal["samples"]
-    times: tuple[Finite, ...] = Field(min_length=6, description="from 0 on, rising [s]")
+    times: tuple[Finite, ...] = Field(min_length=6, description="from 0 on, increasing [s]")
     poses: tuple[PoseOrPosition, ...] = Field(min_length=6, description="a pose or position at each time [m, rad]")
 
     @model_validator(mode="after")
@@ -246,32 +247,30 @@ class TimedPath(PathBase):
     kind: Literal["timed"]
     along: Curve = Field(description="the path; s is the fraction of its own time")
     until: Positive | None = Field(
-        default=None, description="when it ends by its own time [s]; none: after its natural duration"
+        default=None, description="end of the path by its own time [s]; default: its natural duration"
     )
-    s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, rising")
+    s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, increasing")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
 
     @model_validator(mode="after")
     def _law_fits(self) -> Self:
         if len(self.s) != len(self.speeds):
-            raise ValueError(
-                f"speeds must be one for each s, but there are {len(self.speeds)} speeds and {len(self.s)} s"
-            )
+            raise ValueError(f"speeds must have one number for each of the {len(self.s)} s, got {len(self.speeds)}")
         if self.s[0] != 0 or self.s[-1] != 1:
-            raise ValueError(f"s must go from 0 to 1, but it goes from {self.s[0]:g} to {self.s[-1]:g}")
+            raise ValueError(f"s must go from 0 to 1, got {self.s[0]:g} to {self.s[-1]:g}")
         for index, (before, after) in enumerate(pairwise(self.s)):
             if after <= before:
-                raise ValueError(f"s must rise, but s[{index + 1}] = {after:g} follows {before:g}")
+                raise ValueError(f"s must increase, got s[{index + 1}] = {after:g} after {before:g}")
         for index, (before, after) in enumerate(pairwise(self.speeds)):
             if before == after == 0:
-                raise ValueError(f"speeds[{index}] and speeds[{index + 1}] are both 0; accepted: no two in a row")
+                raise ValueError(f"speeds must not be 0 twice in a row, got 0 at {index} and {index + 1}")
         if self.frame != self.along.frame:
-            raise ValueError(f"frame: {self.frame!r} is not that of along; accepted: {self.along.frame!r}")
+            raise ValueError(f"frame must be that of along, {self.along.frame!r}, got {self.frame!r}")
         return self
 
     @cached_property
     def times(self) -> np.ndarray:
-        """When the path is at each s, (n,) [s]."""
+        """Return the time at which the path is at each s, (n,) [s]."""
         speeds = np.array(self.speeds)
         return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (speeds[1:] + speeds[:-1]))])
 
@@ -281,7 +280,7 @@ class TimedPath(PathBase):
         return float(self.times[-1])
 
     def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
+        """Return s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
         knots, s, speeds = self.times, np.array(self.s), np.array(self.speeds)
         k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
         rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (2 * (s[k + 1] - s[k]))
@@ -304,9 +303,9 @@ AnyPath = Annotated[
 
 def _check_times(times: tuple[float, ...], count: int) -> None:
     if len(times) != count:
-        raise ValueError(f"times must be one for each point, but there are {len(times)} times and {count} points")
+        raise ValueError(f"times must have one number for each of the {count} points, got {len(times)}")
     if times[0] != 0:
-        raise ValueError(f"times must start at 0 s, but the first is {times[0]:g} s")
+        raise ValueError(f"times must start at 0 s, got {times[0]:g} s")
     for index, (before, after) in enumerate(pairwise(times)):
         if after <= before:
-            raise ValueError(f"times must rise, but times[{index + 1}] = {after:g} s follows {before:g} s")
+            raise ValueError(f"times must increase, got times[{index + 1}] = {after:g} s after {before:g} s")

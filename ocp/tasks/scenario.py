@@ -15,24 +15,25 @@ import numpy as np
 
 from ...errors import InputError
 from ...models import Dynamics, Robot
+from ...models.ranges import PositiveRange
 from ...models.robot import MobileCarrier, QuadrotorCarrier, Vector3
 from .carrier_paths import by_index
 from .clearance import point_outside
 from .path import AnyPath, Motion, RestPath
 from .scheme import LINEAR, SCHEMES, Scheme
-from .task import DurationRange, FreeBase, GivenBase, HoldBase, Task
+from .task import FreeBase, GivenBase, HoldBase, Task
 from .task_limits import OF_CARRIERS
 from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
-LEAST_INTERVALS = 200  # of the audit: a motion of a millisecond has an inside too
+LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too
 MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 
 @dataclass(frozen=True)
 class CarrierLimits:
-    """What one carrier may do; None or infinite: no limit."""
+    """The limits of one carrier; None or infinite: no limit."""
 
     acceleration: float | None  # [m/s^2]
     speed: float | None  # [m/s]
@@ -43,7 +44,7 @@ class CarrierLimits:
     attitude: np.ndarray | None  # (3,) that it keeps [rad]
 
     def without(self, soft: Collection[str]) -> CarrierLimits:
-        """The same without the limits that are soft."""
+        """Return the limits without those that are soft."""
         dropped: dict[str, Any] = {
             name: None for name in ("acceleration", "speed", "tilt", "turn_acceleration") if f"carrier_{name}" in soft
         }
@@ -52,7 +53,7 @@ class CarrierLimits:
         return replace(self, **dropped)
 
     def shrunk(self, share: float) -> CarrierLimits:
-        """Acceleration and speed limits less a share of themselves, for what happens between the nodes."""
+        """Return the limits with acceleration and speed reduced by a share, for what happens between the nodes."""
         keep = 1.0 - share
         acceleration = self.acceleration and self.acceleration * keep
         turn = self.turn_acceleration and self.turn_acceleration * keep
@@ -63,7 +64,7 @@ class CarrierLimits:
 class Deviation:
     """Values of the free coordinates at the points of a transcription, and by its scheme at all times between.
 
-    A scheme with inner points has those among the nodes.
+    The inner points of a scheme are among the nodes.
     """
 
     nodes: np.ndarray  # (k,) [s]
@@ -75,17 +76,17 @@ class Deviation:
     jerk: np.ndarray | None = None  # (k, n), where the scheme is smooth
 
     def evaluate(self, times: np.ndarray) -> list[np.ndarray]:
-        """q, v, a and jerk at `times` (k,), (k, n) each."""
+        """Return q, v, a and jerk at `times` (k,), (k, n) each."""
         return self.scheme.evaluate(self.nodes, (self.q, self.v, self.a), self.jerk, times)
 
     def at(self, nodes: np.ndarray) -> Deviation:
-        """The values of the same motion at other nodes, to start from: between them the line is assumed."""
+        """Return the same motion at other nodes as an initial guess: tensions are interpolated."""
         q, v, a, jerk = self.evaluate(nodes)
         tensions = [np.interp(nodes, self.nodes, column) for column in self.tensions.T]
         return Deviation(nodes, q, v, a, np.stack(tensions, axis=1), jerk=jerk)
 
     def stretched(self, factor: float) -> Deviation:
-        """The same way in `factor` times the time."""
+        """Return the same path in `factor` times the time."""
         jerk = None if self.jerk is None else self.jerk / factor**3
         return replace(self, nodes=self.nodes * factor, v=self.v / factor, a=self.a / factor**2, jerk=jerk)
 
@@ -119,26 +120,26 @@ class Scenario:
 
     @property
     def scheme(self) -> Scheme:
-        """How the acceleration runs between the nodes."""
+        """Return the scheme of the acceleration between the nodes."""
         return SCHEMES[self.task.scheme]
 
     @property
-    def duration_range(self) -> DurationRange | None:
-        """What the planner may choose the duration from; None if it is given."""
-        return self.task.duration if isinstance(self.task.duration, DurationRange) else None
+    def duration_range(self) -> PositiveRange | None:
+        """Return the range from which the planner chooses the duration; None if it is given."""
+        return self.task.duration if isinstance(self.task.duration, PositiveRange) else None
 
     @property
     def wind(self) -> Vector3 | None:
-        """The wind of the planned tensions in {G} [m/s]: of a box its middle; None: no air."""
+        """Return the wind of the planned tensions in {G} [m/s], of a box its middle; None: no air."""
         return self.task.wind.middle if isinstance(self.task.wind, WindBox) else self.task.wind
 
     @property
     def wind_box(self) -> WindBox | None:
-        """All winds in which tensions have to exist; None if the task has one wind or none."""
+        """Return the box of winds in which tensions must exist; None if the task has one wind or none."""
         return self.task.wind if isinstance(self.task.wind, WindBox) else None
 
     def winds_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[Vector3 | None]:
-        """In which winds tensions have to exist as the platform moves (6,), in {G}: of a box in those that decide.
+        """Return the winds in which tensions must exist at a motion (6,) in {G}; of a box those that decide.
 
         [None]: no air.
         """
@@ -149,44 +150,44 @@ class Scenario:
 
     @property
     def decisive_winds(self) -> int:
-        """How many winds of the box decide whether tensions exist in all."""
+        """Return how many winds of the box decide whether tensions exist in all."""
         aero, box = self.robot.platform.aero, self.wind_box
         return 0 if aero is None or box is None else len(choices(box, aero))
 
     def lasting(self, seconds: float) -> Scenario:
-        """The same with another duration [s]."""
+        """Return the scenario with another duration [s]."""
         return replace(self, duration=seconds)
 
     def along(self, path: AnyPath, seconds: float) -> Scenario:
-        """The same with another path of the platform, in the same frame, and its duration [s]."""
+        """Return the scenario with another path of the platform, in the same frame, and its duration [s]."""
         return replace(self, path=path, duration=seconds)
 
     @property
     def count(self) -> int:
-        """Number n of free coordinates."""
+        """Return the number n of free coordinates."""
         return len(self.platform_free) + len(self.carrier_free)
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the task leaves nothing to choose but tensions."""
+        """Return whether the task leaves nothing to choose but tensions."""
         return self.count == 0 and self.duration_range is None
 
     @property
     def output_samples(self) -> int:
-        """How many intervals the saved trajectory has."""
+        """Return how many intervals the saved trajectory has."""
         return max(round(self.duration * self.task.output_rate), 1)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Tension limits less the task's margin where that is hard, (m,) each [N]."""
+        """Return the tension limits less the task's margin if that is hard, (m,) each [N]."""
         return self.robot.t_min + self.hard_margin, self.robot.t_max - self.hard_margin
 
     @property
     def hard_margin(self) -> float:
-        """How far every tension has to stay inside its limits [N]; a soft margin is among `limits`."""
+        """Return how far every tension must stay inside its limits [N]; a soft margin is among `named_limits`."""
         return 0.0 if "margin" in self.task.limits.soft else self.task.margin
 
     def references(self, times: np.ndarray) -> tuple[Motion, list[Motion]]:
-        """The platform's path, in its own frame, and the carriers' reference motions in {G}."""
+        """Return the platform's path, in its own frame, and the carriers' reference motions in {G}."""
         platform = self.path.at(times, self.duration)
         carriers = []
         for index, home in enumerate(self.robot.carrier_home):
@@ -197,7 +198,7 @@ class Scenario:
         return platform, carriers
 
     def motion(self, times: np.ndarray, deviation: Deviation | None) -> tuple[Motion, Motion]:
-        """Platform, (n, 6) each, and carriers, (n, c, 6) each, in {G} with their deviations."""
+        """Return the motion of platform, (n, 6) each, and carriers, (n, c, 6) each, in {G} with their deviations."""
         platform, carriers = self.references(times)
         if deviation is not None:
             values = deviation.evaluate(times)[:3]
@@ -211,7 +212,7 @@ class Scenario:
         return platform, stacked
 
     def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
-        """How far the platform at `motion` in {G} is from its path, (n, 6) [m, rad], along the path's own axes."""
+        """Return the offset of the platform at `motion` in {G} from its path, (n, 6) [m, rad], in the path's axes."""
         wanted = self.path.at(times, self.duration).pose
         pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
         off = pose - wanted
@@ -219,7 +220,7 @@ class Scenario:
         return off
 
     def _spread(self, value: np.ndarray, carrier: int | None) -> np.ndarray:
-        """Free coordinates (n, count) as the six of the platform (None) or of a carrier."""
+        """Return the free coordinates (n, count) as the six of the platform (None) or of a carrier."""
         spread = np.zeros((len(value), 6))
         for column, owner in enumerate(self.owners()):
             if owner[0] == carrier:
@@ -227,13 +228,13 @@ class Scenario:
         return spread
 
     def free_limits(self, shrink: float = 0.0) -> dict[int, CarrierLimits]:
-        """Hard limits of the carriers that the planner moves, lowered by the share `shrink` where that makes sense."""
+        """Return hard limits of the carriers that the planner moves, reduced by the share `shrink` where possible."""
         free = {index for index, _ in self.carrier_free}
         soft = self.task.limits.soft
         return {index: limit.without(soft).shrunk(shrink) for index, limit in self.limits.items() if index in free}
 
     def owners(self) -> list[tuple[int | None, int]]:
-        """Whose coordinate each free one is: (None for the platform or the carrier's index, coordinate)."""
+        """Return the owner of each free coordinate: (None for the platform or the carrier's index, coordinate)."""
         return [*((None, coordinate) for coordinate in self.platform_free), *self.carrier_free]
 
 
@@ -250,11 +251,11 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:
             raise InputError(
-                f"{where}: margin: {task.margin:g} N leaves nothing of the limits of cable {index + 1}, {low:g} N to "
-                f"{high:g} N; accepted: at most {(high - low) / 2:g} N"
+                f"{where}: margin must be at most {(high - low) / 2:g} N, half the range of cable {index + 1} "
+                f"({low:g} N to {high:g} N), got {task.margin:g} N"
             )
     if task.wind is not None and robot.platform.aero is None:
-        raise InputError(f"{where}: wind: robot {robot.name!r} has no platform.aero; accepted: none")
+        raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
     if isinstance(task.wind, WindBox):
         _feels_no_tensions(robot, where)
     _fit_limits(robot, task, where)
@@ -282,8 +283,8 @@ def _feels_no_tensions(robot: Robot, where: str) -> None:
     for carrier in robot.carriers:
         if carrier.kind == "quadrotor":
             raise InputError(
-                f"{where}: wind: is a box, but carrier {carrier.name!r} of kind quadrotor moves with its cables' pull, "
-                "so no motion is the same in every wind; accepted: one wind, (x, y, z) [m/s]"
+                f"{where}: wind must be one wind, (x, y, z) [m/s], got a box: carrier {carrier.name!r} of kind "
+                "quadrotor moves with the pull of its cables, so that no motion is the same in every wind"
             )
 
 
@@ -292,12 +293,16 @@ def _fit_limits(robot: Robot, task: Task, where: str) -> None:
     kinds = {carrier.kind for carrier in robot.carriers}
     for name in task.limits.soft:
         if name in ("thrust", "torque") and "quadrotor" not in kinds:
-            raise InputError(f"{where}: limits.soft: {name!r} is of quadrotors, and robot {robot.name!r} has none")
+            raise InputError(
+                f"{where}: limits.soft must not name {name!r}, a limit of quadrotors: {robot.name!r} has none"
+            )
         if name == "carrier_reach" and "mobile" not in kinds:
-            raise InputError(f"{where}: limits.soft: {name!r} is of mobile carriers, and robot {robot.name!r} has none")
+            raise InputError(
+                f"{where}: limits.soft must not name {name!r}, a limit of mobile carriers: {robot.name!r} has none"
+            )
         if name.startswith("carrier_") and name in OF_CARRIERS and kinds == {"ground"}:
             raise InputError(
-                f"{where}: limits.soft: {name!r} is of carriers that move, and robot {robot.name!r} has none"
+                f"{where}: limits.soft must not name {name!r}, a limit of moving carriers: {robot.name!r} has none"
             )
     for place in task.limits.keep_out:
         if place.frame == "platform" and place.cables is not None:
@@ -305,9 +310,8 @@ def _fit_limits(robot: Robot, task: Task, where: str) -> None:
                 outside = float(point_outside(place, ca.DM(attachment)))
                 if outside < place.cables:
                     raise InputError(
-                        f"{where}: limits.keep_out: {place.name!r}: the attachment of cable {index + 1} is always "
-                        f"{outside:.3g} m outside of it; accepted: a shape that leaves attachments outside by as much "
-                        f"as cables: {place.cables:g} m"
+                        f"{where}: limits.keep_out {place.name!r} must leave all attachments outside by as much as "
+                        f"cables, {place.cables:g} m, got {outside:.3g} m for cable {index + 1}"
                     )
 
 
@@ -316,7 +320,7 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
     only = robot.carriers[0].name if len(robot.carriers) == 1 else None
     if frame != "world" and frame != only:
         accepted = "world" if only is None else f"world, {only}"
-        raise InputError(f"{where}: path.frame: {frame!r} is unknown; accepted: {accepted}")
+        raise InputError(f"{where}: path.frame must be one of {accepted}, got {frame!r}")
     return frame != "world"
 
 
@@ -324,48 +328,50 @@ def _check_transcription(task: Task, where: str) -> None:
     """Refuse what the scheme or the solver cannot do."""
     if task.solver == "fatrop" and getattr(task.base, "ends", None) == "periodic":
         raise InputError(
-            f"{where}: solver: 'fatrop' goes from stage to stage, but base.ends: 'periodic' binds the last to the "
-            "first; accepted: ipopt, or base.ends free, rest or exact"
+            f"{where}: solver must be ipopt if base.ends is periodic, got fatrop, which cannot couple the "
+            "last stage to the first"
         )
     for name, value in (("limits", task.limits), ("objective", task.objective)):
         if value.tension_rate is not None and not SCHEMES[task.scheme].continuous:
             accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if scheme.continuous)
             raise InputError(
-                f"{where}: {name}.tension_rate: {value.tension_rate:g} N/s, but with the scheme {task.scheme!r} "
-                f"tensions jump at the nodes; accepted: none, or scheme: {accepted}"
+                f"{where}: {name}.tension_rate must be left out with the scheme {task.scheme!r}, whose tensions jump "
+                f"at the nodes, got {value.tension_rate:g} N/s; schemes without jumps: {accepted}"
             )
 
 
 def _check_times(task: Task, where: str) -> None:
-    """Refuse a task that does not last as long as its waypoints: beyond their times a spline is anything."""
-    longest = task.duration.max if isinstance(task.duration, DurationRange) else task.seconds
+    """Refuse a task longer or shorter than its waypoints: beyond their times a spline is arbitrary."""
+    longest = task.duration.max if isinstance(task.duration, PositiveRange) else task.seconds
     if longest * AUDIT_RATE > MOST_SAMPLES:
         raise InputError(
-            f"{where}: duration: {longest:g} s; accepted: at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the "
-            f"audit looks {AUDIT_RATE:g} times a second"
+            f"{where}: duration must be at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the audit evaluates "
+            f"{AUDIT_RATE:g} instants per second, got {longest:g} s"
         )
     if longest * task.output_rate > MOST_SAMPLES:
         raise InputError(
-            f"{where}: output_rate: {task.output_rate:g} 1/s for {longest:g} s; accepted: at most "
-            f"{MOST_SAMPLES / longest:g} 1/s, {MOST_SAMPLES} samples in all"
+            f"{where}: output_rate must be at most {MOST_SAMPLES / longest:g} 1/s, {MOST_SAMPLES} samples in "
+            f"{longest:g} s, got {task.output_rate:g} 1/s"
         )
     paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
-    if isinstance(task.duration, DurationRange):
+    if isinstance(task.duration, PositiveRange):
         for name, path in paths.items():
             if not path.stretches:
                 raise InputError(
-                    f"{where}: duration: is to be chosen, but {name} of kind {path.kind} has times of its own; "
-                    "accepted: a number [s], or paths of kind rest, line, waypoints without times"
+                    f"{where}: duration must be a number [s], got a range, while {name} of kind {path.kind} has "
+                    "times of its own; paths of kind rest, line, and waypoints without times take a range"
                 )
     for name, path in paths.items():
         end = path.natural_duration if path.kind in ("waypoints", "samples") else None
         if end is not None and task.seconds > end * (1 + 1e-9):
             raise InputError(
-                f"{where}: duration: {task.seconds:g} s is longer than {name}, whose times end at {end:g} s"
+                f"{where}: duration must be at most {end:g} s, where the times of {name} end, got {task.seconds:g} s"
             )
     end = task.path.natural_duration if task.path.kind in ("waypoints", "samples") else None
     if end is not None and task.seconds < end * (1 - 1e-9):
-        raise InputError(f"{where}: duration: {task.seconds:g} s is shorter than path, whose times end at {end:g} s")
+        raise InputError(
+            f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"
+        )
 
 
 def _carrier_paths(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> dict[int, AnyPath]:
@@ -380,7 +386,7 @@ def _carrier_paths(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
 
 
 def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:
-    """(carrier, coordinate) pairs that the planner chooses."""
+    """Return the (carrier, coordinate) pairs that the planner chooses."""
     if not isinstance(base, FreeBase):
         return []
     free: list[tuple[int, int]] = []
@@ -393,13 +399,14 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
             free += [(index, coordinate) for coordinate in POSITION]
     if not free:
         raise InputError(
-            f"{where}: base.kind: 'free', but robot {robot.name!r} has no carrier that moves (drive: {robot.drive})"
+            f"{where}: base.kind must be hold or given, got free: robot {robot.name!r} has no carrier that moves "
+            f"(drive: {robot.drive})"
         )
     return free
 
 
 def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, CarrierLimits]:
-    """Limits of carriers by index: the robot's own whatever the base does, and the task's for a free base."""
+    """Return limits of carriers by index: always the robot's own, and the task's for a free base."""
     limits = {}
     free = base if isinstance(base, FreeBase) else None
     for index, carrier in enumerate(robot.carriers):
@@ -443,7 +450,7 @@ def _tighter(first: float | None, second: float) -> float:
 
 
 def _pose_in(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """Poses (n, 6) in {G} as seen from the frames at poses (n, 6), by scipy's rotations."""
+    """Return poses (n, 6) given in {G} relative to frames at poses (n, 6), by scipy's rotations."""
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_euler("ZYX", frame[:, 5:2:-1])

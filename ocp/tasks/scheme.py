@@ -1,4 +1,4 @@
-"""Transcription schemes: which polynomial of time the acceleration is between two nodes, and where A t = w is asked.
+"""Transcription schemes: which polynomial of time the acceleration is between two nodes, and where A t = w is required.
 
 Inverse dynamics makes the differential equation a chain of integrators, which every scheme integrates exactly: position
 and speed at the nodes are no approximation. Schemes differ in two choices only:
@@ -35,7 +35,7 @@ SchemeName = Literal["constant", "linear", "hermite", "gauss", "spline"]
 
 @dataclass(frozen=True)
 class Scheme:
-    """One scheme.
+    """A transcription scheme.
 
     An interval has a point at its start, one at each share in `inner`, and one at its end, which is the next
     interval's start. Every point has q, v and a.
@@ -63,26 +63,26 @@ class Scheme:
 
     @property
     def size(self) -> int:
-        """How many points each interval adds."""
+        """Return how many points each interval adds."""
         return 1 + len(self.inner)
 
     @property
     def derivatives(self) -> int:
-        """How many of q, v, a, jerk, snap are unknowns."""
+        """Return how many of q, v, a, jerk, snap are unknowns."""
         return 5 if self.smooth else 3
 
     def shares(self, steps: int) -> np.ndarray:
-        """Where the points of all intervals are, (steps * size + 1,), shares of the duration."""
+        """Return the points of all intervals as shares of the duration, (steps * size + 1,)."""
         starts = np.arange(steps)[:, None] + np.array([0.0, *self.inner])
         return np.append(starts.ravel(), steps) / steps
 
-    def asked(self, steps: int) -> np.ndarray:
-        """At which points A t = w and the limits are asked, indices."""
+    def balance_points(self, steps: int) -> np.ndarray:
+        """Return the indices of the points at which A t = w and the limits are required."""
         points = np.arange(steps * self.size + 1)
         return points if self.continuous else points[points % self.size != 0]
 
     def quadrature(self, steps: int) -> np.ndarray:
-        """Weights of the mean over the duration at all points, (steps * size + 1,)."""
+        """Return the weights of the mean over the duration at all points, (steps * size + 1,)."""
         weights = np.zeros(steps * self.size + 1)
         for k in range(steps):
             weights[k * self.size : (k + 1) * self.size + 1] += np.array(self.weights) / steps
@@ -90,19 +90,19 @@ class Scheme:
 
     @cached_property
     def _to_points(self) -> np.ndarray:
-        """From values where the balance is asked to Bernstein points of the polynomial through them."""
+        """Return the matrix from values at the balance points to the Bernstein points of their polynomial."""
         places = (0.0, *self.inner, 1.0) if self.continuous else self.inner
-        found = np.linalg.inv(bernstein.basis(self.degree, places))
-        return np.where(np.abs(found) < 1e-12, 0.0, found)
+        inverse = np.linalg.inv(bernstein.basis(self.degree, places))
+        return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)
 
     @property
     def inner_points(self) -> tuple[int, ...]:
-        """Bernstein points of the acceleration that are no value at a point: limits are asked there too."""
+        """Return the Bernstein points of the acceleration that are no value at a point: limits apply there too."""
         is_value = [(row != 0).sum() == 1 for row in self._to_points] if not self.smooth else [True, False, False, True]
         return tuple(i for i, known in enumerate(is_value) if not known)
 
     def acceleration(self, h: Values, a: Sequence[Values], jerk: tuple[Values, Values] | None = None) -> list[Values]:
-        """Bernstein points of the acceleration over an interval, `degree` + 1.
+        """Return the Bernstein points of the acceleration over an interval, `degree` + 1.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Scheme:
         a
             Accelerations at its points, start and end included.
         jerk
-            At start and end, for a smooth scheme; None: none is known, the line between the ends.
+            At start and end, for a smooth scheme; None: the line between the ends.
         """
         if self.smooth:
             start, end = a
@@ -126,7 +126,7 @@ class Scheme:
     def evaluate(
         self, nodes: np.ndarray, values: Motion, jerk: np.ndarray | None, times: np.ndarray
     ) -> list[np.ndarray]:
-        """Position, velocity, acceleration and jerk at `times` (k,), (k, n) each.
+        """Return position, velocity, acceleration and jerk at `times` (k,), (k, n) each.
 
         `values` are (q, v, a) at the points `nodes` of all intervals, (points, n) each, and `jerk` likewise or None. At
         a node where the acceleration jumps it is that of the interval to come.
@@ -150,7 +150,7 @@ class Scheme:
 
 
 def _snap_share(steps: int) -> np.ndarray:
-    """What the mean of a cubic spline through values at the nodes has beyond the trapezoid rule, (steps + 1,) weights.
+    """Return the weights that the mean of a cubic spline adds to those of the trapezoid rule, (steps + 1,).
 
     Over an interval the mean is (a + a')/2 - h^2/24 (s + s') with the snaps of s_{k-1} + 4 s_k + s_{k+1} =
     6/h^2 (a_{k-1} - 2 a_k + a_{k+1}), equal in the first two nodes and in the last two. With other weights for the cost

@@ -1,19 +1,21 @@
-"""What a task limits beside the tensions, as data: speeds, cables, distances, places to keep out of."""
+"""`TaskLimits`: what a task limits beside the tensions: speeds, cables, distances, places to keep out of."""
 
 from __future__ import annotations
 
+import difflib
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ...models import shapes
-from ...models.robot import Box, Finite, NonNegative, Part, Positive
+from ...models.ranges import Range
+from ...models.robot import Box, NonNegative, Part, Positive
 
-Distance = Annotated[NonNegative | None, Field(description="[m]; null: may be anywhere")]
+Distance = Annotated[NonNegative | None, Field(description="least distance [m]; null: no limit")]
 
 
-# Limits that the robot's file and the task's base have, under the names that `soft` knows them by.
+# Limits of the robot's file and the task's base, by their names in `soft`.
 OF_CARRIERS = (
     "carrier_speed",
     "carrier_acceleration",
@@ -25,23 +27,23 @@ OF_CARRIERS = (
 )
 
 
-# Limits that places in the frame of the platform make.
+# Limits that come from places in the frame of the platform.
 OF_BODY = ("cable_platform_clearance", "carrier_platform_clearance")
 
 
 class KeepOut(Part):
-    """What all places to keep out of share: by how much platform, carriers and cables stay outside.
+    """The base of all places to keep out of: by how much platform, carriers and cables stay outside.
 
     The platform counts as its CoM and its attachments, a carrier that can move as its origin, a cable as the line
-    between its ends. A place in the frame of the platform rides along with it: so the platform's own body is kept clear
-    of cables and carriers, limits known as cable_platform_clearance and carrier_platform_clearance. Cables end at their
-    attachments, so such a body has to leave these outside.
+    between its ends. A place in the frame of the platform moves with it: this keeps the platform's own body clear
+    of cables and carriers, by limits named cable_platform_clearance and carrier_platform_clearance. Cables end at their
+    attachments, so such a body must leave these outside.
     """
 
     name: str = Field(default="obstacle", min_length=1, max_length=60)
     frame: Literal["world", "platform"] = Field(
         default="world",
-        description="world: the place stands in {G}; platform: it rides along, and cables and carriers keep out of it",
+        description="world: fixed in {G}; platform: it moves with the platform, and cables and carriers keep out of it",
     )
     platform: Distance = 0.0
     carriers: Distance = 0.0
@@ -63,21 +65,8 @@ class Block(KeepOut, shapes.Block):
 AnyKeepOut = Annotated[Sphere | Capsule | Block, Field(discriminator="kind")]
 
 
-class Range(Part):
-    """From min to max."""
-
-    min: Finite
-    max: Finite
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.min > self.max:
-            raise ValueError(f"min: {self.min:g} is more than max: {self.max:g}; accepted: min <= max")
-        return self
-
-
 class TaskLimits(Part):
-    """Limits of this task; null: none. Each is hard unless `soft` names it.
+    """The limits of a task; default: no limit. Each is hard unless `soft` names it.
 
     Attributes
     ----------
@@ -87,20 +76,30 @@ class TaskLimits(Part):
         carrier_turn_acceleration, carrier_reach, thrust, torque.
     """
 
-    cable_speed: Positive | None = Field(default=None, description="of every cable's length, the winch [m/s]")
-    cable_length: Range | None = Field(default=None, description="of every cable [m]")
-    tension_rate: Positive | None = Field(default=None, description="of every tension [N/s]")
-    platform_speed: Positive | None = Field(default=None, description="of its frame's origin [m/s]")
-    platform_acceleration: Positive | None = Field(default=None, description="of its frame's origin [m/s^2]")
-    platform_turn: Positive | None = Field(default=None, description="angular velocity [rad/s]")
-    platform_tilt: Positive | None = Field(default=None, le=np.pi, description="of its z axis from the vertical [rad]")
-    platform_box: Box | None = Field(default=None, description="where its frame's origin may be, in {G} [m]")
-    cable_clearance: Positive | None = Field(
-        default=None, description="between cables that share neither anchor nor attachment [m]"
+    cable_speed: Positive | None = Field(default=None, description="rate of every cable's length, as of a winch [m/s]")
+    cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
+    tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
+    platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
+    platform_acceleration: Positive | None = Field(
+        default=None, description="acceleration of the platform frame's origin [m/s^2]"
     )
-    carrier_separation: Positive | None = Field(default=None, description="between the origins of carriers [m]")
+    platform_turn: Positive | None = Field(default=None, description="angular velocity of the platform [rad/s]")
+    platform_tilt: Positive | None = Field(
+        default=None, le=np.pi, description="angle of the platform's z axis to the vertical [rad]"
+    )
+    platform_box: Box | None = Field(
+        default=None, description="box in {G} in which the platform frame's origin stays [m]"
+    )
+    cable_clearance: Positive | None = Field(
+        default=None, description="least distance of cables that share neither anchor nor attachment [m]"
+    )
+    carrier_separation: Positive | None = Field(
+        default=None, description="least distance of the origins of carriers [m]"
+    )
     keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="places to keep out of")
-    soft: dict[str, Positive] = Field(default={}, description="amount beyond a limit that costs one, by its name")
+    soft: dict[str, Positive] = Field(
+        default={}, description="by the name of a limit, the amount beyond it that costs one"
+    )
 
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
@@ -109,6 +108,8 @@ class TaskLimits(Part):
         given += ["keep_out"] * ("world" in frames) + list(OF_BODY) * ("platform" in frames)
         for name in self.soft:
             if name not in (*given, "margin", *OF_CARRIERS):
-                accepted = ", ".join((*given, "margin", *OF_CARRIERS))
-                raise ValueError(f"soft: {name!r} is none of this task's limits; accepted: {accepted}")
+                names = (*given, "margin", *OF_CARRIERS)
+                close = difflib.get_close_matches(name, names, n=1)
+                meant = f", did you mean {close[0]!r}?" if close else ""
+                raise ValueError(f"soft must name limits of this task ({', '.join(names)}), got {name!r}{meant}")
         return self

@@ -40,33 +40,33 @@ _STEPS = 1.0 / 1.2207440846057596 ** np.arange(1, 4)
 
 
 class WindBox(Part):
-    """All winds from min to max, constant or not: whichever blows, tensions exist."""
+    """All winds from min to max, constant or not: tensions exist in every one of them."""
 
-    min: Vector3 = Field(description="in {G} [m/s]")
-    max: Vector3 = Field(description="in {G} [m/s]")
+    min: Vector3 = Field(description="corner in {G} [m/s]")
+    max: Vector3 = Field(description="corner in {G} [m/s]")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if low > high:
-                raise ValueError(f"min: {low:g} m/s is more than max: {high:g} m/s along {axis}; accepted: min <= max")
+                raise ValueError(f"min must be at most max, {high:g} m/s along {axis}, got {low:g} m/s")
         return self
 
     @property
     def middle(self) -> Vector3:
-        """The wind that the planned tensions are those of, in {G} [m/s]."""
+        """Return the wind of the planned tensions, in {G} [m/s]."""
         x, y, z = ((low + high) / 2 for low, high in zip(self.min, self.max, strict=True))
         return x, y, z
 
 
 def as_wind(values: np.ndarray) -> Vector3:
-    """The same (3,) as plain numbers."""
+    """Return the values (3,) as plain numbers."""
     x, y, z = (float(value) for value in values)
     return x, y, z
 
 
 def choices(box: WindBox, aero: Aero) -> list[tuple[int, int]]:
-    """Which value each of x and y has in the decisive winds: LOW, HIGH or ALONG."""
+    """Return which value each of x and y has in the decisive winds: LOW, HIGH or ALONG."""
     kinks = aero.lift > 0 or aero.form == "printed"
     x, y, _ = (
         [LOW] if low == high else [LOW, HIGH] + [ALONG] * kinks for low, high in zip(box.min, box.max, strict=True)
@@ -75,24 +75,24 @@ def choices(box: WindBox, aero: Aero) -> list[tuple[int, int]]:
 
 
 def decisive_winds(box: WindBox, robot: Robot, pose: Any, velocity: Any) -> list[Any]:
-    """The winds that decide at a motion of the platform in {G}, (6, 1) each: (3, 1) CasADi expressions [m/s]."""
+    """Return the winds that decide at a motion of the platform in {G}, (6, 1) each, as (3, 1) expressions [m/s]."""
     aero = robot.platform.aero
     if aero is None:
         return []
     moving = com_velocity(robot, pose, velocity)
-    found = []
+    winds = []
     for choice in choices(box, aero):
         # The force has a continuous derivative by the clipped wind, since it grows with the square of what clips.
         values = [
             (box.min[i], box.max[i], ca.fmin(ca.fmax(moving[i], box.min[i]), box.max[i]))[which]
             for i, which in enumerate(choice)
         ]
-        found.append(ca.vertcat(*values, box.middle[2]))
-    return found
+        winds.append(ca.vertcat(*values, box.middle[2]))
+    return winds
 
 
 def decisive_winds_at(box: WindBox, robot: Robot, pose: np.ndarray, velocity: np.ndarray) -> list[np.ndarray]:
-    """The same at many instants: poses and velocities (n, 6), winds (n, 3) each."""
+    """Return the winds that decide at many instants, (n, 3) each, from poses and velocities (n, 6)."""
     symbols = ca.SX.sym("pose", 6), ca.SX.sym("velocity", 6)
     function = ca.Function("winds", [*symbols], decisive_winds(box, robot, *symbols))
     values = function.map(len(pose)).call([ca.DM(pose.T), ca.DM(velocity.T)])
@@ -100,7 +100,7 @@ def decisive_winds_at(box: WindBox, robot: Robot, pose: np.ndarray, velocity: np
 
 
 def inner_winds(box: WindBox, count: int, first: int = 0) -> np.ndarray:
-    """Winds that fill the box evenly, (count, 3) [m/s], the same ones whenever asked; every fourth lies on a face."""
+    """Return winds that fill the box evenly, (count, 3) [m/s]; every fourth lies on a face."""
     index = np.arange(first + 1, first + count + 1)
     share = (0.5 + index[:, None] * _STEPS) % 1.0
     faces = np.flatnonzero(index % 4 == 0)

@@ -13,10 +13,11 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot, load
+from ...models.ranges import PositiveRange
 from ...models.statics import equilibria
 from ...ocp import Task
 from ...ocp.tasks.path import AnyPath, LinePath
-from ...ocp.tasks.task import AnyBase, DurationRange, FreeBase, HoldBase, Objective, Tube
+from ...ocp.tasks.task import AnyBase, FreeBase, HoldBase, Objective, Tube
 
 Drive = Literal["fixed-length", "variable-length", "both"]
 DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")
@@ -25,7 +26,7 @@ FIXED, LONG, SHORT = 1.2, 1.25, 1.1  # lengths [m]
 SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes
 TAUT = 0.1  # [N]: paper C wants tensions above zero
 SECONDS = 2.0  # of a motion with least effort
-SPAN = DurationRange(min=0.1, max=4.0)  # [s], of a motion in least time
+SPAN = PositiveRange(min=0.1, max=4.0)  # [s], of a motion in least time
 OBJECTIVES = {
     "effort": Objective(),
     "time": Objective(time=0.01, jerk=30.0, carrier_acceleration=2.0, carrier_offset=0.5),
