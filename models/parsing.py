@@ -94,7 +94,9 @@ def validate(data: dict[str, Any], model: type[Model], where: str) -> Model:
 
 def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     """One line for pydantic's first complaint: where, field, what is accepted, the value, and how many follow."""
+    # A misspelt key is why another one is missing: it comes first.
     details = _without_branches(error.errors(include_url=False))
+    details.sort(key=lambda one: one["type"] != "extra_forbidden")
     first = details[0]
     field, holder = _walk(first["loc"], _schema(model))
     key = str(first["loc"][-1]) if first["loc"] else ""

@@ -128,7 +128,7 @@ WRONG = {
     "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min must be at most max, 1, got 2"),
     "soft": (
         {"limits": {"cable_speed": 1, "soft": {"cable_sped": 0.1}}},
-        "soft must name limits of this task .cable_speed, .*got 'cable_sped' .did you mean 'cable_speed'",
+        "soft must name limits of this task .cable_speed, .*got 'cable_sped', did you mean 'cable_speed'",
     ),
     "box": (
         {"limits": {"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [1, 0, 1]}]}},
