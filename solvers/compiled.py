@@ -25,7 +25,7 @@ from ..writing import whole_file
 from .kernels import memory, single, wide
 from .kernels.codes import UNSURE
 
-__all__ = ["COMPILED", "INTERPRETED", "Kernels", "current", "load", "solve_packed"]
+__all__ = ["COMPILED", "INTERPRETED", "Kernels", "current", "load", "machine_code", "solve_packed"]
 
 COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
 
@@ -140,7 +140,7 @@ def _compile() -> Kernels:
             if signature is None or function.__module__ != space["__name__"]:
                 continue
             copy = FunctionType(function.__code__, space, function.__name__, function.__defaults__)
-            machine[function] = _jit(copy)
+            machine[function] = machine_code(copy)
             if signature:
                 signatures.append((machine[function], signature))
     for space in spaces:
@@ -157,7 +157,7 @@ def _compile() -> Kernels:
     return Kernels(COMPILED, packed, rows, simd_llvm.WIDTH)
 
 
-def _jit(function: FunctionType) -> Any:
+def machine_code(function: FunctionType) -> Any:
     """Mark a function for Numba, kept on the disk where there is a folder for that."""
     import numba
 

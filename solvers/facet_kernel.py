@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernels.jit import jit
+from .compiled import machine_code
 
 __all__ = ["facets", "full_rank"]
 
 LANES = 8
 
 
-@jit()
+@machine_code
 def facets(
     A: np.ndarray,
     low: np.ndarray,
@@ -103,7 +103,7 @@ def facets(
                 least[first + lane, k], most[first + lane, k] = down[lane], up[lane]
 
 
-@jit()
+@machine_code
 def full_rank(A: np.ndarray, tolerance: float, full: np.ndarray) -> None:
     """Write to `full` (N,) whether each of A (N, n, m) has n independent columns, by QR with column pivoting.
 
