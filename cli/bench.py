@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_json
+from .options import PLAIN, Command, JsonOption, print_json
 
-app = typer.Typer(help="Measure towline against its peers on this machine.", no_args_is_help=True)
+app = typer.Typer(**PLAIN)
 
 
 @app.callback()
@@ -17,7 +17,7 @@ def _bench() -> None:
     """Measure towline against its peers on this machine."""
 
 
-@app.command("tension")
+@app.command("tension", cls=Command)
 def tension(
     count: Annotated[int, typer.Option(help="Random problems of each task.")] = 100,
     repeats: Annotated[int, typer.Option(help="Turns of each contender at each task.")] = 5,

@@ -12,22 +12,26 @@ from .options import JsonOption, RobotArgument, print_json
 
 def export(
     robot: RobotArgument,
-    mjcf: Annotated[bool, typer.Option("--mjcf", help="A MuJoCo model.")] = False,
+    mjcf: Annotated[bool, typer.Option("--mjcf", help="Write a MuJoCo model.")] = False,
     c_code: Annotated[
-        bool, typer.Option("--c", help="C code of the dynamics' functions, without dependencies.")
+        bool, typer.Option("--c", help="Write the functions of the dynamics as C code without dependencies.")
     ] = False,
-    out: Annotated[Path | None, typer.Option("--out", help="File to write; none: ROBOT.xml or ROBOT.c here.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="File to write; default: ROBOT.xml or ROBOT.c in this folder."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Export a robot as a MuJoCo model (--mjcf) or as C code (--c)."""
     from ..errors import InputError
     from ..models import load
-    from ..writing import whole_file
+    from ..writing import check_writable, whole_file
 
     if mjcf == c_code:
-        raise InputError("export: accepted: exactly one of --mjcf and --c")
+        raise InputError("export requires exactly one of --mjcf and --c")
     loaded = load(robot)
     path = out or Path(f"{loaded.name}{'.xml' if mjcf else '.c'}")
+    check_writable(path)
     if mjcf:
         from ..models.mjcf import to_mjcf
 

@@ -7,46 +7,57 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_json
+from .options import PLAIN, Command, JsonOption, print_json
 
-app = typer.Typer(help="Turn a robot of another program into a robot file.", no_args_is_help=True)
+app = typer.Typer(**PLAIN)
 
 
-@app.command("caspr")
+@app.callback()
+def _import() -> None:
+    """Convert a robot of another program to a robot file."""
+
+
+@app.command("caspr", cls=Command)
 def caspr(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with *_bodies.xml and *_cables.xml.")],
-    cable_set: Annotated[str | None, typer.Option("--cable-set", help="Id of a set of cables; none: default.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Robot file to write; none: standard output.")] = None,
+    cable_set: Annotated[
+        str | None, typer.Option("--cable-set", metavar="ID", help="The set of cables; default: CASPR's own default.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Robot file to write; default: standard output.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Turn a CASPR robot into a robot file, and say what it could not express."""
+    """Convert a CASPR robot to a robot file, and report what a robot file cannot express."""
     from ..models.caspr import read_caspr
     from ..models.parsing import to_yaml
-    from ..writing import whole_file
+    from ..writing import check_writable, whole_file
 
-    found = read_caspr(folder, cable_set)
-    text = to_yaml(found.robot)
+    if out is not None:
+        check_writable(out)
+    result = read_caspr(folder, cable_set)
+    text = to_yaml(result.robot)
     if out is not None:
         with whole_file(out) as temporary:
             temporary.write_text(text, encoding="utf-8")
     if as_json:
         print_json(
             {
-                "name": found.robot.name,
-                "cable_set": found.cable_set,
-                "cable_sets": found.cable_sets,
-                "notes": found.notes,
+                "name": result.robot.name,
+                "cable_set": result.cable_set,
+                "cable_sets": result.cable_sets,
+                "notes": result.notes,
                 "file": None if out is None else str(out),
-                "robot": found.robot.model_dump(mode="json", exclude_none=True),
+                "robot": result.robot.model_dump(mode="json", exclude_none=True),
             }
         )
         return
     if out is None:
         typer.echo(text, nl=False)
-    # Standard output may be a robot file on its way: what there is to say about it goes beside.
-    for note in found.notes:
+    # Standard output may be the robot file itself: notes go to standard error.
+    for note in result.notes:
         typer.echo(f"note: {note}", err=True)
-    others = [name for name in found.cable_sets if name != found.cable_set]
+    others = [name for name in result.cable_sets if name != result.cable_set]
     if others:
         typer.echo(f"note: other cable sets: {', '.join(others)}", err=True)
     if out is not None:

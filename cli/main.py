@@ -1,67 +1,149 @@
 """`towline`: the commands, and the one place where errors become a line and an exit code.
 
-Exit codes: 0, what was asked holds; 1, it does not (infeasible, not found); 2, wrong input.
+A command's module is imported only when the command runs or shows its help, so that `towline --help` starts at once.
+
+Exit codes: 0, the request holds; 1, it does not (infeasible, not found); 2, wrong input; 3, an error in towline itself;
+130, stopped by Ctrl-C.
 """
 
 from __future__ import annotations
 
+import difflib
+import os
 import sys
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from .. import __version__
-from ..errors import TowlineError
-from . import bench, demo, export, import_, plan, reproduce, robots, tension, time, view, workspace
+from ..errors import InputError, TowlineError
+from .options import PLAIN, Command
 from .stopping import end, requested
 
+COMMANDS = {
+    "demo": "Plan a circle of a flying cable robot and draw it: a first look.",
+    "robots": "List the robots of the library, or diagnose one.",
+    "tension": "Compute the cable tensions at one pose, by every method.",
+    "plan": "Plan a motion that keeps every tension inside its limits.",
+    "time": "Compute the fastest motion along a path.",
+    "workspace": "Sample the poses that a robot can reach.",
+    "view": "Show robots, plans and workspaces in the browser.",
+    "import": "Convert a robot of another program to a robot file.",
+    "reproduce": "Compute a paper's results again, claim by claim.",
+    "export": "Export a robot as a MuJoCo model or as C code.",
+    "bench": "Measure towline and other solvers on this machine.",
+}
+MODULES = {"import": "import_"}  # where the module is not named like the command
+TRACEBACK = "TOWLINE_TRACEBACK"  # environment variable: show the traceback of an error in towline itself
+UsageError = typer.BadParameter.__bases__[0]  # the base of all that Typer reports about a command line
+
+
+class Commands(TyperGroup):
+    """The group of all commands; each is imported when it is first used."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """List the names of the commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Import a command by its name.
+
+        Raises
+        ------
+        InputError
+            If no command has that name.
+        """
+        if cmd_name not in COMMANDS:
+            if ctx.resilient_parsing:
+                return None
+            close = difflib.get_close_matches(cmd_name, COMMANDS, n=1)
+            hint = f", did you mean {close[0]!r}" if close else ""
+            raise InputError(f"{cmd_name!r} is not a command{hint}; the commands are {', '.join(COMMANDS)}")
+        module = import_module(f".{MODULES.get(cmd_name, cmd_name)}", __package__)
+        if hasattr(module, "app"):
+            group = module.app
+        else:
+            group = typer.Typer(**PLAIN)
+            group.command(cmd_name, cls=Command)(getattr(module, cmd_name))
+        return typer.main.get_command(group)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands into the help, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
 app = typer.Typer(
-    help="Optimal control and tension distribution of cable robots.",
-    no_args_is_help=True,
-    rich_markup_mode="markdown",  # Rich's own markup takes units, [m], for its tags
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=Commands,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-app.command("demo")(demo.demo)
-app.command("robots")(robots.robots)
-app.command("tension")(tension.tension)
-app.command("plan")(plan.plan)
-app.command("time")(time.time)
-app.command("workspace")(workspace.workspace)
-app.command("view")(view.view)
-app.add_typer(import_.app, name="import")
-app.command("reproduce")(reproduce.reproduce)
-app.command("export")(export.export)
-app.add_typer(bench.app, name="bench")
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         typer.echo(f"towline {__version__}")
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Optimal control and tension distribution of cable robots."""
+    """Plan motions of cable robots and distribute the tensions of their cables.
+
+    The exit code is 0 if the request holds, 1 if it does not (infeasible, not found), and 2 for wrong input.
+    """
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
 def main() -> None:
-    """Run the command line; towline's own errors are one line on standard error and exit code 2."""
+    """Run the command line; an error is one line on standard error."""
     try:
-        app()
+        code = typer.main.get_command(app).main(prog_name="towline", standalone_mode=False)
         sys.stdout.flush()
     except BaseException as error:
         if requested() or isinstance(error, KeyboardInterrupt):
             end()  # whatever the interrupt has become meanwhile
-        if not isinstance(error, (TowlineError, OSError, MemoryError)):
+        if not isinstance(error, Exception):
             raise
-        typer.echo(f"towline: {str(error) or 'out of memory'}", err=True)
-        sys.exit(2)
+        code = _report(error)
+    if requested():
+        end()
+    sys.exit(code)
+
+
+def _report(error: Exception) -> int:
+    """Print an error as one line; return the exit code."""
+    if isinstance(error, BrokenPipeError):
+        # Whoever read the output has enough of it. Python flushes once more at its end: that goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    code = 2
+    if isinstance(error, UsageError):
+        message = _usage(error)
+    elif isinstance(error, TowlineError | OSError | MemoryError):
+        message = str(error) or "out of memory"
+    elif os.environ.get(TRACEBACK):
+        raise error
+    else:
+        code = 3
+        message = f"an error in towline itself: {type(error).__name__}: {error} ({TRACEBACK}=1 shows where)"
+    typer.echo(f"towline: {' '.join(message.split())}", err=True)
+    return code
+
+
+def _usage(error: Any) -> str:
+    """Return the message of a wrong command line."""
+    message = error.format_message().rstrip(".")
+    hint = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
+    return f"{message[:1].lower()}{message[1:]}{hint}"
 
 
 if __name__ == "__main__":

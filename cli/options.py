@@ -1,20 +1,33 @@
-"""Options that several commands share, and how their text is read."""
+"""Options that several commands share, how their text is read, and how results are printed."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
 
+# Rich takes half a second to load, squeezes help into columns, and takes units, [m], for its tags.
+PLAIN: dict[str, Any] = {"rich_markup_mode": None, "add_completion": False}
+
+
+class Command(TyperCommand):
+    """A command whose usage line names arguments without braces."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the parts of the usage line."""
+        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
+
 
 def robot_names(incomplete: str) -> list[str]:
-    """What a shell completes a robot's name to: those of the library, and files that shells know by themselves."""
-    from ..models import available
+    """Return the robots of the library that a shell can complete a name to; files it completes by itself."""
+    from ..models.library import available
 
     return [name for name in available() if name.startswith(incomplete)]
 
@@ -27,7 +40,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """Print as JSON; numbers that are not finite become null, which JSON has no name for."""
+    """Print as JSON; numbers that are not finite become null, since JSON has no name for them."""
     import json
     import math
 
@@ -41,23 +54,38 @@ def print_json(value: dict[str, Any]) -> None:
     typer.echo(json.dumps(clean(value), indent=2))
 
 
+def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], align: str) -> None:
+    """Print a table; `align` has one letter for each column, l for left and r for right.
+
+    A wide table is left to the terminal to wrap: a number that is cut would be another number.
+    """
+    lines = [headings, *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(headings))]
+    for line in lines:
+        cells = (
+            cell.rjust(width) if side == "r" else cell.ljust(width)
+            for cell, width, side in zip(line, widths, align, strict=True)
+        )
+        typer.echo("  ".join(cells).rstrip())
+
+
 def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.ndarray:
-    """Read "1 2 3" or "1,2,3" as an array of `count` numbers, or rows of it apart by ";".
+    """Read "1 2 3" or "1,2,3" as an array of `count` numbers, or as `rows` of them separated by ";".
 
     Raises
     ------
     InputError
-        Naming the option, what it was given and what is accepted.
+        If the text is anything else.
     """
     import numpy as np
 
-    expected = f"{count} finite numbers" + (f" for each of {rows} carriers, apart by ';'" if rows else "")
+    accepted = f"{count} finite numbers" + (f" for each of {rows} carriers, separated by ';'" if rows else "")
     parts = text.split(";") if rows else [text]
     try:
         values = [[float(word) for word in part.replace(",", " ").split()] for part in parts]
     except ValueError:
-        raise InputError(f"{option}: {text!r} is not a list of numbers; accepted: {expected}") from None
+        raise InputError(f"{option} must be {accepted}, got {text!r}") from None
     fits = all(len(row) == count for row in values) and (rows is None or len(values) == rows)
     if not fits or not np.isfinite(np.array(values)).all():
-        raise InputError(f"{option}: {text!r}; accepted: {expected}")
+        raise InputError(f"{option} must be {accepted}, got {text!r}")
     return np.array(values) if rows else np.array(values[0])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import JsonOption, print_json
+from .options import JsonOption, print_json, print_table, robot_names
 
 if TYPE_CHECKING:
     from ..models import Robot
@@ -16,70 +16,70 @@ if TYPE_CHECKING:
 
 
 def robots(
-    name: Annotated[str | None, typer.Argument(metavar="[ROBOT]", help="A robot or robot file to diagnose.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Draw the robot into this PNG file.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="ROBOT", help="A robot or robot file to diagnose.", autocompletion=robot_names),
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE", help="PNG file to draw the robot in.")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of robot files.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """List the robots of the library, or show one with its diagnosis: rank, limits, warnings."""
-    from ..models import Robot, available, load
+    """List the robots of the library, or diagnose one.
 
+    The diagnosis has the rank of the wrench matrix and its reason, the tensions at rest at home or the proof that
+    there are none, and warnings of implausible numbers.
+    """
     if schema:
+        from ..models import Robot
+
         print_json(Robot.model_json_schema())
     elif name is None:
-        _list([load(known) for known in available()], as_json)
+        from ..models.library import contents
+
+        _list(contents(), as_json)
     else:
         from ..distribution import pose_problem
-        from ..models import Dynamics
+        from ..models import Dynamics, load
         from ..models.diagnosis import diagnose
         from ..solvers import solve
 
         robot = load(name)
         at_home = solve(pose_problem(Dynamics(robot), robot.home))
-        found = _to_dict(robot, diagnose(robot), at_home)
+        result = _to_dict(robot, diagnose(robot), at_home)
         if figure is not None:
             _draw(robot, at_home, figure)
-            found["figure"] = str(figure)
+            result["figure"] = str(figure)
         if as_json:
-            print_json(found)
+            print_json(result)
         else:
-            _show(robot, found, at_home)
+            _show(robot, result, at_home)
 
 
-def _list(library: list[Robot], as_json: bool) -> None:
-    rows = [
-        {
-            "name": robot.name,
-            "cables": robot.m,
-            "carriers": ", ".join(f"{n} {kind}" for kind, n in _kinds(robot).items()),
-            "mass": robot.platform.mass,
-            "source": robot.source.strip().splitlines()[0].strip(),
-        }
-        for robot in library
-    ]
+def _list(library: list[dict[str, Any]], as_json: bool) -> None:
+    from ..text import quantity
+
+    rows = [{**robot, "carriers": _count(robot["carriers"])} for robot in library]
     if as_json:
         print_json({"robots": rows})
         return
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table("robot", "cables", "carriers", "mass [kg]", box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(row["name"], str(row["cables"]), row["carriers"], f"{row['mass']:g}")
-    Console().print(table)
+    print_table(
+        ("robot", "cables", "carriers", "mass"),
+        [(row["name"], str(row["cables"]), row["carriers"], quantity(row["mass"], "kg")) for row in rows],
+        "lrlr",
+    )
 
 
-def _kinds(robot: Robot) -> dict[str, int]:
-    kinds = [carrier.kind for carrier in robot.carriers]
-    return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+def _count(kinds: dict[str, int]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in kinds.items())
 
 
 def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> dict[str, Any]:
+    kinds = [carrier.kind for carrier in robot.carriers]
     return {
         "name": robot.name,
         "source": robot.source.strip(),
         "cables": robot.m,
-        "carriers": _kinds(robot),
+        "carriers": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
         "home": robot.home.tolist(),
         "mass": robot.platform.mass,
         "weight": robot.weight,
@@ -97,19 +97,23 @@ def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> di
     }
 
 
-def _show(robot: Robot, found: dict[str, Any], at_home: TensionSolution) -> None:
-    carriers = ", ".join(f"{count} {kind}" for kind, count in found["carriers"].items())
-    moves = len(robot.platform.dof)
-    rank = f"{found['rank']} of {moves} at home, {found['rank_level']} when level, {found['rank_tilted']} when tilted"
+def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> None:
+    from ..text import quantity, quantity_range, quantity_row
+
+    of = f"of {len(robot.platform.dof)}"
+    rank = f"rank {result['rank']} {of} at home, {result['rank_level']} when level, {result['rank_tilted']} when tilted"
     lines = [
-        f"{found['name']}: {found['cables']} cables; carriers: {carriers}",
-        f"  mass {found['mass']:g} kg, weight {found['weight']:.4g} N, characteristic length {found['length']:.4g} m",
-        f"  home ({_told(found['home'])}) m, rad; cables there {_range(found['cable_lengths'])} m long",
-        f"  tension limits: t_min {_range(found['t_min'])} N, t_max {_range(found['t_max'])} N",
-        f"  wrench matrix: rank {rank}" + (f": {found['reason']}" if found["reason"] else ""),
-        f"  singular values, moments over that length: {_told(found['singular_values'])}",
+        f"{result['name']}: {result['cables']} cables; carriers: {_count(result['carriers'])}",
+        f"  mass {quantity(result['mass'], 'kg')}, weight {quantity(result['weight'], 'N')}, "
+        f"characteristic length {quantity(result['length'], 'm')}",
+        f"  home ({quantity_row(result['home'])}) [m, rad], cable lengths there "
+        f"{quantity_range(result['cable_lengths'], 'm')}",
+        f"  tension limits: t_min {quantity_range(result['t_min'], 'N')}, t_max {quantity_range(result['t_max'], 'N')}",
+        f"  wrench matrix: {rank}" + (f": {result['reason']}" if result["reason"] else ""),
+        f"  its singular values, moments divided by the characteristic length: "
+        f"{quantity_row(result['singular_values'])}",
         *_rest(at_home),
-        *(f"  warning: {warning}" for warning in found["warnings"]),
+        *(f"  warning: {warning}" for warning in result["warnings"]),
         "  source:",
         *(f"    {line.strip()}" for line in robot.source.strip().splitlines()),
     ]
@@ -117,9 +121,13 @@ def _show(robot: Robot, found: dict[str, Any], at_home: TensionSolution) -> None
 
 
 def _rest(at_home: TensionSolution) -> list[str]:
-    """Whether the robot can rest at home, or the proof that it cannot."""
+    """Return the tensions that hold the robot at home, or the proof that there are none."""
+    from ..text import quantity_range
+
     if at_home.tensions is not None:
-        return [f"  at rest at home: tensions {_range(at_home.tensions.tolist())} N ({at_home.status.value})"]
+        return [
+            f"  at rest at home: tensions {quantity_range(at_home.tensions.tolist(), 'N')} ({at_home.status.value})"
+        ]
     lines = [f"  cannot rest at home ({at_home.status.value})"]
     if at_home.certificate is not None:
         lines += [f"    {line}" for line in at_home.certificate.describe().splitlines()]
@@ -150,12 +158,3 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
         feasible=feasible,
     )
     style.save(figure.draw(sketch), file)
-
-
-def _told(values: list[float]) -> str:
-    return ", ".join(f"{value:.4g}" for value in values)
-
-
-def _range(values: list[float]) -> str:
-    low, high = min(values), max(values)
-    return f"{low:.4g}" if high - low < 1e-9 * max(abs(high), 1) else f"{low:.4g} to {high:.4g}"

@@ -1,4 +1,4 @@
-"""`towline tension`: one tension distribution, by every method."""
+"""`towline tension`: the tensions of one instant, by every method."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import JsonOption, RobotArgument, numbers, print_json
+from .options import JsonOption, RobotArgument, numbers, print_json, print_table
 
 if TYPE_CHECKING:
     from ..models import Robot
@@ -17,34 +17,59 @@ SIX = "x y z roll pitch yaw"
 
 def tension(
     robot: RobotArgument,
-    pose: Annotated[str | None, typer.Option(help=f"Platform in {{G}}: '{SIX}' [m, rad]; none: home.")] = None,
-    velocity: Annotated[str | None, typer.Option(help="Its time derivative, six numbers; none: at rest.")] = None,
-    acceleration: Annotated[str | None, typer.Option(help="Its second derivative, six numbers; none: zero.")] = None,
-    carrier_pose: Annotated[
-        str | None, typer.Option(help=f"'{SIX}' of each carrier in {{G}}, apart by ';'; none: at home.")
+    pose: Annotated[
+        str | None,
+        typer.Option(metavar=f"'{SIX}'", help="Pose of the platform in the frame {G} [m, rad]; default: its home."),
     ] = None,
-    wind: Annotated[str | None, typer.Option(help="Air velocity in {G}: 'x y z' [m/s]; none: no air.")] = None,
+    velocity: Annotated[
+        str | None, typer.Option(metavar="'six numbers'", help="Time derivative of the pose; default: zero.")
+    ] = None,
+    acceleration: Annotated[
+        str | None, typer.Option(metavar="'six numbers'", help="Second time derivative of the pose; default: zero.")
+    ] = None,
+    carrier_pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'six numbers; ...'",
+            help="Pose of each carrier in {G} [m, rad], separated by ';'; default: their homes.",
+        ),
+    ] = None,
+    wind: Annotated[
+        str | None, typer.Option(metavar="'x y z'", help="Velocity of the air in {G} [m/s]; default: no air.")
+    ] = None,
     method: Annotated[
-        str, typer.Option(help="The method whose answer counts; the others stand beside it.")
+        str, typer.Option(metavar="NAME", help="The method whose result decides the exit code.")
     ] = "active-set",
-    backend: Annotated[str | None, typer.Option(help="QP solver for the method qp.")] = None,
+    backend: Annotated[str | None, typer.Option(metavar="NAME", help="QP solver of the method qp.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Distribute the tensions at one pose and motion, or prove that none exist (exit code 1)."""
+    """Compute the cable tensions at one pose and motion, by every method.
+
+    The exit code is 1 if no tensions inside the limits exist; the proof is printed then.
+    """
     from ..models import load
-    from ..solvers import methods, solve
+    from ..solvers import methods
 
     loaded = load(robot)
     problem, at = _problem(loaded, pose, velocity, acceleration, carrier_pose, wind)
-    answer = solve(problem, method=method, backend=backend)
-    others = {name: solve(problem, method=name) for name in methods() if name != method}
+    # Of a wrong method or back end, report before the others compute.
+    solution = _solve(problem, method, backend)
+    solutions = {method: solution, **{name: _solve(problem, name) for name in methods() if name != method}}
     if as_json:
-        beside = {name: other.to_dict() for name, other in {method: answer, **others}.items()}
-        print_json({"robot": loaded.name, **at, **answer.to_dict(), "methods": beside})
+        each = {name: other.to_dict() for name, other in solutions.items()}
+        print_json({"robot": loaded.name, **at, **solution.to_dict(), "methods": each})
     else:
-        _show(loaded, at, answer, {method: answer, **others})
-    if not answer.feasible:
+        _show(loaded, at, solutions, method)
+    if not solution.feasible:
         raise typer.Exit(1)
+
+
+def _solve(problem: TensionProblem, method: str, backend: str | None = None) -> TensionSolution:
+    """Solve twice: the first call loads libraries, and its time is not the method's."""
+    from ..solvers import solve
+
+    solve(problem, method=method, backend=backend)
+    return solve(problem, method=method, backend=backend)
 
 
 def _problem(
@@ -55,7 +80,7 @@ def _problem(
     carrier_pose: str | None,
     wind: str | None,
 ) -> tuple[TensionProblem, dict[str, Any]]:
-    """The problem at the stated pose and motion, and those as lists."""
+    """Return the problem of the instant, and its pose and wrench as lists."""
     import numpy as np
 
     from ..distribution import pose_problem
@@ -67,34 +92,33 @@ def _problem(
     count = len(robot.carriers)
     carriers = robot.carrier_home if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=count)
     air = None if wind is None else numbers("--wind", wind, 3)
-    problem = pose_problem(Dynamics(robot), at, rate, rate_rate, carriers, air)
+    problem = pose_problem(Dynamics(robot), at, rate, rate_rate, carriers, wind=air)
     return problem, {"pose": at.tolist(), "wrench": problem.w.tolist()}
 
 
-def _show(robot: Robot, at: dict[str, Any], answer: TensionSolution, methods: dict[str, TensionSolution]) -> None:
-    from rich.console import Console
-    from rich.measure import Measurement
-    from rich.table import Table
+def _show(robot: Robot, at: dict[str, Any], solutions: dict[str, TensionSolution], method: str) -> None:
+    from ..text import column, quantity, quantity_row
 
-    # One row a method: there are more of them than cables.
-    table = Table(box=None, pad_edge=False)
-    table.add_column("tensions [N]", no_wrap=True)
-    for heading in (*(str(i + 1) for i in range(robot.m)), "status", "ms"):
-        table.add_column(heading)
-    table.add_row("t_min", *(f"{limit:g}" for limit in robot.t_min), "", "")
-    for name, found in methods.items():
-        tensions = ["-"] * robot.m if found.tensions is None else [f"{t:.3f}" for t in found.tensions]
-        table.add_row(name, *tensions, found.status.value, f"{1e3 * found.time:.2f}")
-    table.add_row("t_max", *(f"{limit:g}" for limit in robot.t_max), "", "")
-    pose = ", ".join(f"{value:g}" for value in at["pose"])
-    typer.echo(f"{robot.name} at ({pose}): {answer.status.value.upper()}")
-    console = Console()
-    # A number cut to fit a narrow terminal would be another number: rather let lines wrap.
-    whole = Measurement.get(console, console.options.update(max_width=1000), table).maximum
-    Console(width=max(console.width, whole)).print(table)
-    if answer.tensions is not None:
-        typer.echo(f"residual {answer.residual:.2e} N")
-    if answer.certificate is not None:
-        typer.echo(answer.certificate.describe())
-    if answer.detail:
-        typer.echo(answer.detail)
+    solution = solutions[method]
+    # One row for each method: there are more of them than cables.
+    names = ["t_min", *solutions, "t_max"]
+    tensions = [
+        robot.t_min,
+        *(robot.m * [None] if each.tensions is None else each.tensions for each in solutions.values()),
+        robot.t_max,
+    ]
+    cables = [column([row[i] for row in tensions], digits=5) for i in range(robot.m)]
+    status = ["", *(each.status.value for each in solutions.values()), ""]
+    times = ["", *(f"{1e3 * each.time:.2f} ms" for each in solutions.values()), ""]
+    typer.echo(f"{robot.name} at ({quantity_row(at['pose'])}) [m, rad]: {solution.status.value.upper()}")
+    print_table(
+        ["tensions [N] of cable", *(str(i + 1) for i in range(robot.m)), "status", "time"],
+        list(zip(names, *cables, status, times, strict=True)),
+        f"l{robot.m * 'r'}lr",
+    )
+    if solution.tensions is not None:
+        typer.echo(f"residual of the wrench {quantity(solution.residual, 'N', digits=2)}")
+    if solution.certificate is not None:
+        typer.echo(solution.certificate.describe())
+    if solution.detail:
+        typer.echo(solution.detail)
