@@ -1,19 +1,18 @@
-"""Exceptions of towline.
+"""Define the exceptions of towline: wrong input, and a broken solver.
 
-An infeasible problem is not among them: that is an answer, with a status and a certificate. Exceptions are for wrong
-input and for a broken solver.
+An infeasible problem is not an exception but a result, with a status and a certificate.
 """
 
 __all__ = ["InputError", "SolverError", "TowlineError"]
 
 
 class TowlineError(Exception):
-    """Base class: catch this to catch everything that towline raises on purpose."""
+    """Base class of all exceptions that towline raises on purpose."""
 
 
 class InputError(TowlineError, ValueError):
-    """Wrong input. The message names the field, the value and what would be accepted, in one line."""
+    """Wrong input; the message names the field, what is accepted and the value, in one line."""
 
 
 class SolverError(TowlineError, RuntimeError):
-    """A numerical solver broke, or is not installed. The message names the solver and lists what is available."""
+    """A numerical solver failed or is not installed; the message names it and lists the available solvers."""

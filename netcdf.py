@@ -1,4 +1,4 @@
-"""Datasets as plain data and as NetCDF files. Saving one loads neither xarray nor pandas: each costs a second."""
+"""Hold datasets as plain data and save them as NetCDF, without loading xarray and pandas, which cost a second each."""
 
 from __future__ import annotations
 

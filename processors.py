@@ -1,4 +1,4 @@
-"""How many processors this process may use, and a way to use fewer: what runs beside others takes one each."""
+"""Count the processors that this process may use, and limit them, so that parallel jobs can take one each."""
 
 import os
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ _most: ContextVar[int | None] = ContextVar("most", default=None)
 
 
 def available() -> int:
-    """Processors that this process may use, at least 1; fewer inside of `at_most`."""
+    """Return how many processors this process may use, at least 1; `at_most` limits it."""
     there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     most = _most.get()
     return there if most is None else min(there, most)
@@ -17,7 +17,7 @@ def available() -> int:
 
 @contextmanager
 def at_most(count: int) -> Iterator[None]:
-    """Use no more than so many processors while the block runs, in this thread."""
+    """Limit the number of processors for this thread until the block ends."""
     token = _most.set(count)
     try:
         yield

@@ -1,4 +1,4 @@
-"""Files and folders that are written whole or not at all."""
+"""Write files and folders whole or not at all."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary place beside `path` to write to; it takes the name `path` when the block ends without an exception.
+    """Yield a temporary file beside `path`; it is renamed to `path` when the block ends without an exception.
 
-    A link is followed to the file that it stands for; folders that are missing are made.
+    A link is followed to its file; missing folders are created.
 
     Raises
     ------
     InputError
-        If the place cannot be written to. A file that was there before is left as it was.
+        If the file cannot be written. An existing file is not changed.
     """
     target = check_writable(path)
     try:
@@ -51,15 +51,15 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder beside `path` to fill; it takes the name `path` when the block ends without an exception.
+    """Yield a temporary folder beside `path`; it is renamed to `path` when the block ends without an exception.
 
     Raises
     ------
     InputError
-        If something is there already, which is left as it is, or the place cannot be written to.
+        If `path` exists already, or cannot be written.
     """
     if path.exists() or path.is_symlink():
-        raise InputError(f"{path}: is there already; accepted: a new path")
+        raise InputError(f"{path} must be a new path, got one that exists")
     target = check_writable(path)
     try:
         temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix="."))
@@ -82,7 +82,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 
 def remove_unfinished() -> None:
-    """Remove what is being written now, for a process that ends without unwinding its blocks."""
+    """Remove unfinished files, for a process that ends without unwinding its blocks."""
     for temporary in tuple(_unfinished):
         with suppress(OSError):
             if temporary.is_dir():
@@ -92,19 +92,19 @@ def remove_unfinished() -> None:
 
 
 def check_writable(path: Path) -> Path:
-    """The file that `path` stands for, its folder made, before any work is done for it.
+    """Return the file behind `path` and create its folder; call this before computing its contents.
 
     Raises
     ------
     InputError
-        If it is a folder, a device or a pipe, or its folder cannot be written to.
+        If it is a folder, a device or a pipe, or its folder cannot be written.
     """
     try:
         target = path.resolve()
         if not path.name or target.is_dir():
-            raise InputError(f"{path}: is a folder; accepted: the path of a file")
+            raise InputError(f"{path} must be the path of a file, got a folder")
         if target.exists() and not stat.S_ISREG(target.stat().st_mode):
-            raise InputError(f"{path}: is a device or a pipe; accepted: the path of a file")
+            raise InputError(f"{path} must be the path of a file, got a device or a pipe")
         target.parent.mkdir(parents=True, exist_ok=True)
         if not os.access(target.parent, os.W_OK):
             raise PermissionError(13, "Permission denied")
@@ -117,11 +117,11 @@ def check_writable(path: Path) -> Path:
 
 def _refusal(path: Path, error: Exception) -> InputError:
     reason = getattr(error, "strerror", None) or str(error)
-    return InputError(f"{path}: cannot be written ({reason}); accepted: a writable place")
+    return InputError(f"{path}: cannot be written ({reason})")
 
 
 def _mode(target: Path) -> int:
-    """Permissions of the file that is replaced, or what this process gives to new files."""
+    """Return the permissions of the file to replace, or those that this process gives to new files."""
     if target.exists():
         return stat.S_IMODE(target.stat().st_mode)
     mask = os.umask(0)

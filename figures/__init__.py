@@ -1,1 +1,1 @@
-"""Matplotlib figures and films of datasets and plain arrays: this room knows no robot, no task and no plan."""
+"""Draw figures and films of datasets and plain arrays by Matplotlib; robots, tasks and plans are not known here."""

@@ -1,7 +1,7 @@
-"""The robot in motion: cables coloured by tension, platform, carriers and the trail of the platform, in 3-D.
+"""Draw a film of a robot in 3-D: cables coloured by tension, platform, carriers and the trail of the platform.
 
-What does not move is drawn once; each frame begins with a copy of it and adds what moves. With a new drawing each, a
-frame would take ten times as long.
+Fixed parts are drawn once; each frame is a copy of them with the moving parts added. A new drawing for each frame would
+take ten times as long.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ NO_TENSIONS = "#999999"
 
 
 class Timing(NamedTuple):
-    """When the frames are.
+    """The times of the frames.
 
     Attributes
     ----------
     times
-        Of the motion, one a frame (k,) [s].
+        Times of the motion, one for each frame, (k,) [s].
     rate
-        Frames a second of the film.
+        Frames per second of the film.
     speed
-        Seconds of the motion in one of the film.
+        Seconds of the motion per second of the film.
     """
 
     times: np.ndarray
@@ -58,11 +58,11 @@ class Scene:
     carriers, names
         Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
     bodies
-        For each carrier the indices of the cables that hang from it: three and more anchors are drawn as a body.
+        For each carrier the indices of its cables; three or more anchors are drawn as a body.
     boxes
         Corners (low, high) of reach boxes.
     obstacles
-        For each place to keep out of the lines, (n, 3) each, that outline it.
+        For each region to keep out of, the lines that outline it, (n, 3) each.
     tensions
         (k, m) [N], nan where there are none.
     t_min, t_max
@@ -85,44 +85,44 @@ class Scene:
 
 
 def check_film(path: Path, speed: float, fps: float) -> float:
-    """The frame rate [1/s] that a film at `path` will have, before there is a motion to film.
+    """Return the frame rate [1/s] of a film at `path`; call this before computing the motion.
 
     Raises
     ------
     InputError
-        If the suffix, the speed or the frame rate are none that can be.
+        If the suffix, the speed or the frame rate are not possible.
     """
     if not (speed > 0 and np.isfinite(speed)):
-        raise InputError(f"speed: {speed:g}; accepted: a number > 0, 1 is real time")
+        raise InputError(f"speed must be a number above 0 (1 is real time), got {speed:g}")
     return film.frame_rate(path, fps)
 
 
 def timing(path: Path, duration: float, speed: float, fps: float) -> Timing:
-    """When to look at a motion that lasts `duration` [s], for a film at `path`.
+    """Return the times of the frames for a motion of `duration` [s] and a film at `path`.
 
     Raises
     ------
     InputError
-        If `check_film` refuses it, or the film would be too long.
+        If `check_film` raises it, or the film would be too long.
     """
     rate = check_film(path, speed, fps)
     count = duration * rate / speed + 1
     if count > MOST_FRAMES:
         raise InputError(
-            f"{path}: {count:.0f} frames; accepted: at most {MOST_FRAMES}, with a lower fps than {fps:g} or a higher "
-            f"speed than {speed:g}"
+            f"{path} must have at most {MOST_FRAMES} frames, got {count:.0f}; "
+            f"lower fps from {fps:g} or raise speed from {speed:g}"
         )
     return Timing(np.arange(int(count + 1e-9)) * speed / rate, rate, speed)
 
 
 def draw(scene: Scene, when: Timing, path: Path) -> Path:
-    """Draw the film into `path`, whole or not at all; see `film.write`."""
+    """Draw the film into `path`; see `film.write`."""
     stage = _Stage(scene, when)
     return film.write(path, stage.frame, len(when.times), when.rate)
 
 
 class _Stage:
-    """What stands still, drawn once, and the artists that move."""
+    """The fixed parts, drawn once, and the artists that move."""
 
     def __init__(self, scene: Scene, when: Timing):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -140,7 +140,7 @@ class _Stage:
         self._still: Any = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def frame(self, k: int) -> np.ndarray:
-        """The k-th frame, (height, width, 3) of bytes."""
+        """Return the k-th frame, (height, width, 3) of bytes."""
         scene = self._scene
         self._canvas.restore_region(self._still)
         self._trail.set_data_3d(*scene.path[scene.path_times <= self._when.times[k] + 1e-9].T)
@@ -165,7 +165,7 @@ class _Stage:
         return [artist for body in (*self._bodies, self._platform) for artist in body.artists]
 
     def _draw_surroundings(self) -> None:
-        """Axes, the whole path, the carriers' paths, boxes, and the colour bar with the limits."""
+        """Draw axes, paths of platform and carriers, boxes, and the colour bar with the limits."""
         from matplotlib import cm
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
@@ -237,14 +237,14 @@ class _Body:
             self.artists.insert(0, ax.add_collection3d(self._hull))
 
     def set_points(self, points: np.ndarray) -> None:
-        """Move."""
+        """Move the points."""
         self._dots.set_data_3d(*points.T)
         if self._faces:
             self._hull.set_verts([points[face] for face in self._faces])
 
 
 def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndarray]:
-    """Outlines as far as they fit between two corners (2, 3): a wall may be much larger than the robot's room."""
+    """Return the outlines inside two corners (2, 3), because a wall may be much larger than the robot."""
     low, high = corners
     found = []
     for lines in places:
@@ -255,7 +255,7 @@ def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndar
 
 
 def _tension_colours(scene: Scene) -> tuple[Colormap, Normalize]:
-    """Colours for all tensions that there are; limits far from them would make them all look alike."""
+    """Return a colour scale for the tensions that exist; limits far from them would make all colours similar."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap, Normalize
 

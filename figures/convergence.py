@@ -1,4 +1,4 @@
-"""How a solver came to its answer: infeasibility and objective over its iterations, every run of it."""
+"""Draw the convergence of a solver: infeasibility and objective over the iterations of all its runs."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ FLOOR = 1e-16  # a logarithmic axis has no place for an infeasibility of exactly
 
 
 def runs(iterates: Sequence[Iterate]) -> list[np.ndarray]:
-    """Split rows of (iteration, objective, infeasibility) where the iteration falls back: one array (k, 3) a run."""
+    """Split rows of (iteration, objective, infeasibility) where the iteration falls: one array (k, 3) for each run."""
     rows = np.array(iterates, dtype=float).reshape(-1, 3)
     starts = np.flatnonzero(np.diff(rows[:, 0]) <= 0) + 1
     return [run for run in np.split(rows, starts) if len(run)]
 
 
 def convergence(iterates: Sequence[Iterate]) -> Figure:
-    """Infeasibility above, objective below, over the iterations of all runs counted through; a colour each run.
+    """Draw infeasibility and objective over the iterations, numbered through all runs, with a colour for each run.
 
     Parameters
     ----------
     iterates
-        Rows of (iteration, objective, infeasibility) in the order in which the solver told them. Where the iteration
-        falls back to 0 another run begins: a finer mesh, or tighter limits, or a program with slacks.
+        Rows of (iteration, objective, infeasibility) in order. Another run begins where the iteration number falls to
+        0: a finer mesh, tighter limits, or a program with slacks.
     """
     canvas = style.figure(5.0, 4.4)
     above = style.axes(canvas, "", "infeasibility [-]", (2, 1, 1))
@@ -63,7 +63,7 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
 
 
 def _scale_objective(ax: Axes, values: np.ndarray) -> None:
-    """Logarithmic, if every objective is above zero; else linear only as near to zero as the smallest of them."""
+    """Use a logarithmic axis; if an objective is not positive, one that is linear near zero."""
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     if not sizes.size:
         return
@@ -76,7 +76,7 @@ def _scale_objective(ax: Axes, values: np.ndarray) -> None:
 
 
 def _plain_labels(ax: Axes) -> None:
-    """Label a logarithmic axis of less than a decade by plain numbers: it may have no power of ten to show."""
+    """Label a logarithmic axis of less than a decade by plain numbers, because it may contain no power of ten."""
     from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 
     ax.yaxis.set_major_locator(MaxNLocator(6))

@@ -1,4 +1,4 @@
-"""Ways of points in space."""
+"""Draw curves in space."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def curve_in_space(ways: Mapping[str, np.ndarray]) -> Figure:
-    """Draw ways (n, 3) [m] under their names, one scale on all axes; a dot where each begins."""
+    """Draw curves (n, 3) [m] with their names and equal scales; a dot marks the start of each."""
     from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 
     canvas = style.figure(5.0, 4.4)

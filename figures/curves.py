@@ -1,4 +1,4 @@
-"""Curves over one axis, in panels one below the other, with the bounds that they are to keep."""
+"""Draw curves over one axis, in panels below each other, with their bounds."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 
 class Panel(NamedTuple):
-    """One panel.
+    """A panel with curves.
 
     Attributes
     ----------
     label
-        Of its vertical axis, with the unit.
+        Label of the vertical axis, with the unit.
     curves
-        (n,) each, by their names in the legend, an empty name for none; not finite: a gap.
+        (n,) each, by their names in the legend; an empty name has no entry, and nan leaves a gap.
     bounds
-        Values to draw a dashed line at, by what is written on it.
+        Values of dashed lines, by their labels.
     dots
-        As `curves`, drawn as dots: what should lie on a curve.
+        As `curves`, drawn as dots, for points that should lie on a curve.
     logarithmic
-        Whether the vertical axis is.
+        Use a logarithmic vertical axis.
     """
 
     label: str
@@ -48,14 +48,14 @@ def curves(
 ) -> Figure:
     """Draw panels over `x` (n,); curves of one name look the same in all of them.
 
-    Every second curve is dashed, so that those that lie on one another can be seen.
+    Every second curve is dashed, so that curves on top of each other stay visible.
 
     Parameters
     ----------
     logarithmic
-        Whether the horizontal axis is.
+        Use a logarithmic horizontal axis.
     marks
-        Places on the horizontal axis to draw a line at, by their names in the legend.
+        Positions of vertical lines, by their names in the legend.
     """
     canvas = style.figure(5.0, 1.2 + 2.0 * len(panels))
     looks: dict[str, int] = {}

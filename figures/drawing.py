@@ -1,4 +1,4 @@
-"""`Drawing`: a figure and what stands below it."""
+"""Define a figure with its caption."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class Drawing(NamedTuple):
-    """A figure and what stands below it."""
+    """A figure with its caption."""
 
     caption: str
     figure: Figure

@@ -1,4 +1,4 @@
-"""Moving pictures as files: GIF by Pillow, MP4 by ffmpeg; the file's suffix decides."""
+"""Write films as GIF by Pillow or as MP4 by ffmpeg, by the suffix of the file."""
 
 from __future__ import annotations
 
@@ -20,51 +20,51 @@ FASTEST = 120.0  # [1/s] of MP4: screens show no more
 Draw = Callable[[int], np.ndarray]  # the k-th frame, (height, width, 3) of bytes
 
 
-def frame_rate(path: Path, wanted: float) -> float:
-    """The rate [1/s] nearest to `wanted` that the format of `path` has, before any work is done for it.
+def frame_rate(path: Path, rate: float) -> float:
+    """Return the frame rate [1/s] nearest to `rate` that the format of `path` supports.
 
     Raises
     ------
     InputError
-        If the suffix is of no format, the rate is none that it can have, or ffmpeg is needed and missing.
+        If the suffix is unknown, the rate is not possible, or ffmpeg is needed and missing.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(f"{path}: suffix {path.suffix!r}; accepted: {', '.join(SUFFIXES)}")
+        raise InputError(f"{path} must end in {' or '.join(SUFFIXES)}, got {path.suffix!r}")
     fastest = 1 / (SHORTEST * TICK) if suffix == ".gif" else FASTEST
-    if not 0.1 <= wanted <= fastest:
-        raise InputError(f"fps: {wanted:g}; accepted: 0.1 to {fastest:g} frames a second in {suffix}")
+    if not 0.1 <= rate <= fastest:
+        raise InputError(f"fps must be a number from 0.1 to {fastest:g} for {suffix}, got {rate:g}")
     if suffix == ".gif":
-        return 1 / (TICK * round(1 / (TICK * wanted)))
+        return 1 / (TICK * round(1 / (TICK * rate)))
     ffmpeg(path)
-    return wanted
+    return rate
 
 
 def ffmpeg(path: Path) -> str:
-    """The program that makes MP4, as matplotlib finds it (its setting `animation.ffmpeg_path`).
+    """Return the path of ffmpeg, from the setting `animation.ffmpeg_path` of matplotlib.
 
     Raises
     ------
     InputError
-        If there is none: then a GIF is what can be made.
+        If ffmpeg is not installed.
     """
     from matplotlib import rcParams
 
-    found = shutil.which(rcParams["animation.ffmpeg_path"])
-    if found is None:
-        raise InputError(f"{path}: MP4 needs the program ffmpeg, which is not installed; accepted without it: .gif")
-    return found
+    program = shutil.which(rcParams["animation.ffmpeg_path"])
+    if program is None:
+        raise InputError(f"{path} needs the program ffmpeg, which is not installed; without it use .gif")
+    return program
 
 
 def write(path: Path, draw: Draw, count: int, rate: float) -> Path:
-    """Write `count` frames at `rate` (from `frame_rate`), whole or not at all.
+    """Write `count` frames at `rate` (from `frame_rate`); a failure leaves no partial file.
 
     Raises
     ------
     InputError
-        If the place cannot be written to.
+        If the file cannot be written.
     TowlineError
-        If ffmpeg breaks; with its last line.
+        If ffmpeg fails; the message has its last line.
     """
     with whole_file(path) as temporary:
         if path.suffix.lower() == ".gif":
@@ -75,7 +75,7 @@ def write(path: Path, draw: Draw, count: int, rate: float) -> Path:
 
 
 def _write_gif(path: Path, draw: Draw, count: int, rate: float) -> None:
-    """One palette for all frames: quicker than one each, and colours do not flicker."""
+    """Write a GIF with one palette for all frames, which is faster and avoids flicker."""
     from PIL import Image
 
     shown = np.vstack([draw(k) for k in sorted({0, count // 2, count - 1})])

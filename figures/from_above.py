@@ -1,4 +1,4 @@
-"""Cables seen from above: which anchor each joins to which attachment."""
+"""Draw cables from above: which anchor each joins to which attachment."""
 
 from __future__ import annotations
 

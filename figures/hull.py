@@ -1,4 +1,4 @@
-"""The convex hull of a body's points, as the faces that pictures draw."""
+"""Compute the faces of the convex hull of a body, for pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plan limits beside the tensions, over time, each with its limits: a panel a limit."""
+"""Draw the limited quantities of a plan over time, with a panel for each limit."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Limited(NamedTuple):
     Attributes
     ----------
     name, unit
-        Of the limit.
+        Name and unit of the limit.
     labels
-        What each curve is about.
+        Names of the curves.
     values
         (n, k).
     low, high
-        Infinite: none.
+        The limits; an infinite one is not drawn.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Limited(NamedTuple):
 
 
 def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
-    """Draw quantities over `times` (n,) [s], one below the other."""
+    """Draw quantities over `times` (n,) [s], with a panel for each."""
     canvas = style.figure(5.0, 0.9 + 1.5 * len(quantities))
     looks: dict[str, int] = {}
     for row, quantity in enumerate(quantities):

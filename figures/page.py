@@ -1,6 +1,6 @@
-"""A page as one HTML file: a verdict, tables, figures inside, nothing to load.
+"""Write a page as one HTML file with a status, tables and figures, which loads nothing.
 
-Whatever is told passes `html.escape`; the figures are images of their own, in which nothing can run.
+All text passes `html.escape`; the figures are images, in which no script can run.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ pre { overflow-x: auto; font-size: 0.8rem; background: #f6f6f6; padding: 0.6rem;
 </head>
 <body>
 <h1>$title</h1>
-<p class="verdict"><strong>$word</strong>: $told</p>
+<p class="verdict"><strong>$word</strong>: $summary</p>
 $parts
 <footer>towline $version</footer>
 </body>
@@ -50,24 +50,24 @@ $parts
 """)
 
 
-def page(title: str, word: str, told: str, colour: str, parts: Iterable[str]) -> str:
-    """The whole page.
+def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str]) -> str:
+    """Return the page.
 
     Parameters
     ----------
     title
-        Of the page.
-    word, told, colour
-        The verdict: one word, what decided it, and the colour of the bar beside them, as `style.colour` has it.
+        Title of the page.
+    word, summary, colour
+        The status in one word, the reason for it, and the colour of the bar beside them, from `style.colour`.
     parts
-        What the functions of this module made, in order.
+        Results of the other functions of this module, in order.
     """
     from .. import __version__
 
     return PAGE.substitute(
         title=escape(title),
         word=escape(word),
-        told=escape(told),
+        summary=escape(summary),
         colour=colour,
         parts="\n".join(parts),
         version=escape(__version__),
@@ -75,17 +75,17 @@ def page(title: str, word: str, told: str, colour: str, parts: Iterable[str]) ->
 
 
 def heading(text: str, level: int = 2) -> str:
-    """A heading of level 2 or 3."""
+    """Return a heading of level 2 or 3."""
     return f"<h{level}>{escape(text)}</h{level}>"
 
 
 def paragraph(text: str) -> str:
-    """A paragraph of plain text."""
+    """Return a paragraph of plain text."""
     return f"<p>{escape(text)}</p>"
 
 
 def facts(title: str, rows: Iterable[tuple[str, str]], level: int = 2) -> str:
-    """Named facts under a heading; one without a name goes on with the one before it."""
+    """Return a table of named facts with a heading; a fact without a name continues the one before it."""
     lines = [
         f'<tr{"" if name else " class=more"}><th scope="row">{escape(name)}</th><td>{escape(fact)}</td></tr>'
         for name, fact in rows
@@ -94,7 +94,7 @@ def facts(title: str, rows: Iterable[tuple[str, str]], level: int = 2) -> str:
 
 
 def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table with a name for each column, under a heading; on a narrow screen it scrolls."""
+    """Return a table with a heading and column names; on a narrow screen it scrolls."""
     first = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
     lines = ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows]
     inner = "\n".join([f"<tr>{first}</tr>", *lines])
@@ -102,7 +102,7 @@ def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> 
 
 
 def picture(drawing: Drawing) -> str:
-    """A figure with its caption, inside the page."""
+    """Return a figure with its caption as an embedded image."""
     caption = escape(drawing.caption)
     image = base64.b64encode(style.svg(drawing.figure).encode()).decode()
     source = f"data:image/svg+xml;base64,{image}"
@@ -110,5 +110,5 @@ def picture(drawing: Drawing) -> str:
 
 
 def file(title: str, text: str) -> str:
-    """The text of a file, folded away under its title."""
+    """Return the text of a file, folded under its title."""
     return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"

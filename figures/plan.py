@@ -1,4 +1,4 @@
-"""Figures of a planned motion: its path in space, its tensions against their limits, its carriers beside it."""
+"""Draw a planned motion: its path, its tensions with their limits, and the offsets of its carriers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def path(trajectory: xr.Dataset) -> Figure:
-    """Platform and carriers in {G}, with the lines between them at a few instants."""
+    """Draw the paths of platform and carriers in {G}, with the lines between them at a few instants."""
     from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 
     canvas = style.figure(5.0, 4.4)
@@ -43,14 +43,14 @@ def path(trajectory: xr.Dataset) -> Figure:
 
 
 def tensions(trajectory: xr.Dataset) -> Figure:
-    """Every cable's tension over time, with its limits; see `tensions_side_by_side`."""
+    """Draw the tension of every cable over time with its limits; see `tensions_side_by_side`."""
     return tensions_side_by_side({"": trajectory})
 
 
 def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
-    """Tensions against their limits of several plans of one robot, a panel each under its title.
+    """Draw the tensions of several plans of one robot with their limits, a panel with a title for each.
 
-    Where no tensions exist, thin lines show what the motion would ask for without limits, pushing included.
+    Where no tensions exist, thin lines show the tensions that the motion would need without limits, pushing included.
     """
     canvas = style.figure(1.0 + 4.0 * len(trajectories), 3.6)
     panels = [
@@ -64,7 +64,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
 
 
 def base_offset(trajectory: xr.Dataset) -> Figure:
-    """Where each carrier is beside the platform: its horizontal distance and its height above it."""
+    """Draw the horizontal distance of each carrier from the platform, and its height above it."""
     canvas = style.figure()
     ax = style.axes(canvas, "time [s]", "carrier from platform [m]")
     time = trajectory["time"].values
@@ -81,7 +81,7 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
 
 
 def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
-    """Draw one panel; what has to be told beside it."""
+    """Draw one panel; return the note for its caption."""
     time = trajectory["time"].values
     values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
     missing = ~np.isfinite(values).all(axis=1)
@@ -98,7 +98,7 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
 
 
 def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> list[str]:
-    """Draw the limits, an upper one only if it is near: far ones would press the curves flat, so they are told."""
+    """Draw the limits; return a note on upper limits too far away to draw without flattening the curves."""
     for low in np.unique(trajectory["t_min"].values):
         _draw_limit(ax, low, f"t_min = {low:g} N", above=True)
     far = []
@@ -117,7 +117,7 @@ def _draw_limit(ax: Axes, value: float, text: str, above: bool) -> None:
 
 
 def equal_scales(ax: Any, points: np.ndarray) -> None:
-    """The same scale on all three axes, so that a circle is a circle."""
+    """Set the same scale on all three axes, so that a circle looks like a circle."""
     low, high = points.min(axis=0), points.max(axis=0)
     half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
     for axis, centre in zip("xyz", (low + high) / 2, strict=True):
@@ -126,7 +126,7 @@ def equal_scales(ax: Any, points: np.ndarray) -> None:
 
 
 def name_axes(ax: Any) -> None:
-    """Coordinates with their unit on axes in space, and few ticks."""
+    """Label axes in space with coordinates and units, and set few ticks."""
     for axis in "xyz":
         # Numbers run across the label of z: it stands off. Below, the others' labels would leave the figure.
         getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7 if axis == "z" else 4)
@@ -134,7 +134,7 @@ def name_axes(ax: Any) -> None:
 
 
 def few_ticks() -> MaxNLocator:
-    """Tick marks that leave a small 3-D axis legible."""
+    """Set few enough tick marks that a small 3-D axis stays legible."""
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(4, prune="both")

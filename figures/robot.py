@@ -1,4 +1,4 @@
-"""A robot in space: carriers, anchors, cables coloured by tension, platform, and where it can rest."""
+"""Draw a robot in space: carriers, anchors, cables coloured by tension, platform, and where it can rest."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotSketch:
-    """What is drawn; everything in {G} [m].
+    """The parts of a robot to draw; everything in {G} [m].
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class RobotSketch:
     boxes
         Corners (low, high) of reach boxes.
     tensions
-        (m,) [N], or None: cables are grey.
+        (m,) [N], or None for grey cables.
     positions, feasible
-        (k, 3) and (k,): where the platform can rest and where not.
+        (k, 3) positions of the platform, and (k,) whether it can rest there.
     """
 
     title: str
@@ -93,6 +93,6 @@ def _draw_platform(ax: Any, attachments: np.ndarray) -> None:
 
 
 def box_edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """The twelve edges of a box, (2, 3) each."""
+    """Return the twelve edges of a box, (2, 3) each."""
     corners = np.array([[(low, high)[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
     return [corners[[i, i | 1 << k]] for i in range(8) for k in range(3) if not i >> k & 1]

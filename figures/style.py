@@ -1,4 +1,4 @@
-"""One look for every figure: colour-blind safe, units on the axes, readable at 8 cm width."""
+"""Give every figure the same style: colour-blind safe, units on the axes, legible at 8 cm width."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ DPI = 160
 
 
 def colour(index: int) -> str:
-    """The colour of the index-th series."""
+    """Return the colour of the index-th series."""
     return COLOURS[index % len(COLOURS)]
 
 
 def line_style(index: int) -> str:
-    """Solid for the first round of colours, then dashed, so that more than eight series stay apart."""
+    """Return solid for the first eight colours, then dashed, so that more than eight series stay distinct."""
     return ["-", "--", ":", "-."][(index // len(COLOURS)) % 4]
 
 
 def figure(width: float = 5.0, height: float = 3.6) -> Figure:
-    """An empty figure, size in inches, that belongs to no window."""
+    """Return an empty figure, size in inches, that belongs to no window."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
-    """Axes with labels, a light grid and no box, at `place` (rows, columns, which)."""
+    """Return axes with labels, a light grid and no box, at `place` (rows, columns, index)."""
     ax = canvas.add_subplot(*place)
     ax.set_xlabel(xlabel)
     ax.set_ylabel(ylabel)
@@ -45,7 +45,7 @@ def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] =
 
 
 def legend_below(canvas: Figure, *panels: Axes) -> None:
-    """One legend of all panels below everything, in as many rows as the figure's width asks for, equally long."""
+    """Draw one legend for all panels at the bottom, in rows of equal length that fit the width of the figure."""
     shown = {}
     for ax in panels:
         handles, labels = ax.get_legend_handles_labels()
@@ -61,14 +61,14 @@ def legend_below(canvas: Figure, *panels: Axes) -> None:
 
 
 def save(canvas: Figure, path: Path) -> Path:
-    """Save as PNG, whole or not at all."""
+    """Save as PNG; a failure leaves no partial file."""
     with whole_file(path) as temporary:
         canvas.savefig(temporary, dpi=DPI, format="png")
     return path
 
 
 def svg(canvas: Figure) -> str:
-    """The figure as the text of an SVG image, letters as shapes: no font is needed, equal figures give equal text."""
+    """Return the figure as SVG text with letters as shapes, so that no font is needed and equal figures are equal."""
     import io
 
     from matplotlib import rc_context

@@ -1,4 +1,4 @@
-"""A plan seen from above and from the side: paths, cables at start and end, reach boxes, places to keep out of."""
+"""Draw a plan from above and from the side: paths, cables at start and end, reach boxes, regions to keep out of."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewi
 
 
 def views(scene: Scene) -> Figure:
-    """Draw a scene of a few instants, the first of them the start and the last the end, in two views of equal scale."""
+    """Draw a scene of a few instants, from start to end, in two views of equal scale."""
     canvas = style.figure(5.0, 6.4)
     panels = [
         style.axes(canvas, f"{'xyz'[across]} [m]", f"{'xyz'[up]} [m]", (2, 1, row + 1))

@@ -1,4 +1,4 @@
-"""Workspaces as pictures: points seen along the axes of {G}, cross sections at heights, shares of samples accepted."""
+"""Draw workspaces: projections along the axes of {G}, cross sections at heights, accepted shares of samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_POINTS = 20_000  # of a series in a panel: more are not seen, and files gro
 
 
 def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) -> Figure:
-    """Draw points of {G} as seen from above and from two sides, at equal scales.
+    """Draw points of {G} from above and from two sides, at equal scales.
 
     Parameters
     ----------
@@ -70,14 +70,14 @@ def cross_sections(
 
 
 def reached(found: xr.Dataset) -> Figure:
-    """Draw the share accepted of the samples along each line of sight: from above, from the front and the side.
+    """Draw the accepted share of the samples along each line of sight: from above, from the front and the side.
 
     Axes along which the region has no extent are left out.
 
     Parameters
     ----------
     found
-        With `tried` and `reached` (x, y, z), counts in cells, as `workspace.sample` returns it.
+        From `workspace.sample`, with the counts `tried` and `reached` (x, y, z) of its cells.
     """
     thick = [name for name in ("x", "y", "z") if found.sizes[name] > 1]
     pairs = [(a, b) for a, b in (("x", "y"), ("x", "z"), ("y", "z")) if a in thick and b in thick]
@@ -110,13 +110,13 @@ def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) ->
 
 
 def _reached_along(canvas: Figure, found: xr.Dataset, along: str) -> None:
-    """Of a region of one dimension."""
+    """Draw the accepted share over the axis of a region of one dimension."""
     share = _share(found, tuple(name for name in ("x", "y", "z") if name != along))
     style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(found[along], share, color=style.colour(0))
 
 
 def _share(found: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:
-    """Accepted of those tried, nan where none were."""
+    """Return the accepted share, nan where nothing was tried."""
     tried, reached = found["tried"].sum(over), found["reached"].sum(over)
     # What nothing was accepted of stays white.
     return (reached / tried.where(tried > 0)).where(reached > 0, np.nan)

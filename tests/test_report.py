@@ -314,7 +314,7 @@ def test_mp4_by_ffmpeg_or_a_line_that_names_gif(impossible, tmp_path, monkeypatc
         impossible.animate(file, fps=25)
         assert file.read_bytes()[4:8] == b"ftyp"
     monkeypatch.setitem(mpl.rcParams, "animation.ffmpeg_path", "/nowhere/ffmpeg")
-    with pytest.raises(InputError, match=r"ffmpeg, which is not installed; accepted without it: \.gif"):
+    with pytest.raises(InputError, match=r"ffmpeg, which is not installed; without it use \.gif"):
         impossible.animate(tmp_path / "other.mp4")
     assert not (tmp_path / "other.mp4").exists()
 
@@ -332,12 +332,12 @@ def test_a_broken_ffmpeg_is_one_line_and_leaves_no_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("file", "options", "message"),
     [
-        ("film.avi", {}, "suffix '.avi'; accepted: .gif, .mp4"),
-        ("film", {}, "suffix ''; accepted: .gif, .mp4"),
-        ("film.gif", {"fps": 80}, "fps: 80; accepted: 0.1 to 50 frames a second in .gif"),
-        ("film.gif", {"fps": float("nan")}, "fps: nan; accepted"),
-        ("film.gif", {"speed": 0}, "speed: 0; accepted: a number > 0"),
-        ("film.gif", {"speed": 1e-4}, "frames; accepted: at most 3000"),
+        ("film.avi", {}, "must end in .gif or .mp4, got '.avi'"),
+        ("film", {}, "must end in .gif or .mp4, got ''"),
+        ("film.gif", {"fps": 80}, "fps must be a number from 0.1 to 50 for .gif, got 80"),
+        ("film.gif", {"fps": float("nan")}, "fps must be a number"),
+        ("film.gif", {"speed": 0}, "speed must be a number above 0"),
+        ("film.gif", {"speed": 1e-4}, "must have at most 3000 frames"),
     ],
 )
 def test_films_that_cannot_be_are_refused_in_one_line(impossible, file, options, message, tmp_path):

@@ -60,7 +60,7 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path):
         (temporary / "part").write_text("a")
         assert not (tmp_path / "new").exists()
     assert (tmp_path / "new" / "part").read_text() == "a"
-    with pytest.raises(InputError, match="is there already; accepted: a new path"), whole_folder(tmp_path / "new"):
+    with pytest.raises(InputError, match="must be a new path, got one that exists"), whole_folder(tmp_path / "new"):
         pass
     with pytest.raises(RuntimeError), whole_folder(tmp_path / "other"):
         raise RuntimeError("in the middle")

@@ -1,4 +1,4 @@
-"""Where the parts of a robot are: `Geometry`, by the same kinematics as its wrench matrix, for many poses at once."""
+"""Compute the points of a robot for many poses at once, by the kinematics of its wrench matrix."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Points(NamedTuple):
     exits
         Where each cable leaves its pulley, (..., m, 3); the anchor if it has none.
     com
-        Of the platform, (..., 3).
+        Centre of mass of the platform, (..., 3).
     """
 
     anchors: np.ndarray
@@ -39,12 +39,12 @@ class Room(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Its diagonal [m]."""
+        """Return the length of the diagonal [m]."""
         return float(np.linalg.norm(self.high - self.low))
 
     @staticmethod
     def of(*points: np.ndarray) -> Room:
-        """The smallest one around points (..., 3) [m]."""
+        """Return the smallest box around points (..., 3) [m]."""
         every = np.concatenate([some.reshape(-1, 3) for some in points])
         return Room(every.min(axis=0), every.max(axis=0))
 
@@ -55,7 +55,7 @@ class Geometry:
     Attributes
     ----------
     room
-        That home, anchors and reach boxes take up.
+        The smallest box around home, anchors and reach boxes.
     """
 
     def __init__(self, robot: Robot):
@@ -64,9 +64,9 @@ class Geometry:
         self.room = Room.of(low, high, robot.home_anchors, robot.home_attachments, robot.carrier_home[:, :3])
 
     def __call__(self, pose: np.ndarray, carrier_pose: np.ndarray) -> Points:
-        """The points at poses (..., 6) of the platform and (..., c, 6) of the carriers in {G} [m, rad].
+        """Return the points at poses (..., 6) of the platform and (..., c, 6) of the carriers in {G} [m, rad].
 
-        Inside a sheave no cable is tangent to it: its exit is nan there.
+        The exit is nan where the attachment is inside the pulley, because then no cable is tangent to it.
         """
         dynamics = dynamics_of(self.robot)
         anchors, attachments = dynamics.points(pose, carrier_pose)
