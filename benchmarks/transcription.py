@@ -4,8 +4,8 @@
 
 The first table compares IPOPT with fatrop: build and first solve, and the same object solved again from its own
 solution; medians of several runs. The second carries the load of paper C's robot, whose three cables cannot follow
-every motion exactly, by each scheme on ever finer meshes without refinement. It prints the largest wrench error
-between the points over the weight, and the time of one run.
+every motion exactly, by each scheme on ever finer meshes without refinement. It prints the largest wrench error between
+the points over the weight, and the time of one run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`towline bench`: towline against its peers, here and now."""
+"""`towline bench`: towline against other solvers, here and now."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ app = typer.Typer(**PLAIN)
 
 @app.callback()
 def _bench() -> None:
-    """Measure towline against its peers on this machine."""
+    """Measure towline against other solvers on this machine."""
 
 
 @app.command("tension", cls=Command)
@@ -37,7 +37,7 @@ def tension(
     try:
         cables = [int(word) for word in m.replace(",", " ").split()]
     except ValueError:
-        raise InputError(f"--m: {m!r} is not a list of integers; accepted: numbers of cables from 1 to 16") from None
+        raise InputError(f"--m must be numbers of cables from 1 to 16, separated by commas, got {m!r}") from None
     if out is not None:
         check_writable(out / "tension.md")
     with Progress(console=Console(stderr=True)) as bar:

@@ -1,4 +1,4 @@
-"""`towline demo`: the flagship study."""
+"""`towline demo`: plan a circle of the flying cable robot."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .watching import watching
 
 
 def demo(
-    folder: Annotated[Path, typer.Option("--out", help="Where pictures and files go.")] = Path("towline-demo"),
+    folder: Annotated[Path, typer.Option("--out", help="Folder for pictures and files.")] = Path("towline-demo"),
     as_json: JsonOption = False,
 ) -> None:
-    """Fly paper F's circle: impossible while the quadrotor hovers, possible when it moves."""
+    """Plan a circle of the flying cable robot: impossible while the quadrotor hovers, feasible if it moves."""
     from ..studies.flying import circle as flying_circle
 
     with watching("planning the circle with the base free", quiet=as_json) as progress:
@@ -25,9 +25,9 @@ def demo(
         halves = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict()}
         print_json({"as_expected": result.as_expected, **halves, "files": written})
     else:
-        typer.echo("Paper F's circle, r = 1 m at 99 m, under a quadrotor hovering at 100 m:\n")
+        typer.echo("A circle of 1 m radius at a height of 99 m, under a quadrotor that hovers at 100 m:\n")
         typer.echo(result.hovering.report())
-        typer.echo("\nThe same circle with the quadrotor free to move, acceleration up to 3 m/s^2:\n")
+        typer.echo("\nThe same circle with a quadrotor that may move, with acceleration up to 3 m/s^2:\n")
         typer.echo(result.free.report())
         typer.echo("\nWritten:")
         for name in written:

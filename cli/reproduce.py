@@ -1,4 +1,4 @@
-"""`towline reproduce`: a paper recomputed, claim by claim."""
+"""`towline reproduce`: recompute a paper, claim by claim."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def reproduce(
         str, typer.Argument(metavar="PAPER", help="flying: the flying cable robot; ctmrts: the towing robots.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for report, errata and figures; none: towline-PAPER.")
+        Path | None, typer.Option("--out", help="Folder for report, errata and figures; default: towline-PAPER.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Recompute every equation, table and figure of a paper: what holds, what differs, what cannot be."""
+    """Recompute the equations, tables and figures of a paper, with a verdict on each claim."""
     from ..studies.accounts.files import write
     from ..studies.papers import PAPERS
     from ..writing import check_writable
 
     if paper not in PAPERS:
-        raise InputError(f"PAPER: {paper!r}; accepted: {', '.join(PAPERS)}")
+        raise InputError(f"PAPER must be one of {', '.join(PAPERS)}, got {paper!r}")
     folder = out if out is not None else Path(f"towline-{paper}")
     check_writable(folder / f"{paper}.md")
     with _progress(quiet=as_json) as progress:
@@ -64,7 +64,7 @@ def _show(account: Account) -> None:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Progress]:
-    """A bar over the chapters on standard error, if a person is watching."""
+    """Show a progress bar over the chapters on standard error, if that is a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -73,7 +73,7 @@ def _progress(quiet: bool) -> Iterator[Progress]:
     with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
         line = shown.add_task("", total=None)
 
-        def tell(what: str, done: int, total: int) -> None:
-            shown.update(line, description=what, completed=done, total=total)
+        def update(title: str, done: int, total: int) -> None:
+            shown.update(line, description=title, completed=done, total=total)
 
-        yield tell
+        yield update

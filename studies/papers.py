@@ -1,4 +1,4 @@
-"""The papers that `towline reproduce` knows, by name."""
+"""The papers that `towline reproduce` recomputes, by name."""
 
 from __future__ import annotations
 

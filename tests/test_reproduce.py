@@ -1,4 +1,4 @@
-"""`towline reproduce flying`: its claims by second derivations, its verdicts by their numbers, and what a user sees."""
+"""`towline reproduce flying`: its claims by second derivations, its verdicts by their numbers, and its output."""
 
 import json
 import os
@@ -17,7 +17,7 @@ from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load
 from towline.studies.accounts import text
 from towline.studies.accounts.account import Chapter, Paper, gather
-from towline.studies.accounts.claim import Verdict, compared, stated, told, undetermined
+from towline.studies.accounts.claim import Verdict, compared, stated, undetermined, value_text
 from towline.studies.accounts.files import write
 from towline.studies.flying import (
     balance,
@@ -76,7 +76,8 @@ def test_a_verdict_follows_from_the_numbers():
     assert compared("a", "Eq. 1", "x", 1.0, float("nan"), within=0.1, **words).verdict is Verdict.DIFFERS
     never = stated("b", "Eq. 2", "x", None, "y", holds=False, otherwise=Verdict.IMPOSSIBLE, **words)
     assert never.verdict is Verdict.IMPOSSIBLE
-    assert told((1.0, 2.5), "m") == "(1, 2.5) m"
+    assert value_text((1.0, 2.5), "m") == "(1, 2.5) m"
+    assert value_text(-0.0, "N") == "0 N"
 
 
 def example(name, **broken):
@@ -115,27 +116,27 @@ def test_an_account_is_written_from_the_same_claims(tmp_path):
     assert [claim["verdict"] for claim in json.loads(data)["claims"]] == ["reproduced", "not determined"]
 
 
-def test_a_chapter_that_breaks_is_told_and_stops_no_other():
+def test_a_chapter_that_breaks_is_reported_and_stops_no_other():
     def breaks():
         raise SolverError("the solver fell over")
 
-    seen = []
+    calls = []
     whole = example("small", Two=breaks)
     assert not whole.complete
     assert len(whole.claims) == 2
     assert whole.broken == {"Two": "the solver fell over"}
     assert "the solver fell over" in text.report(whole)
-    gather(Paper("p", "P"), {"One": lambda: Chapter([])}, lambda *told_so: seen.append(told_so))
-    assert seen == [("One", 0, 1), ("done", 1, 1)]
+    gather(Paper("p", "P"), {"One": lambda: Chapter([])}, lambda *call: calls.append(call))
+    assert calls == [("One", 0, 1), ("done", 1, 1)]
 
 
 # --- paper F
 
 
-def test_every_claim_is_told(chapters, claims):
+def test_every_claim_has_a_reason(chapters, claims):
     for claim in claims.values():
         assert claim.why.strip().endswith("."), claim.id
-        assert claim.says.strip(), claim.id
+        assert claim.statement.strip(), claim.id
         assert re.fullmatch(r"[\w.-]+", claim.id), claim.id
         numbers = [value for value in (claim.printed, claim.computed) if isinstance(value, float | tuple)]
         assert all(np.isfinite(value).all() for value in numbers), claim.id
@@ -143,8 +144,8 @@ def test_every_claim_is_told(chapters, claims):
         assert {claim.figure for claim in chapter.claims if claim.figure} <= set(chapter.drawings)
 
 
-def test_known_errata_are_found(claims):
-    """Each row of the list of paper F's errors has its verdict, and what holds is called so."""
+def test_known_errata_have_their_verdicts(claims):
+    """Each row of the list of paper F's errors has its verdict, and so has what holds."""
     expected = {
         Verdict.DIFFERS: "eq-1 eq-2-height eq-15 eq-16 eq-22 eq-25-drag eq-26-frame eq-26-wind eq-31-32 eq-36-alpha "
         "eq-37-J step-7 step-8 table-1-gyration eq-5 eq-17 eq-21",
@@ -153,19 +154,19 @@ def test_known_errata_are_found(claims):
         "eq-30 eq-26 eq-36 eq-38 eq-25-lift step-2 step-3 step-4 step-5 step-6 fig-6 VI.A-flight conclusion-mobility",
         Verdict.NOT_DETERMINED: "step-1 fig-5-shape fig-12-13 fig-15",
     }
-    for wanted, names in expected.items():
+    for expected_verdict, names in expected.items():
         for name in names.split():
-            assert claims[name].verdict is wanted, name
+            assert claims[name].verdict is expected_verdict, name
 
 
-def test_what_the_pulley_feels_is_beside_what_eq_16_lets_it_feel(claims):
+def test_the_force_on_the_pulley_is_beside_that_of_eq_16(claims):
     """Printed is what the rule gives, nothing; computed the whole cable's spring, E A / l times the stretch."""
     stretch, length = 1e-5, np.linalg.norm(load("wang-flying").anchors[0] - load("wang-flying").home_attachments[0])
     assert claims["eq-16"].printed == 0
     assert claims["eq-16"].computed == pytest.approx(13000 / length * stretch, rel=1e-6)
 
 
-def test_table_1_is_read_back_and_a_misprint_is_seen(monkeypatch):
+def test_table_1_is_read_back_and_a_misprint_changes_the_verdict(monkeypatch):
     assert verdict(parameters, "table-1-mass") is Verdict.REPRODUCED
     monkeypatch.setitem(parameters.PRINTED, "m_B", 1.3)
     assert verdict(parameters, "table-1-mass") is Verdict.DIFFERS
@@ -186,21 +187,21 @@ def test_other_printed_values_change_the_verdict(monkeypatch):
 
 def test_rates_and_accelerations_by_differences():
     """The derivatives that the equations are held against, by scipy's rotations at three instants."""
-    seen = instants.instants()
+    samples = instants.instants()
     step = 1e-4
-    angles, rates, bends = (part[:, 3:] for part in seen.base)
+    angles, rates, bends = (part[:, 3:] for part in samples.base)
     before, now, after = (
         Rotation.from_euler("ZYX", (angles + t * rates + t**2 / 2 * bends)[:, ::-1]) for t in (-step, 0, step)
     )
-    np.testing.assert_allclose(seen.R_A.R, now.as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(samples.R_A.R, now.as_matrix(), atol=1e-14)
     forward, backward = (now.inv() * after).as_rotvec() / step, (before.inv() * now).as_rotvec() / step
-    np.testing.assert_allclose(seen.R_A.rate, (forward + backward) / 2, atol=1e-7)
+    np.testing.assert_allclose(samples.R_A.rate, (forward + backward) / 2, atol=1e-7)
     # the turn of the second step is that of the first, carried on in the turned frame
-    np.testing.assert_allclose(seen.R_A.acceleration, (forward - backward) / step, atol=1e-3)
+    np.testing.assert_allclose(samples.R_A.acceleration, (forward - backward) / step, atol=1e-3)
 
 
 def test_the_missing_newtons_of_the_helix(claims):
-    """By scipy's non-negative least squares: what pulling cables lack at the instant of the claim."""
+    """By scipy's non-negative least squares: the shortfall of pulling cables at the instant of the claim."""
     from scipy.optimize import nnls
 
     dynamics = Dynamics(load("wang-flying"))
@@ -210,9 +211,9 @@ def test_the_missing_newtons_of_the_helix(claims):
     scale = np.r_[np.ones(3), np.full(3, 1 / dynamics.robot.length)]
     A = dynamics.relative.wrench_matrix(turn.pose[row]) * scale[:, None]
     w = dynamics.relative.required_wrench(*(part[row] for part in turn)) * scale
-    _, missing = nnls(A, w)
-    (told_so,) = re.findall(r"([\d.]+) N short", claims["fig-7-positive"].why)
-    assert float(told_so) == pytest.approx(missing, abs=0.01)
+    _, shortfall = nnls(A, w)
+    (reported,) = re.findall(r"short by ([\d.]+) N", claims["fig-7-positive"].why)
+    assert float(reported) == pytest.approx(shortfall, abs=0.01)
 
 
 def test_largest_radius_by_the_tensions_themselves():
@@ -226,14 +227,14 @@ def test_largest_radius_by_the_tensions_themselves():
     assert not radius.feasible(dynamics, 1.0, 0.0)
 
 
-def test_the_printed_ratio_falls_where_it_is_said_to():
+def test_the_printed_ratio_is_that_of_the_computed_amplitude():
     robot = load("wang-flying")
     amplitude = vibration.amplitude_of(robot, vibration.RATIO)
-    found = vibration.forces(robot, amplitude)
+    shaken = vibration.forces(robot, amplitude)
     # T is what the platform needs less what the vibration adds
     steady = motion.steady_tensions(Dynamics(robot), motion.circle(motion.FEASIBLE))
-    np.testing.assert_allclose(found.T + found.dT, steady, atol=1e-9)
-    assert np.abs(found.dT[:, 0] / (steady - found.dT)[:, 0]).max() == pytest.approx(0.1247, rel=1e-3)
+    np.testing.assert_allclose(shaken.T + shaken.dT, steady, atol=1e-9)
+    assert np.abs(shaken.dT[:, 0] / (steady - shaken.dT)[:, 0]).max() == pytest.approx(0.1247, rel=1e-3)
     assert amplitude == pytest.approx(1.9e-6, rel=0.05)
 
 
@@ -249,7 +250,7 @@ def test_a_pitching_quadrotor_by_newton_and_euler(claims):
     assert claims["fig-15"].computed == pytest.approx(worst, rel=1e-6)
 
 
-# --- what a user sees
+# --- the command
 
 
 def test_the_command_reproduces_the_paper(tmp_path):
@@ -259,20 +260,20 @@ def test_the_command_reproduces_the_paper(tmp_path):
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
-    told_so = json.loads(done.stdout)
-    assert told_so["complete"]
-    assert {"id", "printed", "computed", "verdict"} <= set(told_so["claims"][0])
-    names = [claim["id"] for claim in told_so["claims"]]
+    printed = json.loads(done.stdout)
+    assert printed["complete"]
+    assert {"id", "printed", "computed", "verdict"} <= set(printed["claims"][0])
+    names = [claim["id"] for claim in printed["claims"]]
     assert len(names) == len(set(names)) > 50
-    by_name = {claim["id"]: claim for claim in told_so["claims"]}
+    by_name = {claim["id"]: claim for claim in printed["claims"]}
     assert by_name["circle"]["verdict"] == "impossible"
     assert by_name["circle-repair"]["verdict"] == "reproduced"
     assert by_name["helix-repair"]["verdict"] == "reproduced"
     assert by_name["fig-11"]["verdict"] == "not determined"
     assert by_name["fig-10-tension"]["computed"] < -0.9
-    assert all(Path(file).stat().st_size > 0 for file in told_so["files"])
-    drawn = {Path(file).stem for file in told_so["files"] if file.endswith(".png")}
-    assert {claim["figure"] for claim in told_so["claims"]} - {None} <= drawn
+    assert all(Path(file).stat().st_size > 0 for file in printed["files"])
+    drawn = {Path(file).stem for file in printed["files"] if file.endswith(".png")}
+    assert {claim["figure"] for claim in printed["claims"]} - {None} <= drawn
     page = (tmp_path / "out" / "flying.html").read_text()
     assert page.count("<h3>") == len(names)
     assert page.count("data:image/svg+xml") == len(drawn)
@@ -288,6 +289,6 @@ def test_an_unknown_paper_is_one_line(tmp_path):
         [str(towline), "reproduce", "walking"], capture_output=True, text=True, cwd=tmp_path, check=False
     )
     assert done.returncode == 2
-    assert done.stderr.startswith("towline: PAPER: 'walking'; accepted: flying, ctmrts")
+    assert done.stderr.startswith("towline: PAPER must be one of flying, ctmrts, got 'walking'")
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())

@@ -1,1 +1,1 @@
-"""What became of a paper: its claims, one verdict each, and the files that tell it."""
+"""Accounts of papers: their claims with one verdict each, and the files that report them."""

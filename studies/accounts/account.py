@@ -1,7 +1,7 @@
 """`Account`: a paper recomputed, claim by claim, with a figure beside each claim that has one.
 
 A study is a mapping from the titles of its chapters to functions, each of which computes one `Chapter`; `gather` runs
-them one after the other. A chapter whose solver breaks does not stop the others: it is told, and the account is not
+them one after the other. A chapter whose solver breaks does not stop the others: it is reported, and the account is not
 complete.
 """
 
@@ -39,16 +39,16 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Account:
-    """What became of a paper's claims.
+    """The claims of a paper, each with its verdict.
 
     Attributes
     ----------
     paper
-        Which one.
+        Its name and source.
     chapters
-        By title, in order.
+        Chapters by title, in order.
     broken
-        Titles of chapters that could not be computed, and why.
+        Reasons by title, of chapters that could not be computed.
     seconds
         Wall time of the whole run.
     """
@@ -60,28 +60,28 @@ class Account:
 
     @property
     def claims(self) -> list[Claim]:
-        """All of them, in order."""
+        """Return the claims of all chapters, in order."""
         return [claim for chapter in self.chapters.values() for claim in chapter.claims]
 
     @property
     def errata(self) -> list[Claim]:
-        """Those that were not reproduced."""
+        """Return the claims that were not reproduced."""
         return [claim for claim in self.claims if claim.verdict is not Verdict.REPRODUCED]
 
     @property
     def complete(self) -> bool:
-        """Whether every chapter was computed, so that every claim has a verdict."""
+        """Return whether every chapter was computed, so that every claim has a verdict."""
         return bool(self.claims) and not self.broken
 
     def summary(self) -> str:
-        """How many claims have which verdict, in a line."""
+        """Return how many claims have which verdict, in one line."""
         counts = Counter(claim.verdict for claim in self.claims)
         parts = [f"{counts[verdict]} {verdict.value}" for verdict in Verdict if counts[verdict]]
         missing = [f"not computed: {', '.join(self.broken)}"] if self.broken else []
         return "; ".join([f"{len(self.claims)} claims: {', '.join(parts)}", *missing])
 
     def to_dict(self) -> dict[str, Any]:
-        """{"paper", "complete", "broken", "seconds", "claims"}, ready for JSON."""
+        """Return {"paper", "complete", "broken", "seconds", "claims"} for JSON."""
         return {
             "paper": self.paper.name,
             "complete": self.complete,
@@ -97,20 +97,20 @@ def gather(paper: Paper, chapters: Mapping[str, Callable[[], Chapter]], progress
     Parameters
     ----------
     chapters
-        What computes each, by its title.
+        Functions that compute the chapters, by title.
     progress
-        Told before each chapter, and once at the end.
+        Called before each chapter and once at the end.
     """
-    found: dict[str, Chapter] = {}
+    computed: dict[str, Chapter] = {}
     broken: dict[str, str] = {}
     start = time.perf_counter()
     for done, (title, compute) in enumerate(chapters.items()):
         if progress is not None:
             progress(title, done, len(chapters))
         try:
-            found[title] = compute()
+            computed[title] = compute()
         except SolverError as error:
             broken[title] = str(error)
     if progress is not None:
         progress("done", len(chapters), len(chapters))
-    return Account(paper, found, broken, time.perf_counter() - start)
+    return Account(paper, computed, broken, time.perf_counter() - start)

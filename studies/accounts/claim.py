@@ -1,8 +1,8 @@
-"""`Claim`: one thing that a paper says, beside what comes out when it is computed.
+"""`Claim`: one statement of a paper beside the result of computing it.
 
-A verdict follows from numbers, never from opinion: `compared` holds numbers against the printed ones, `stated` asks
-whether what is said holds, `undetermined` says what the paper does not print. Each is told in one sentence, and what is
-written for one verdict never stands beside another.
+A verdict follows from numbers, never from opinion: `compared` compares numbers with the printed ones, `stated` records
+whether a statement holds, `undetermined` records what the paper does not print. Each verdict comes with one sentence of
+its own.
 """
 
 from __future__ import annotations
@@ -13,30 +13,33 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-__all__ = ["Claim", "Value", "Verdict", "compared", "stated", "told", "undetermined"]
+from ...text import quantity, quantity_row
+
+__all__ = ["Claim", "Value", "Verdict", "compared", "stated", "undetermined", "value_text"]
 
 Value: TypeAlias = float | tuple[float, ...] | str | None
+DIGITS = 5  # of values in reports: one more than papers print
 
 
 class Verdict(StrEnum):
-    """What became of a claim; its values are plain strings."""
+    """The verdict on a claim; its values are plain strings."""
 
     REPRODUCED = "reproduced"
-    """What is computed is what is printed."""
+    """The computed result is the printed one."""
 
     DIFFERS = "differs"
-    """Something else comes out, or what is printed contradicts itself."""
+    """The computed result is another, or the paper contradicts itself."""
 
     IMPOSSIBLE = "impossible"
-    """No choice of what the paper leaves open gives what is printed."""
+    """No choice of what the paper leaves open gives the printed result."""
 
     NOT_DETERMINED = "not determined"
-    """The paper does not print what would decide it."""
+    """The paper does not print what is needed to decide."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One row of an account.
+    """One claim of a paper and its verdict.
 
     Attributes
     ----------
@@ -44,21 +47,21 @@ class Claim:
         Unique in its account: letters, digits, dots and hyphens.
     place
         Where in the paper: an equation, a table, a figure, a section.
-    says
-        What the paper says there, in a sentence.
+    statement
+        The statement of the paper, in a sentence.
     printed, computed
-        Numbers in `unit`, or text; printed is None where the paper draws or says it without a number.
+        Numbers in `unit`, or text; printed is None where the paper gives no number.
     verdict, why
-        The verdict, and why, in one sentence.
+        The verdict, and the reason in one sentence.
     unit
-        Of printed and computed; empty: none.
+        Unit of printed and computed; default: no unit.
     figure
-        Name of the figure that shows it, if one does.
+        Name of the figure that shows it, if there is one.
     """
 
     id: str
     place: str
-    says: str
+    statement: str
     printed: Value
     computed: Value
     verdict: Verdict
@@ -67,11 +70,11 @@ class Claim:
     figure: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it, ready for JSON."""
+        """Return all fields for JSON."""
         return {
             "id": self.id,
             "place": self.place,
-            "says": self.says,
+            "statement": self.statement,
             "printed": self.printed,
             "computed": self.computed,
             "unit": self.unit,
@@ -84,7 +87,7 @@ class Claim:
 def compared(
     id: str,
     place: str,
-    says: str,
+    statement: str,
     printed: float | tuple[float, ...],
     computed: float | tuple[float, ...],
     *,
@@ -94,25 +97,25 @@ def compared(
     unit: str = "",
     figure: str | None = None,
 ) -> Claim:
-    """Hold computed numbers against printed ones: reproduced if none is farther off than `within`.
+    """Compare computed numbers with printed ones: reproduced if they differ by `within` at most.
 
     Parameters
     ----------
     within
-        The difference that is allowed, in `unit`: that of the digits that are printed, or of a figure's lines.
+        The allowed difference in `unit`: the precision of the printed digits, or of the lines of a figure.
     agrees, differs
-        The sentence for either verdict.
+        The reason for either verdict.
     """
     apart = np.abs(np.asarray(computed, dtype=float) - np.asarray(printed, dtype=float))
     same = bool((apart <= within).all())
     verdict, why = (Verdict.REPRODUCED, agrees) if same else (Verdict.DIFFERS, differs)
-    return Claim(id, place, says, printed, computed, verdict, why, unit, figure)
+    return Claim(id, place, statement, printed, computed, verdict, why, unit, figure)
 
 
 def stated(
     id: str,
     place: str,
-    says: str,
+    statement: str,
     printed: Value,
     computed: Value,
     *,
@@ -123,15 +126,15 @@ def stated(
     unit: str = "",
     figure: str | None = None,
 ) -> Claim:
-    """Ask whether what is said holds: reproduced if so, else `otherwise`; `agrees` and `differs` as in `compared`."""
+    """Return a claim that is reproduced if the statement holds, else `otherwise`; other arguments as in `compared`."""
     verdict, why = (Verdict.REPRODUCED, agrees) if holds else (otherwise, differs)
-    return Claim(id, place, says, printed, computed, verdict, why, unit, figure)
+    return Claim(id, place, statement, printed, computed, verdict, why, unit, figure)
 
 
 def undetermined(
     id: str,
     place: str,
-    says: str,
+    statement: str,
     printed: Value,
     computed: Value,
     *,
@@ -139,18 +142,18 @@ def undetermined(
     unit: str = "",
     figure: str | None = None,
 ) -> Claim:
-    """What the paper leaves open; `missing` says what it does not print, and what was assumed for `computed`."""
-    return Claim(id, place, says, printed, computed, Verdict.NOT_DETERMINED, missing, unit, figure)
+    """Return a claim that the paper leaves open; `missing` states what it does not print and what was assumed."""
+    return Claim(id, place, statement, printed, computed, Verdict.NOT_DETERMINED, missing, unit, figure)
 
 
-def told(value: Value, unit: str = "") -> str:
-    """A value in words, with its unit; that of None is a dash."""
+def value_text(value: Value, unit: str = "") -> str:
+    """Return a value as text with its unit; None is a dash."""
     if value is None:
         return "–"
     if isinstance(value, str):
         text = value
     elif isinstance(value, tuple):
-        text = "(" + ", ".join(f"{each:.5g}" for each in value) + ")"
+        text = f"({quantity_row(value, digits=DIGITS)})"
     else:
-        text = f"{value:.5g}"
+        text = quantity(value, digits=DIGITS)
     return f"{text} {unit}" if unit else text

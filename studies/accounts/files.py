@@ -14,7 +14,7 @@ __all__ = ["write"]
 
 
 def write(account: Account, folder: Path) -> list[Path]:
-    """Write report (Markdown and HTML), errata, claims (JSON) and figures (PNG) into `folder`; their paths.
+    """Write report (Markdown and HTML), errata, claims (JSON) and figures (PNG) into `folder`; return their paths.
 
     Each file is written whole or not at all.
 

@@ -1,4 +1,4 @@
-"""An account as one HTML file with its figures inside, that loads nothing."""
+"""An account as one HTML file that contains its figures and loads nothing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...figures import page as html
 from ...figures import style
-from .claim import Claim, told
+from .claim import Claim, value_text
 from .text import READ
 
 if TYPE_CHECKING:
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 def page(account: Account) -> str:
-    """The whole page: an overview, then chapter by chapter each claim with its figure."""
-    told_so = f"{account.summary()}. Computed in {account.seconds:.0f} s."
+    """Return the page: an overview, then chapter by chapter each claim with its figure."""
+    summary = f"{account.summary()}. Computed in {account.seconds:.0f} s."
     word, colour = ("complete", style.colour(0)) if account.complete else ("incomplete", style.colour(1))
     parts = [_overview(account)]
     for title, chapter in account.chapters.items():
         parts += [html.heading(title), *_chapter(chapter)]
     parts += [html.heading(f"{title}: not computed") + html.paragraph(why) for title, why in account.broken.items()]
     parts.append(_errata(account))
-    return html.page(account.paper.source, word, told_so, colour, parts)
+    return html.page(account.paper.source, word, summary, colour, parts)
 
 
 def _overview(account: Account) -> str:
     rows = [
-        (claim.id, told(claim.printed, claim.unit), told(claim.computed, claim.unit), claim.verdict.value)
+        (claim.id, value_text(claim.printed, claim.unit), value_text(claim.computed, claim.unit), claim.verdict.value)
         for claim in account.claims
     ]
     return html.columns("All claims", ("claim", "printed", "computed", "verdict"), rows)
@@ -39,7 +39,7 @@ def _errata(account: Account) -> str:
 
 
 def _chapter(chapter: Chapter) -> list[str]:
-    """Claims, each figure after the first claim that it belongs to, and then those that belong to none."""
+    """Return claims, each figure after the first claim that it belongs to, then the figures that belong to no claim."""
     parts, waiting = [], dict(chapter.drawings)
     for claim in chapter.claims:
         parts.append(_claim(claim))
@@ -50,9 +50,9 @@ def _chapter(chapter: Chapter) -> list[str]:
 
 def _claim(claim: Claim) -> str:
     rows = [
-        (claim.place, claim.says),
-        ("Printed", told(claim.printed, claim.unit)),
-        ("Computed", told(claim.computed, claim.unit)),
+        (claim.place, claim.statement),
+        ("Printed", value_text(claim.printed, claim.unit)),
+        ("Computed", value_text(claim.computed, claim.unit)),
         (claim.verdict.value.capitalize(), claim.why),
     ]
     return html.facts(claim.id, rows, level=3)

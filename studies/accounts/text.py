@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .claim import Claim, Verdict, told
+from .claim import Claim, Verdict, value_text
 
 if TYPE_CHECKING:
     from .account import Account
 
 FIGURES = "figures"  # the folder beside the report
 READ = (
-    "The paper was read as text recognised from its pages: a single symbol that is wrong may be that reading's, not "
-    "the authors'."
+    "The paper was read as text recognised from its pages: a single wrong symbol may be an error of the recognition, "
+    "not of the authors."
 )
 
 
 def report(account: Account) -> str:
-    """Chapter by chapter: a table of its claims, and its figures."""
+    """Return the report: for each chapter a table of its claims, and its figures."""
     from ... import __version__
 
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
     for title, chapter in account.chapters.items():
-        heads = ("claim", "where", "the paper says", "printed", "computed", "verdict", "why")
+        heads = ("claim", "where", "the paper states", "printed", "computed", "verdict", "why")
         rows = [
             (
                 claim.id,
                 claim.place,
-                claim.says,
-                told(claim.printed, claim.unit),
-                told(claim.computed, claim.unit),
+                claim.statement,
+                value_text(claim.printed, claim.unit),
+                value_text(claim.computed, claim.unit),
                 f"**{claim.verdict}**",
                 claim.why,
             )
@@ -45,16 +45,16 @@ def report(account: Account) -> str:
 
 
 def errata(account: Account) -> str:
-    """The claims that were not reproduced, by verdict, with why."""
+    """Return the claims that were not reproduced, by verdict, with their reasons."""
     lines = [
         f"# Errata of {account.paper.source}",
         "",
-        f"Computed, not argued: each line is a claim of the report. {READ}",
+        f"Each line is a claim of the report, and its verdict was computed. {READ}",
     ]
     titles = {
-        Verdict.DIFFERS: "What is printed and what holds",
-        Verdict.IMPOSSIBLE: "What cannot be",
-        Verdict.NOT_DETERMINED: "What the paper does not print",
+        Verdict.DIFFERS: "Printed and correct",
+        Verdict.IMPOSSIBLE: "Impossible",
+        Verdict.NOT_DETERMINED: "Not printed in the paper",
     }
     for verdict, title in titles.items():
         rows = [_row(claim) for claim in account.errata if claim.verdict is verdict]
@@ -63,18 +63,18 @@ def errata(account: Account) -> str:
                 "",
                 f"## {title}",
                 "",
-                *_table(("claim", "where", "the paper says", "printed", "computed", "why"), rows),
+                *_table(("claim", "where", "the paper states", "printed", "computed", "why"), rows),
             ]
     return "\n".join([*lines, ""])
 
 
 def _row(claim: Claim) -> tuple[str, ...]:
-    printed, computed = told(claim.printed, claim.unit), told(claim.computed, claim.unit)
-    return claim.id, claim.place, claim.says, printed, computed, claim.why
+    printed, computed = value_text(claim.printed, claim.unit), value_text(claim.computed, claim.unit)
+    return claim.id, claim.place, claim.statement, printed, computed, claim.why
 
 
 def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
-    """A table; what would end a cell is escaped."""
+    """Return a table; characters that would end a cell are escaped."""
     safe = [tuple(cell.replace("|", "\\|").replace("\n", " ") for cell in row) for row in (heads, *rows)]
     first, *others = ("| " + " | ".join(row) + " |" for row in safe)
     return [first, "|" + " --- |" * len(heads), *others]

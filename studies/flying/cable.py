@@ -13,11 +13,11 @@ from .motion import RADIUS, circle, steady_tensions
 ELEMENTS = (1, 2, 5, 16, 64)
 STRETCH = 1e-5  # of the attachment, away from the anchor [m]
 WINDING = 1e-6  # of each element [m]
-NEGLIGIBLE = 1e-2  # elongation that may be ignored, assumed: the paper says that it goes to 0
+NEGLIGIBLE = 1e-2  # elongation that may be ignored, assumed: by the paper it goes to 0
 
 
 def chapter() -> Chapter:
-    """The equations of section III on cable 1 at home."""
+    """Check the equations of section III on cable 1 at home."""
     robot = load("wang-flying")
     return Chapter(
         [
@@ -33,7 +33,7 @@ def chapter() -> Chapter:
 
 
 def chain(robot: Robot, elements: int) -> ElementChain:
-    """Cable 1 at home, taut whatever happens."""
+    """Return cable 1 at home as a chain of elements that is always taut."""
     cable = robot.cables[0]
     assert cable.stiffness is not None
     return ElementChain(robot.anchors[0], robot.home_attachments[0], cable.stiffness, elements, np.inf)
@@ -47,17 +47,17 @@ def _elongation(robot: Robot) -> Claim:
     return stated(
         "eq-6",
         "Eq. 6",
-        "F l / (E A) goes to 0, the elongation can be ignored: l_e / l at the circle's largest tension.",
+        "F l / (E A) goes to 0 and the elongation can be ignored (l_e / l at the largest tension of the circle).",
         0.0,
         share,
         holds=share < NEGLIGIBLE,
-        agrees=f"{largest:.1f} N on E A = {stiffness:g} N: below {NEGLIGIBLE:.0%}, which is taken for nothing.",
+        agrees=f"{largest:.1f} N on E A = {stiffness:g} N is less than {NEGLIGIBLE:.0%}, which is taken as negligible.",
         differs=f"{largest:.1f} N on E A = {stiffness:g} N is more than {NEGLIGIBLE:.0%}.",
     )
 
 
 def _one_element(robot: Robot) -> Claim:
-    """The chain of n elements against the whole cable, E A / l times the elongation."""
+    """Compare chains of n elements with the whole cable, E A / l times the elongation."""
     whole = chain(robot, 1)
     increments = {n: chain(robot, n).end_increment(STRETCH * whole.direction) for n in ELEMENTS}
     spring = whole.stiffness / whole.length * STRETCH
@@ -66,18 +66,18 @@ def _one_element(robot: Robot) -> Claim:
     return stated(
         "eq-21",
         "section III.C, Eqs. 12 to 21",
-        "The elastic force cannot be studied with the whole cable as a unit: n elements give another one.",
+        "The elastic force cannot be studied with the whole cable as a unit: n elements give another force.",
         "n matters",
         f"{increments[1]:.4g} N for n = 1, {increments[ELEMENTS[-1]]:.4g} N for n = {ELEMENTS[-1]}",
         holds=not alike,
         agrees="The increment depends on the number of elements.",
-        differs=f"A cable without mass carries one tension: E A / l times the elongation for every n (those of "
-        f"n = {', '.join(map(str, ELEMENTS))} differ by {spread:.0e} N).",
+        differs="A cable without mass has the same tension everywhere: E A / l times the elongation for every n "
+        f"(n = {', '.join(map(str, ELEMENTS))} differ by {spread:.0e} N).",
     )
 
 
 def _stiffness_of_winding(robot: Robot) -> Claim:
-    """By Eq. 15 an element that is lengthened by de carries E A / de times de, whatever de is."""
+    """Compare the force of an element that is lengthened by de with E A / de times de, as in Eq. 15."""
     elements = 8
     cable = chain(robot, elements)
     nodes = np.zeros((elements + 1, 3))
@@ -86,36 +86,36 @@ def _stiffness_of_winding(robot: Robot) -> Claim:
     return compared(
         "eq-15",
         "Eq. 15",
-        f"k_l = E A / de: the increment of an element that is lengthened by de = {WINDING * 1e6:g} um.",
+        f"k_l = E A / de (force increment of an element that is lengthened by de = {WINDING * 1e6:g} um).",
         printed,
         held,
         within=1e-6 * cable.stiffness,
-        agrees="The element carries E A.",
-        differs="With de below the line every lengthening, however small, gives E A; k_l is E A / e, as in Eq. 12.",
+        agrees="The force increment is E A.",
+        differs="With de as the divisor every lengthening, however small, gives E A; k_l is E A / e, as in Eq. 12.",
         unit="N",
     )
 
 
 def _axis(robot: Robot) -> Claim:
-    """Where x_c points in {G}, by the row u^T of Eq. 17 and by the cable's own direction."""
+    """Compare the direction of x_c in {G} by the row u^T of Eq. 17 with the direction of the cable."""
     cable = chain(robot, 1)
     vector = robot.anchors[0] - robot.home_attachments[0]  # L by Eq. 4
     u = vector / np.linalg.norm(vector)
     return compared(
         "eq-17",
         "Eqs. 4, 16 to 18",
-        "x_c, from the pulley along the cable, is u = L / l in {G}: the cosine of the angle between both.",
+        "x_c, from the pulley along the cable, is u = L / l in {G} (cosine of the angle between them).",
         1.0,
         float(u @ cable.direction),
         within=1e-9,
-        agrees="They point the same way.",
-        differs="By Eq. 4 L runs from the platform to the pulley, so dX, dE and the forces of Eq. 18 come out with the "
-        "other sign; k_n does not see it, and the norm of Eq. 22 hides it.",
+        agrees="They have the same direction.",
+        differs="By Eq. 4 L points from the platform to the pulley, so dX, dE and the forces of Eq. 18 have the wrong "
+        "sign; k_n does not depend on it, and the norm of Eq. 22 hides it.",
     )
 
 
 def _assembled(robot: Robot) -> Claim:
-    """K_n of two elements, from the blocks k_1 to k_4 of Eq. 19, against the chain's."""
+    """Compare K_n of two elements, from the blocks k_1 to k_4 of Eq. 19, with that of the chain."""
     cable = chain(robot, 2)
     u = cable.direction
     block = cable.stiffness * cable.elements / cable.length * np.outer(u, u)
@@ -127,7 +127,7 @@ def _assembled(robot: Robot) -> Claim:
     return compared(
         "eq-19",
         "Eqs. 18, 19, 21, figure 4",
-        "k_1 to k_4 are S(j) u u^T with signs, and K_n is assembled from them: largest difference for two elements.",
+        "k_1 to k_4 are S(j) u u^T with signs, and K_n is assembled from them (largest difference for two elements).",
         0.0,
         off,
         within=1e-6,
@@ -138,7 +138,7 @@ def _assembled(robot: Robot) -> Claim:
 
 
 def _switch(robot: Robot) -> Claim:
-    """Node 0 is held and never moves, so that Eq. 16 never lets element 1 pull."""
+    """Compare the force on the pulley with the force by Eq. 16, where element 1 never pulls: node 0 never moves."""
     elements = 8
     cable = chain(robot, elements)
     nodes = cable.displacements(STRETCH * cable.direction)
@@ -149,30 +149,32 @@ def _switch(robot: Robot) -> Claim:
     return compared(
         "eq-16",
         "Eq. 16",
-        "sgn(j) = 1 if both nodes of element j move away from the pulley: what a stretched cable does to the pulley.",
+        "sgn(j) = 1 if both nodes of element j move away from the pulley (force of a stretched cable on the pulley).",
         float(abs(forces[0])),
         float(abs(true[0])),
         within=1e-9,
-        agrees="The pulley feels what the stretched cable carries.",
-        differs="Node 0 is held at the pulley, so element 1 never pulls by this rule and the pulley feels nothing, the "
-        "printed value; an element pulls while it, with the tension that it had, is longer than at rest.",
+        agrees="The force on the pulley is the tension of the stretched cable.",
+        differs="Node 0 is fixed at the pulley, so by this rule element 1 never pulls and the force on the pulley is "
+        "zero, "
+        "the printed value. An element pulls as long as it, with the tension that it had, is longer than at rest.",
         unit="N",
     )
 
 
 def _sign(robot: Robot) -> Claim:
-    """A taut cable whose end comes nearer loses tension; a norm cannot tell."""
+    """Check the sign of the increment of a taut cable whose end comes nearer: its tension falls, a norm never does."""
     cable = chain(robot, 8)
     shorter = cable.end_increment(-STRETCH * cable.direction)
     return stated(
         "eq-22",
         "Eqs. 7, 22, 23",
-        "dT_K is the norm of the force at B_i, also when the platform comes nearer to the anchor.",
+        "dT_K is the norm of the force at B_i, also where the platform comes nearer to the anchor.",
         abs(shorter),
         shorter,
         holds=shorter >= 0,
         agrees="The increment is not negative.",
-        differs=f"A taut cable whose end comes {STRETCH * 1e6:g} um nearer pulls less: the increment has a sign, and "
-        "F = T + dT needs it.",
+        differs=f"A taut cable whose end comes {STRETCH * 1e6:g} um nearer pulls less, so the increment needs its sign "
+        "in "
+        "F = T + dT.",
         unit="N",
     )

@@ -1,8 +1,9 @@
 """Paper F's circle (section VI.B): impossible under a hovering quadrotor, possible when the quadrotor moves too.
 
-The platform goes round a horizontal circle of r = 1 m, 1 m below the point [50, 50, 100] m, at 0.2 pi rad/s. All
-anchors lie within 0.52 m of the quadrotor's axis, so the CoM cannot hang 1 m off it: the paper's own parameters ask for
-pushing cables. With the base free (acceleration up to 3 m/s^2) the same circle is followed with every cable taut.
+The platform follows a horizontal circle of r = 1 m, 1 m below the point [50, 50, 100] m, at 0.2 pi rad/s. All anchors
+lie within 0.52 m of the quadrotor's axis, so the CoM cannot be 1 m beside it: with the paper's own parameters cables
+would have to push. With the base free (acceleration up to 3 m/s^2) the platform follows the same circle with every
+cable taut.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ class FlyingCircle:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the study shows what it is for: a proof that the one is impossible, and an audited plan."""
+        """Return whether the first half is proven impossible and the second has an audited plan."""
         proven = self.hovering.certificate is not None and self.hovering.certificate.shortfall > 0
         return proven and self.free.feasible and self.free.tracking_error_max < 0.01
 
 
 def tasks() -> tuple[Task, Task]:
-    """The circle with the quadrotor hovering, and with the quadrotor free."""
+    """Return the task with the quadrotor hovering, and the task with the quadrotor free."""
     hovering = Task(name="circle-hovering", path=CIRCLE, base=HoldBase(kind="hold", poses={"quad": HOVER}))
     around: dict[str, AnyPath] = {"quad": RestPath(kind="rest", pose=HOVER)}
     moving = FreeBase(kind="free", around=around, acceleration_max=3.0, ends="periodic")
@@ -49,7 +50,7 @@ def tasks() -> tuple[Task, Task]:
 
 
 def run(folder: Path, progress: Progress | None = None) -> FlyingCircle:
-    """Plan both, and write two NetCDF files and three pictures into `folder`."""
+    """Plan both tasks, and write two NetCDF files and three pictures into `folder`."""
     robot = load("wang-flying")
     hovering_task, free_task = tasks()
     hovering, free = plan(robot, hovering_task), plan(robot, free_task, progress)

@@ -1,8 +1,8 @@
 """Paper F's section VI.C: the tension of cable 1 with and without D_B, under a quadrotor that moves and pitches.
 
-The paper draws the flight and the pitch and prints no numbers. Assumed, as in `flying_plans`: VI.A's line, pitching by
+The paper draws the flight and the pitch and prints no numbers. Assumed, as in `plans`: VI.A's line, pitching by
 0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its thrust pitches; and a circle of 0.15 m in {A}, on
-which every cable pulls. Without D_B means: as under a quadrotor that hovers, level, whose D_B is the weight alone.
+which every cable pulls. "Without D_B" means with the D_B of a level, hovering quadrotor, which is the weight alone.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PITCHES = np.linspace(0.0, 0.3, 7)  # largest pitch [rad]
 
 
 def chapter() -> Chapter:
-    """With and without D_B, and how tensions spread as the quadrotor moves more."""
+    """Compare tensions with and without D_B, and their range as the quadrotor moves more."""
     dynamics = Dynamics(load("wang-flying"))
     body, base = circle(FEASIBLE), flown(PITCH)
     without, moving = steady_tensions(dynamics, body), steady_tensions(dynamics, body, base)
@@ -57,12 +57,12 @@ def chapter() -> Chapter:
 
 
 def flown(pitch: float) -> Motion:
-    """The quadrotor in {G}, pitching by up to `pitch` [rad] with its surge, (n, 6) each."""
+    """Return the motion of the quadrotor in {G}, pitching by up to `pitch` [rad] with its surge, (n, 6) each."""
     return pitching_flight(pitch).at(TIMES, SECONDS)
 
 
 def pitching_on_the_line() -> Motion:
-    """The same pitch on VI.A's straight line, which no thrust along the quadrotor's axis can fly."""
+    """Return the same pitch on VI.A's straight line, which a thrust along the quadrotor's axis cannot give."""
     turned, line = flown(PITCH), flight()
     return Motion(*(np.hstack([ahead[:, :3], tilt[:, 3:]]) for ahead, tilt in zip(line, turned, strict=True)))
 
@@ -71,10 +71,11 @@ def _motion() -> Claim:
     return undetermined(
         "fig-12-13",
         "VI.C, figures 12 and 13",
-        "The quadrotor moves and pitches: largest pitch.",
+        "The quadrotor moves and pitches (largest pitch).",
         None,
         float(np.degrees(PITCH)),
-        missing="Neither flight nor pitch is printed; assumed: VI.A's line, a sine of pitch, its surge along x.",
+        missing="Neither the flight nor the pitch is printed. Assumed: VI.A's line, a sine of pitch, its surge along "
+        "x.",
         unit="degrees",
         figure="disturbance-flight",
     )
@@ -84,11 +85,11 @@ def _error(error: np.ndarray, worse: np.ndarray) -> Claim:
     return undetermined(
         "fig-15",
         "VI.C, figures 14 and 15",
-        "The relative error of the tension of cable 1 when D_B is left out: its largest value.",
+        "Without D_B the tension of cable 1 has a relative error (its largest value).",
         None,
         float(error[:, 0].max()),
-        missing="No value is printed, nor the motion; a quadrotor that surges as it pitches mostly feels its load "
-        f"along its own axis, while the same pitch on a straight line would give {worse[:, 0].max():.0f} %.",
+        missing="Neither a value nor the motion is printed. With the surge the load pulls mostly along the quadrotor's "
+        f"own axis; the same pitch on a straight line would give {worse[:, 0].max():.0f} %.",
         unit="%",
         figure="disturbance",
     )
@@ -99,12 +100,13 @@ def _felt(error: np.ndarray) -> Claim:
     return stated(
         "conclusion-D_B",
         "abstract, VI.C, conclusion 3",
-        "The quadrotor's motion affects the tensions apparently: largest relative error of any cable without D_B.",
+        "The motion of the quadrotor affects the tensions apparently (largest relative error of any cable without "
+        "D_B).",
         "apparently",
         f"{most:.1f} %",
         holds=most > 1.0,
-        agrees="More than one per cent, with the motion assumed.",
-        differs="Less than one per cent, with the motion assumed.",
+        agrees="It is more than 1 % with the assumed motion.",
+        differs="It is less than 1 % with the assumed motion.",
         figure="disturbance",
     )
 
@@ -118,6 +120,6 @@ def _mobility(spans: np.ndarray) -> Claim:
         f"{spans[0]:.2f} N at rest, {spans[-1]:.2f} N pitching by {np.degrees(PITCHES[-1]):.0f} degrees",
         holds=bool((np.diff(spans) > 0).all()),
         agrees="The range grows with every step of the largest pitch.",
-        differs="The range does not grow all the way.",
+        differs="The range does not grow with every step of the largest pitch.",
         figure="mobility",
     )

@@ -1,7 +1,7 @@
 """Random instants of both bodies of paper F, with rotations and their time derivatives from CasADi.
 
 Angular velocity and acceleration follow from these alone, R^T dR = [omega]x and R^T ddR = [alpha]x + [omega]x^2, so
-that the paper's formulas, and this toolkit's, are held against something that knows neither.
+that the formulas of the paper and of this toolkit are compared with an independent result.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ class Turning(NamedTuple):
     ddR: np.ndarray  # noqa: N815
 
     def then(self, other: Turning) -> Turning:
-        """The product self R x other R, and its derivatives."""
+        """Return the product self.R other.R and its derivatives."""
         R, dR, ddR = self
         S, dS, ddS = other
         return Turning(R @ S, dR @ S + R @ dS, ddR @ S + 2 * dR @ dS + R @ ddS)
 
     @property
     def rate(self) -> np.ndarray:
-        """Angular velocity in the turned frame, (n, 3) [rad/s]."""
+        """Return the angular velocity in the rotated frame, (n, 3) [rad/s]."""
         return _axial(self.R.transpose(0, 2, 1) @ self.dR)
 
     @property
     def acceleration(self) -> np.ndarray:
-        """Its time derivative, (n, 3) [rad/s^2]."""
+        """Return the time derivative of `rate`, (n, 3) [rad/s^2]."""
         return _axial(self.R.transpose(0, 2, 1) @ self.ddR)
 
 
 class Instants(NamedTuple):
-    """Motions at n instants that have nothing to do with each other.
+    """Motions at n independent instants.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Instants(NamedTuple):
 
 
 def instants(seed: int = 0) -> Instants:
-    """Seeded instants: both bodies move and turn, the platform about 1 m below the base."""
+    """Return random instants: both bodies translate and rotate, the platform about 1 m below the base."""
     rng = np.random.default_rng(seed)
     sizes = (ANGLES, RATES, ACCELERATIONS)
     body, base = (Motion(*(rng.uniform(-size, size, (COUNT, 6)) for size in sizes)) for _ in range(2))
@@ -71,7 +71,7 @@ def instants(seed: int = 0) -> Instants:
 
 
 def turning(motion: Motion) -> Turning:
-    """The rotations of a motion: R of angles + t rates + t^2 / 2 accelerations, derived by t at t = 0."""
+    """Return the rotations of a motion and their time derivatives, by differentiating R(angles(t)) at t = 0."""
     angles, rates, accelerations = (ca.SX.sym(name, 3) for name in ("angles", "rates", "accelerations"))
     t = ca.SX.sym("t")
     R = ca.vec(rotation(angles + t * rates + t**2 / 2 * accelerations))
@@ -83,6 +83,6 @@ def turning(motion: Motion) -> Turning:
 
 
 def _axial(matrices: np.ndarray) -> np.ndarray:
-    """The vectors of the skew parts of (n, 3, 3): what is symmetric, [omega]x^2, falls out."""
+    """Return the vectors of the skew parts of (n, 3, 3); the symmetric part, [omega]x^2, drops out."""
     skew = (matrices - matrices.transpose(0, 2, 1)) / 2
     return np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)

@@ -9,26 +9,26 @@ from ...ocp.tasks.path import CirclePath, Motion
 from .plans import BELOW, RATE, SECONDS
 
 RADIUS = 1.0  # of the circle in VI.A and VI.B [m]
-FEASIBLE = 0.15  # [m], assumed where the paper's own circle has no tensions to speak of
+FEASIBLE = 0.15  # [m], assumed where no tensions of the paper's own circle are inside their limits
 TIMES = np.linspace(0.0, SECONDS, 1001)
 
 
 def circle(radius: float, times: np.ndarray = TIMES, below: float = BELOW) -> Motion:
-    """The circle in {A} about a point `below` [m] under the quadrotor, level; its three parts are (n, 6)."""
+    """Return the circle in {A} about a point `below` [m] under the quadrotor, level; its three parts are (n, 6)."""
     return CirclePath(kind="circle", centre=(0.0, 0.0, -below), radius=radius, rate=RATE).at(times, SECONDS)
 
 
 def steady_tensions(dynamics: Dynamics, motion: Motion, base: Motion | None = None) -> np.ndarray:
-    """T = A^-1 w of a robot with six cables and one carrier, (n, 6) [N]: its only tensions, negative where they push.
+    """Return T = A^-1 w of a robot with six cables and one carrier, (n, 6) [N]: negative where a cable would push.
 
     Parameters
     ----------
     dynamics
-        Of that robot.
+        Dynamics of that robot.
     motion
-        Of the platform in {A}.
+        Motion of the platform in {A}.
     base
-        Of the carrier in {G}; None: hovering, level.
+        Motion of the carrier in {G}; default: hovering, level.
     """
     w = dynamics.relative.required_wrench(*motion, *(base or ()))
     return np.linalg.solve(dynamics.relative.wrench_matrix(motion.pose), w[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""Which point of the ring a cable joins to which point of the platform: the printed pairing has no inverse of J."""
+"""The pairing of anchors and attachments: with the printed one J has no inverse."""
 
 from __future__ import annotations
 
@@ -15,32 +15,33 @@ ROWS = 6  # of J, whose inverse step 7 of section V takes
 
 
 def chapter() -> Chapter:
-    """The rank of J by the printed pairing, and by the crossed one that the other chapters use."""
+    """Check the rank of J of the printed pairing, and of the crossed pairing that the other chapters use."""
     robot = load("wang-flying")
     printed, crossed = diagnose(load("wang-flying-printed")), diagnose(robot)
     values = ", ".join(f"{value:.3g}" for value in crossed.singular_values)
     claim = stated(
         "pairing",
         "Eqs. 2, 3, 38, section V step 7",
-        "Cable i joins A_i to B_i, both 60 degrees apart from one to the next, and T = J^-1 (...) : J has rank 6.",
+        "Cable i joins A_i to B_i, neighbours are separated by 60 degrees, and T = J^-1 (...) (rank of J).",
         float(ROWS),
         float(printed.rank_level),
         holds=printed.rank_level == ROWS,
         otherwise=Verdict.IMPOSSIBLE,
         agrees="J has full rank at level poses.",
-        differs=f"The rank at every level pose tried is the computed one, because {printed.reason}. Crossed pairs of "
-        f"the same points (A1-B2, A2-B1, ...) have rank {crossed.rank}, singular values {values} (moments over "
-        f"{robot.length:.3g} m): all else is computed with these.",
+        differs=f"At every level pose that was tried J has the computed rank, because {printed.reason}. Crossed pairs "
+        "of "
+        f"the same points (A1-B2, A2-B1, ...) have rank {crossed.rank} and singular values {values} (moments over "
+        f"{robot.length:.3g} m); all other chapters use them.",
         figure="pairing",
     )
     pairs = {
         f"as printed: rank {printed.rank}": _points("wang-flying-printed"),
         f"crossed: rank {crossed.rank}": _points("wang-flying"),
     }
-    return Chapter([claim], {"pairing": Drawing("The cables seen from above, numbered", from_above(pairs))})
+    return Chapter([claim], {"pairing": Drawing("The numbered cables from above", from_above(pairs))})
 
 
 def _points(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Anchors and attachments, (6, 3) each; cable i has the number of its anchor."""
+    """Return anchors and attachments, (6, 3) each; cable i has the number of its anchor."""
     robot = load(name)
     return robot.anchors, robot.attachments

@@ -1,4 +1,4 @@
-"""Paper F's Table 1: what this run computes with, and whether its numbers go together."""
+"""Paper F's Table 1: the parameters of this run, and whether they are consistent."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ CENTRE = 1.0  # z of the circle's centre in {A}, as sections VI.A and VI.B print
 
 
 def chapter() -> Chapter:
-    """Table 1 against the robot that the run uses, and against itself."""
+    """Compare Table 1 with the robot that this run uses, and check its consistency."""
     robot = load("wang-flying-printed")
     return Chapter([*_used(robot), _rigid(), _gyration(), _height(robot)])
 
 
 def _used(robot: Robot) -> list[Claim]:
-    """The robot file against the table, in groups."""
+    """Compare the robot file with the table, in groups."""
     aero = robot.platform.aero
     assert aero is not None
     cable = robot.cables[0]
@@ -77,19 +77,19 @@ def _used(robot: Robot) -> list[Claim]:
         compared(
             f"table-1-{name}",
             "Table 1",
-            f"{says}.",
+            f"{statement}.",
             printed,
             tuple(float(value) for value in computed),
             within=1e-9 * max(printed),
-            agrees="What this run computes with, read back from the robot's file.",
-            differs="The robot's file has other numbers than the table.",
+            agrees="The robot file of this run has the same numbers.",
+            differs="The robot file of this run has other numbers.",
         )
-        for name, says, printed, computed in groups
+        for name, statement, printed, computed in groups
     ]
 
 
 def _ring(points: np.ndarray) -> tuple[float, float, float]:
-    """Radius [m], angle between neighbours [degrees] and distance along z [m] of six points, (6, 3)."""
+    """Return radius [m], angle between neighbours [degrees] and distance along z [m] of six points, (6, 3)."""
     angles = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     return (
         float(np.hypot(points[:, 0], points[:, 1]).mean()),
@@ -103,47 +103,50 @@ def _rigid() -> Claim:
     return stated(
         "table-1-rigid",
         "Table 1",
-        "The moments of inertia are those of a rigid body: none exceeds the sum of the others.",
+        "The moments of inertia are those of a rigid body (largest moment, sum of the others).",
         PRINTED["I_z"],
         others,
         holds=PRINTED["I_z"] <= others,
-        agrees="I_z is no more than I_x + I_y, the computed value.",
-        differs="I_z is more than I_x + I_y, the computed value, which no body has.",
+        agrees="I_z is not larger than I_x + I_y, the computed value.",
+        differs="I_z is larger than I_x + I_y, the computed value, which is impossible for a rigid body.",
         unit="kg m^2",
     )
 
 
 def _gyration() -> Claim:
-    """I_z of all mass on a circle of radius r is m r^2: no body that ends there has more."""
+    """Compare I_z with m r^2, the largest that a body within the radius r can have."""
     reach = max(PRINTED["r_B"], float(np.sqrt(PRINTED["S"] / np.pi)))
     most = PRINTED["m_B"] * reach**2
     radius = float(np.sqrt(PRINTED["I_z"] / PRINTED["m_B"]))
     return stated(
         "table-1-gyration",
         "Table 1",
-        "A platform of 1.2 kg, with its cables at r_B = 0.25 m and a cross section of 0.16 m^2, has this I_z.",
+        "A platform of 1.2 kg with attachments at r_B = 0.25 m and a cross section of 0.16 m^2 has this I_z.",
         PRINTED["I_z"],
         most,
         holds=PRINTED["I_z"] <= most,
         agrees="A body within that radius can have it.",
-        differs=f"All of the mass at {reach:.2f} m from the axis gives the computed value; I_z asks for a gyration "
-        f"radius of {radius:.2f} m. It is computed with as printed.",
+        differs=f"The whole mass at {reach:.2f} m from the axis has the computed I_z; the printed I_z requires a "
+        "radius of "
+        f"gyration of {radius:.2f} m. All chapters use the printed I_z.",
         unit="kg m^2",
     )
 
 
 def _height(robot: Robot) -> Claim:
-    """Heights in {G} decide the sign of z in {A}."""
+    """Compare the signs of z in {A} with the heights in {G}."""
     centre = CIRCLE - QUADROTOR
     return compared(
         "eq-2-height",
         "Eq. 2, VI.A, VI.B",
-        "a_i has z = +H_1 and the circle's centre z = +1 in {A}, which at zero angles is turned as {G}, with z up.",
+        "a_i has z = +H_1 and the centre of the circle z = +1 in {A}, whose axes at zero angles are those of {G}, z "
+        "up.",
         (PRINTED["H_1"], CENTRE),
         (float(np.sign(centre)) * PRINTED["H_1"], centre),
         within=1e-9,
-        agrees="The heights in {G} say so too.",
-        differs=f"The circle is at {CIRCLE:g} m under a quadrotor at {QUADROTOR:g} m, so what hangs below has z < 0 in "
-        f"{{A}}: the ring at {robot.anchors[0, 2]:g} m, the centre at {-BELOW:g} m.",
+        agrees="The heights in {G} agree.",
+        differs=f"The circle is at {CIRCLE:g} m under a quadrotor at {QUADROTOR:g} m, so points below it have z < 0 in "
+        f"{{A}}: "
+        f"the anchors {robot.anchors[0, 2]:g} m, the centre {-BELOW:g} m.",
         unit="m",
     )

@@ -1,7 +1,7 @@
 """Three plans of paper F's robot, one for each of the motions that section VI simulates.
 
-The paper's platform circles with r = 1 m, which no cables that only pull can do under a quadrotor that hovers or flies
-straight (`flying_circle`). What can be done instead:
+The platform of the paper follows circles with r = 1 m, which cables that only pull cannot give under a quadrotor that
+hovers or flies straight (`circle`). These plans replace them:
 
 - VI.B, the circle in {G}, with the quadrotor free to move beside its hovering point;
 - VI.A, the helix in {G}, with the quadrotor free to leave its straight line;
@@ -29,12 +29,12 @@ Vector = tuple[float, float, float]
 
 
 def circle() -> Task:
-    """VI.B: the circle about a hovering point, the quadrotor free."""
+    """Return VI.B: the circle about a hovering point, with the quadrotor free."""
     return tasks()[1]
 
 
 def helix() -> Task:
-    """VI.A: the helix about a straight flight, the quadrotor free."""
+    """Return VI.A: the helix about a straight flight, with the quadrotor free."""
     path = CirclePath(
         kind="circle",
         centre=_vector(START - [0, 0, BELOW]),
@@ -48,13 +48,13 @@ def helix() -> Task:
 
 
 def pitching() -> Task:
-    """VI.C: a small circle in the frame of a quadrotor that moves and pitches."""
+    """Return VI.C: a small circle in the frame of a quadrotor that moves and pitches."""
     path = CirclePath(kind="circle", frame="quad", centre=(0, 0, -BELOW), radius=0.15, rate=RATE)
     return Task(name="circle-pitching", path=path, base=GivenBase(kind="given", paths={"quad": pitching_flight()}))
 
 
 def pitching_flight(largest: float = PITCH) -> SamplePath:
-    """The flight of VI.C, pitching by up to `largest` [rad], with the surge that belongs to it."""
+    """Return the flight of VI.C, pitching by up to `largest` [rad], with its surge."""
     times = np.linspace(0.0, SECONDS, 101)
     pitch = largest * np.sin(RATE * times)
     flight = START + times[:, None] * (END - START) / SECONDS
@@ -65,7 +65,7 @@ def pitching_flight(largest: float = PITCH) -> SamplePath:
 
 
 def surge(times: np.ndarray, largest: float = PITCH) -> np.ndarray:
-    """How far along x the pitch throws the quadrotor off its line [m]: ddx = g tan(pitch), to third order in pitch.
+    """Return the deviation from the line along x [m] by ddx = g tan(pitch), to third order in pitch.
 
     With s = sin(RATE t) and P = `largest`, tan(P s) = P s + (P s)^3 / 3 and s^3 = (3 sin(RATE t) - sin(3 RATE t)) / 4.
     """

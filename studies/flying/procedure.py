@@ -1,4 +1,4 @@
-"""Paper F's section V, the procedure for the driving forces, run step by step and held against the toolkit's own.
+"""Paper F's section V, the procedure for the driving forces, run step by step and compared with this toolkit.
 
 Each step is taken as printed, where it can be, instant by instant and cable by cable: lengths by Eq. 5, damping by
 Eq. 11, elasticity by the assembled chain of Eq. 21, T by Eq. 38. `driving_force` does the same in one pass over arrays.
@@ -32,7 +32,7 @@ SAME = 1e-9  # [m, N]
 
 @dataclass(frozen=True)
 class Run:
-    """What the steps gave, (n, 6) each; see `driving_force` for the names."""
+    """Results of the steps, (n, 6) each; see `driving_force` for the names."""
 
     times: np.ndarray  # (n,)
     lengths: np.ndarray
@@ -43,7 +43,7 @@ class Run:
 
 
 def chapter() -> Chapter:
-    """The eight steps, and where they are wrong or open."""
+    """Run the eight steps and compare them."""
     robot, motion, shake = load("wang-flying"), Motion(*(part[ROWS] for part in circle(FEASIBLE))), vibration(AMPLITUDE)
     run = steps(robot, motion, shake[ROWS])
     own = driving_force(robot, *motion, shake[ROWS], STEP, ELEMENTS)
@@ -62,7 +62,7 @@ def chapter() -> Chapter:
 
 
 def steps(robot: Robot, motion: Motion, shake: np.ndarray) -> Run:
-    """Steps 2 to 8 for a quadrotor that hovers, level, so that {A} and {G} have the same axes."""
+    """Run steps 2 to 8 for a level, hovering quadrotor, so that {A} and {G} have the same axes."""
     rows = [_instant(robot, pose, small) for pose, small in zip(motion.pose, shake, strict=True)]
     lengths, elements, dT_C, dT_K = (np.stack(part) for part in zip(*rows, strict=True))
     dynamics = Dynamics(robot).relative
@@ -78,9 +78,9 @@ def steps(robot: Robot, motion: Motion, shake: np.ndarray) -> Run:
 
 
 def _instant(robot: Robot, pose: np.ndarray, shake: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Steps 2 to 5 at one instant: lengths, element lengths, dT_C and dT_K of each cable, (6,) each."""
+    """Run steps 2 to 5 at one instant; return lengths, element lengths, dT_C and dT_K of each cable, (6,) each."""
     R = rotation(ca.DM(pose[3:])).full()
-    found = []
+    rows = []
     for cable in robot.cables:
         assert cable.stiffness is not None
         assert cable.damping is not None
@@ -90,15 +90,15 @@ def _instant(robot: Robot, pose: np.ndarray, shake: np.ndarray) -> tuple[np.ndar
         dB = shake[:3] + np.cross(shake[3:], arm)
         moved = float(np.linalg.norm(anchor - end - dB))
         chain = ElementChain(anchor, end, cable.stiffness, ELEMENTS)
-        found.append((length, length / ELEMENTS, cable.damping * (moved - length) / STEP, chain.end_increment(dB)))
-    return tuple(np.array(column) for column in zip(*found, strict=True))
+        rows.append((length, length / ELEMENTS, cable.damping * (moved - length) / STEP, chain.end_increment(dB)))
+    return tuple(np.array(column) for column in zip(*rows, strict=True))
 
 
 def _given() -> Claim:
     return undetermined(
         "step-1",
         "section V, step 1",
-        "Given are the points A_i and B_i, the time step dt, E, A and C; then n elements, and the vibration.",
+        "The points A_i and B_i, the time step dt, E, A, C, the number n of elements and the vibration are given.",
         None,
         f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um",
         missing="Points, E, A and C are in Table 1; dt, n and the vibration are not printed, and assumed.",
@@ -111,19 +111,19 @@ def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, uni
     return compared(
         name,
         f"section V, step {step}",
-        f"The {what}: largest difference of this step, taken cable by cable, from the toolkit's own.",
+        f"The {what} (largest difference from this toolkit).",
         0.0,
         off,
         within=SAME,
-        agrees=f"The step gives what the toolkit has: up to {np.abs(own).max():.3g} {unit}.",
-        differs="The step gives something else than the toolkit.",
+        agrees=f"The step and this toolkit give the same, up to {np.abs(own).max():.3g} {unit}.",
+        differs="The step and this toolkit give different results.",
         unit=unit,
         figure="procedure",
     )
 
 
 def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
-    """Newton and Euler in {G} with F = T + dT on the platform, and what is off if T' is the time derivative of T."""
+    """Check the balance in {G} with F = T + dT on the platform, and its error if T' is the time derivative of T."""
     dynamics = Dynamics(robot)
     A, w = dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion)
     dT = run.dT_C + run.dT_K
@@ -132,12 +132,13 @@ def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
     return compared(
         "step-7",
         "section V, step 7",
-        "T = J^-1 (M ddX_b + F_B + D_B - W_e - J T'): what is left of the platform's balance if T' is dT/dt.",
+        "T = J^-1 (M ddX_b + F_B + D_B - W_e - J T') (error of the platform's balance if T' is dT/dt).",
         0.0,
         literal,
         within=SAME,
         agrees="The derivative balances the platform.",
-        differs=f"T' is defined nowhere; with dT, the increment of step 6, in its place {meant:.0e} N is left.",
+        differs="T' is not defined in the paper. With dT, the increment of step 6, in its place the error is "
+        f"{meant:.0e} N.",
         unit="N",
         figure="procedure",
     )
@@ -148,29 +149,29 @@ def _inverse() -> Claim:
     return stated(
         "step-7-inverse",
         "section V, step 7",
-        "J^-1 exists for the printed pairing at the level poses of section VI: the rank of J.",
+        "J^-1 exists for the printed pairing at the level poses of section VI (rank of J).",
         6.0,
         float(rank),
         holds=rank == 6,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="J has its inverse.",
-        differs="There is no inverse; step 7 is run with the crossed pairs.",
+        agrees="J has an inverse.",
+        differs="There is no inverse; step 7 is run with the crossed pairs instead.",
     )
 
 
 def _clock() -> Claim:
-    """K = 1, 2, 3, ... with t = t + k dt each time."""
+    """Compare the times of t = t + k dt for k = 1, 2, 3, ... with those of a constant step."""
     count = 4
     printed = tuple(accumulate(k * STEP for k in range(count)))
     return compared(
         "step-8",
         "section V, step 8",
-        "Let k = k + 1, then t = t + k dt: the first times of the loop.",
+        "Let k = k + 1, then t = t + k dt (first times of the loop).",
         printed,
         tuple(k * STEP for k in range(count)),
         within=1e-12,
-        agrees="The times are equally far apart.",
-        differs="To the letter the steps grow with k; t = k dt is meant.",
+        agrees="The time step is constant.",
+        differs="Taken literally the steps grow with k; t = k dt is meant.",
         unit="s",
     )
 

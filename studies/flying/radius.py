@@ -1,7 +1,7 @@
-"""How large a circle paper F's robot can fly under a hovering quadrotor, by bisection, and how far below it.
+"""The largest circle of paper F's robot under a hovering quadrotor, by bisection, and at other depths below it.
 
-At each radius the whole turn is asked of the tension solver: it is feasible if tensions above a floor exist at every
-instant. They rise and fall steadily with the radius, so that halving the interval finds the largest.
+A radius is feasible if tensions above a floor exist at every instant of the turn, by the tension solver. The smallest
+tension falls with the radius, so bisection gives the largest feasible one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DEPTHS = np.linspace(0.4, 4.0, 10)  # of the circle under the quadrotor [m]
 
 
 def largest_radius(dynamics: Dynamics, floor: float = 0.0, below: float = BELOW, most: float = 2.0) -> float:
-    """Largest radius [m], up to `most`, for which tensions of at least `floor` [N] exist all the way round."""
+    """Return the largest radius [m], up to `most`, at which tensions of at least `floor` [N] exist all the time."""
     low, high = 0.0, most
     while high - low > PRECISION:
         middle = (low + high) / 2
@@ -36,28 +36,28 @@ def largest_radius(dynamics: Dynamics, floor: float = 0.0, below: float = BELOW,
 
 
 def feasible(dynamics: Dynamics, radius: float, floor: float, below: float = BELOW) -> bool:
-    """Whether tensions of at least `floor` [N], below the robot's t_max, exist at every instant of the turn."""
+    """Return whether tensions from `floor` [N] to the robot's t_max exist at every instant of the turn."""
     robot, motion = dynamics.robot, circle(radius, TURN, below)
     A, w = dynamics.relative.wrench_matrix(motion.pose), dynamics.relative.required_wrench(*motion)
     return bool(solve_batch(A, w, np.full(robot.m, floor), robot.t_max).feasible.all())
 
 
 def chapter() -> Chapter:
-    """The largest radius at the paper's depth, against the printed one."""
+    """Compare the largest radius at the paper's depth with the printed one."""
     dynamics = Dynamics(load("wang-flying"))
     floor = float(dynamics.robot.t_min.max())
     taut, kept = largest_radius(dynamics), largest_radius(dynamics, floor)
-    rest_in_words = f"with tensions of at least {floor:g} N it is {kept:.3f} m"
+    with_floor = f"with tensions of at least {floor:g} N it is {kept:.3f} m"
     claim = stated(
         "radius",
         "VI.A, VI.B",
-        "The platform flies a circle of this radius, 1 m below the hovering quadrotor, on cables that only pull.",
+        "The platform follows a circle of this radius, 1 m below the hovering quadrotor, on cables that only pull.",
         RADIUS,
         taut,
         holds=taut >= RADIUS,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees=f"The largest radius without a pushing cable is no smaller; {rest_in_words}.",
-        differs=f"Beyond the computed radius some cable would have to push; {rest_in_words}.",
+        agrees=f"The largest radius without a pushing cable is not smaller; {with_floor}.",
+        differs=f"Beyond the computed radius some cable would have to push; {with_floor}.",
         unit="m",
         figure="radius",
     )

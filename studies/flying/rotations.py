@@ -1,4 +1,4 @@
-"""Paper F's rotations: Eqs. 1, 9, 27, 28, 30, 31 and 32, held against derivatives of rotation matrices."""
+"""Paper F's rotations: Eqs. 1, 9, 27, 28, 30, 31 and 32, compared with derivatives of rotation matrices."""
 
 from __future__ import annotations
 
@@ -13,62 +13,64 @@ from ..accounts.claim import Claim, compared, stated
 from .instants import Instants, Turning, instants
 
 ROUNDING = 1e-12
-SMALL = 1e-4  # [rad], a small turn as Eq. 9 has it
+SMALL = 1e-4  # [rad], a small rotation for Eq. 9
 
 
 def chapter() -> Chapter:
-    """The equations that turn angles into rates and accelerations."""
-    seen = instants()
-    return Chapter([_matrix(seen), _small_turn(), _rate(seen), _acceleration(seen), _composed(seen)])
+    """Check the equations that give angular velocity and acceleration from angles."""
+    samples = instants()
+    return Chapter([_matrix(samples), _small_turn(), _rate(samples), _acceleration(samples), _composed(samples)])
 
 
-def _matrix(seen: Instants) -> Claim:
-    """Row three is printed (-S theta, S phi C phi, C phi S phi): each phi may be read as roll or as yaw."""
-    roll, pitch, yaw = seen.base.pose[:, 3:].T
+def _matrix(samples: Instants) -> Claim:
+    """Check row three, printed (-S theta, S phi C phi, C phi S phi), with each phi read as roll or as yaw."""
+    roll, pitch, yaw = samples.base.pose[:, 3:].T
     lengths = [
         np.sin(pitch) ** 2 + (np.sin(a) * np.cos(b)) ** 2 + (np.cos(c) * np.sin(d)) ** 2
         for a, b, c, d in product((roll, yaw), repeat=4)
     ]
     off = min(float(np.abs(np.sqrt(squares) - 1).max()) for squares in lengths)
-    R = seen.R_A.R
+    R = samples.R_A.R
     ours = float(np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max())
     return stated(
         "eq-1",
         "Eqs. 1, 2",
-        "R of roll, pitch and yaw, phi printed for two of them: how far the length of its third row is from 1.",
+        "R of roll, pitch and yaw, where phi stands for two of them (difference of the norm of its third row from 1).",
         0.0,
         off,
         holds=off < ROUNDING,
-        agrees="Some reading of the letters gives a rotation.",
-        differs="No reading of each phi as roll or as yaw makes the third row a unit vector (computed: the best of "
-        f"them, at the worst angles tried); R = Rz(yaw) Ry(pitch) Rx(roll) is meant, orthogonal to {ours:.0e}.",
+        agrees="One reading of the letters gives a rotation.",
+        differs="Whether each phi is read as roll or as yaw, the third row is no unit vector (computed: the best "
+        "reading "
+        f"at its worst angles); R = Rz(yaw) Ry(pitch) Rx(roll) is meant, orthogonal to {ours:.0e}.",
     )
 
 
 def _small_turn() -> Claim:
-    """R = 1 + [dTheta]x + O(dTheta^2)."""
+    """Check R = 1 + [dTheta]x + O(dTheta^2)."""
     angles = SMALL * np.array([0.6, -0.8, 1.0])
     turned = rotation.rotation(ca.DM(angles)).full()
     off = float(np.abs(turned - np.eye(3) - ca.skew(ca.DM(angles)).full()).max())
     return stated(
         "eq-9",
         "Eqs. 9, 10",
-        "A small turn moves B_i by [dTheta]x (R b_i), the yaw in row one and the roll in row two of the matrix.",
+        "A small rotation moves B_i by [dTheta]x (R b_i), with the yaw in row one and the roll in row two of the "
+        "matrix.",
         0.0,
         off,
         holds=off < SMALL**2,
-        agrees=f"At {SMALL:g} rad the matrix is R - 1 but for terms of second order.",
-        differs=f"At {SMALL:g} rad the matrix is off by more than terms of second order.",
+        agrees=f"At {SMALL:g} rad the matrix is R - 1 up to terms of second order.",
+        differs=f"At {SMALL:g} rad the matrix differs from R - 1 by more than terms of second order.",
     )
 
 
-def _rate(seen: Instants) -> Claim:
-    ours = _each(rotation.body_rate, seen.base.pose, seen.base.velocity)
-    off = float(np.abs(ours - seen.R_A.rate).max())
+def _rate(samples: Instants) -> Claim:
+    ours = _each(rotation.body_rate, samples.base.pose, samples.base.velocity)
+    off = float(np.abs(ours - samples.R_A.rate).max())
     return compared(
         "eq-27-28",
         "Eqs. 27, 28",
-        "omega = P dTheta: its difference from the angular velocity in R^T dR.",
+        "omega = P dTheta (difference from the angular velocity in R^T dR).",
         0.0,
         off,
         within=ROUNDING,
@@ -79,54 +81,58 @@ def _rate(seen: Instants) -> Claim:
 
 
 def printed_acceleration(motion_pose: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Eqs. 31 and 32 as printed, dP dTheta + ddTheta, (n, 3) [rad/s^2], of motions (n, 6) each."""
+    """Return Eqs. 31 and 32 as printed, dP dTheta + ddTheta, (n, 3) [rad/s^2], of motions (n, 6) each."""
     bent = _each(lambda a, r: rotation.rate_matrix_derivative(a, r) @ r, motion_pose, velocity)
     return bent + acceleration[:, 3:]
 
 
-def _acceleration(seen: Instants) -> Claim:
-    true = seen.R_A.acceleration
-    printed = printed_acceleration(*seen.base)
+def _acceleration(samples: Instants) -> Claim:
+    true = samples.R_A.acceleration
+    printed = printed_acceleration(*samples.base)
     size = np.linalg.norm(true, axis=1)
     off = np.linalg.norm(printed - true, axis=1) / size
-    bent = _each(lambda a, r: rotation.rate_matrix_derivative(a, r) @ r, seen.base.pose, seen.base.velocity)
-    ours = bent + _each(rotation.body_rate, seen.base.pose, seen.base.acceleration)
+    bent = _each(lambda a, r: rotation.rate_matrix_derivative(a, r) @ r, samples.base.pose, samples.base.velocity)
+    ours = bent + _each(rotation.body_rate, samples.base.pose, samples.base.acceleration)
     rounding = float((np.linalg.norm(ours - true, axis=1) / size).max())
     return compared(
         "eq-31-32",
         "Eqs. 31, 32",
-        "alpha = dP dTheta + ddTheta: its median relative difference from the derivative of omega.",
+        "alpha = dP dTheta + ddTheta (median relative difference from the derivative of omega).",
         0.0,
         float(np.median(off)),
         within=ROUNDING,
         agrees="The printed form is the derivative of P dTheta.",
-        differs=f"alpha = dP dTheta + P ddTheta, off by {rounding:.0e}; without the P the error grows with the angles "
-        f"(here up to {np.abs(seen.base.pose[:, 3:]).max():.1f} rad) and reaches {off.max():.0%}.",
+        differs=f"alpha = dP dTheta + P ddTheta holds to {rounding:.0e}; without the P the error grows with the angles "
+        f"(here up to {np.abs(samples.base.pose[:, 3:]).max():.1f} rad) and reaches {off.max():.0%}.",
     )
 
 
-def _composed(seen: Instants) -> Claim:
-    """R_A (alpha_A + R alpha_B + omega_A x R Omega) against the second derivative of R_A R."""
-    whole: Turning = seen.R_A.then(seen.R_B)
+def _composed(samples: Instants) -> Claim:
+    """Compare R_A (alpha_A + R alpha_B + omega_A x R Omega) with the second derivative of R_A R."""
+    whole: Turning = samples.R_A.then(samples.R_B)
     in_world = _turn(whole.R, whole.acceleration)
-    R = seen.R_B.R
-    inner = seen.R_A.acceleration + _turn(R, seen.R_B.acceleration) + np.cross(seen.R_A.rate, _turn(R, seen.R_B.rate))
-    off = float(np.abs(_turn(seen.R_A.R, inner) - in_world).max())
+    R = samples.R_B.R
+    inner = (
+        samples.R_A.acceleration
+        + _turn(R, samples.R_B.acceleration)
+        + np.cross(samples.R_A.rate, _turn(R, samples.R_B.rate))
+    )
+    off = float(np.abs(_turn(samples.R_A.R, inner) - in_world).max())
     return compared(
         "eq-30",
         "Eq. 30",
-        "alpha of the platform in {G} from those of {A} and of {B} in {A}: its difference from that of R_A R_B.",
+        "alpha of the platform in {G} from those of {A} and of {B} in {A} (difference from that of R_A R_B).",
         0.0,
         off,
         within=ROUNDING,
-        agrees="Eq. 30 holds to rounding, with alpha_A and alpha_B as they should be.",
+        agrees="Eq. 30 holds to rounding, with the correct alpha_A and alpha_B.",
         differs="Eq. 30 is not the angular acceleration of the product of both rotations.",
         unit="rad/s^2",
     )
 
 
 def _each(function, pose: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """A CasADi expression of angles and rates, (3, 1) each, at every row of (n, 6) each: (n, 3)."""
+    """Evaluate a CasADi expression of angles and rates, (3, 1) each, at every row of (n, 6) each: (n, 3)."""
     angles, speeds = ca.SX.sym("angles", 3), ca.SX.sym("rates", 3)
     f = ca.Function("each", [angles, speeds], [function(angles, speeds)])
     return np.asarray(f(pose[:, 3:].T, rates[:, 3:].T)).T

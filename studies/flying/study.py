@@ -24,14 +24,14 @@ PAPER = Paper(
 )
 CHAPTERS = {
     "Table 1": parameters.chapter,
-    "Which cable goes where": pairing.chapter,
+    "The pairing of the cables": pairing.chapter,
     "Rotations (section II, IV)": rotations.chapter,
     "A vibrating cable (section III)": cable.chapter,
     "Forces and moments (section IV)": balance.chapter,
     "The procedure (section V)": procedure.chapter,
     "Wind (section VI)": wind.chapter,
     "A straight flight (section VI.A)": helix.chapter,
-    "A circle of 1 m, and its repair (section VI.B)": repair.chapter,
+    "A circle of 1 m, and what makes it possible (section VI.B)": repair.chapter,
     "The largest circle (section VI.B)": radius.chapter,
     "A vibrating platform (section VI.B)": vibration.chapter,
     "A moving quadrotor (section VI.C)": disturbance.chapter,

@@ -1,8 +1,8 @@
 """Paper F's section VI.B: cable 1 while the platform vibrates under a hovering quadrotor (figures 8 to 11).
 
 The paper prints neither the amplitude and the frequency of the vibration nor the time step. Assumed: along each axis a
-sine of one amplitude at 5, 6 and 7 Hz, no turning; steps of 10 ms; 8 elements, whose number does not matter. On the
-printed circle the steady tension of cable 1 passes zero, so the ratio dT / T is followed on one of 0.15 m.
+sine of one amplitude at 5, 6 and 7 Hz, no rotation; steps of 10 ms; 8 elements, whose number does not matter. On the
+printed circle the steady tension of cable 1 passes zero, so the ratio dT / T is computed on a circle of 0.15 m.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ PHASES = np.array([0.0, 1.0, 2.0])  # [rad]
 AMPLITUDES = np.geomspace(1e-8, 1e-4, 17)  # [m]
 WINDINGS: tuple[Literal["printed", "paid out"], ...] = ("printed", "paid out")
 HALF_WINDOW = 0.5  # of the figure [s]
-NEAR_ZERO, FAR = 1e-10, 1e-3  # amplitudes between which the printed ratio is looked for [m]
+NEAR_ZERO, FAR = 1e-10, 1e-3  # amplitudes between which the printed ratio is searched [m]
 
 
 def chapter() -> Chapter:
-    """Lengths, tensions and the ratio of cable 1."""
+    """Check lengths, tensions and the ratio of cable 1."""
     robot = load("wang-flying")
     dynamics = Dynamics(robot)
     small, large = circle(FEASIBLE), circle(RADIUS)
@@ -60,18 +60,18 @@ def chapter() -> Chapter:
 
 
 def vibration(amplitude: float) -> np.ndarray:
-    """What the vibration adds to the pose at each of `TIMES`, (n, 6) [m, rad], `amplitude` [m] along each axis."""
+    """Return the vibration of the pose at each of `TIMES`, (n, 6) [m, rad], with `amplitude` [m] along each axis."""
     shift = amplitude * np.sin(2 * np.pi * np.outer(TIMES, HERTZ) + PHASES)
     return np.hstack([shift, np.zeros_like(shift)])
 
 
 def forces(robot: Robot, amplitude: float, step: float = STEP) -> DrivingForce:
-    """The driving forces on the small circle with that vibration."""
+    """Return the driving forces on the small circle with that vibration."""
     return driving_force(robot, *circle(FEASIBLE), vibration(amplitude), step, ELEMENTS)
 
 
 def largest_ratios(robot: Robot, amplitudes: np.ndarray, step: float = STEP) -> np.ndarray:
-    """Largest dT / T of cable 1 over the turn at each of the amplitudes (k,) [m], (k,); all of them in one pass."""
+    """Return the largest dT / T of cable 1 over the turn at each of the amplitudes (k,) [m], (k,)."""
     count = len(amplitudes)
     motion = Motion(*(np.tile(part, (count, 1)) for part in circle(FEASIBLE)))
     shaken = np.concatenate([vibration(float(amplitude)) for amplitude in amplitudes])
@@ -80,13 +80,12 @@ def largest_ratios(robot: Robot, amplitudes: np.ndarray, step: float = STEP) -> 
 
 
 def amplitude_of(robot: Robot, ratio: float, step: float = STEP) -> float:
-    """The amplitude [m] at which the largest dT / T is `ratio`."""
+    """Return the amplitude [m] at which the largest dT / T is `ratio`."""
 
     def above(amplitude: float) -> float:
         return float(largest_ratios(robot, np.array([amplitude]), step)[0]) - ratio
 
-    found = root_scalar(above, bracket=(NEAR_ZERO, FAR), method="brentq", xtol=1e-10)
-    return float(found.root)
+    return float(root_scalar(above, bracket=(NEAR_ZERO, FAR), method="brentq", xtol=1e-10).root)
 
 
 def _length(lengths: np.ndarray) -> Claim:
@@ -94,12 +93,12 @@ def _length(lengths: np.ndarray) -> Claim:
     return stated(
         "fig-9-length",
         "VI.B, figure 9",
-        "Over the turn cable 1 is short, long, short: its length at the start, after half a turn and at the end.",
+        "Over the turn cable 1 is short, long, short (length at the start, after half a turn and at the end).",
         "short, long, short",
         f"{start:.3f} m, {half:.3f} m, {end:.3f} m",
         holds=bool(half > max(start, end)),
-        agrees="With the turn, whose start is not printed, beginning at anchor 1.",
-        differs="The length varies another way.",
+        agrees="It is, if the turn, whose start is not printed, begins at anchor 1.",
+        differs="The length varies differently.",
         figure="turn",
     )
 
@@ -109,19 +108,20 @@ def _tension(lengths: np.ndarray, tensions: np.ndarray, near: float) -> Claim:
     return stated(
         "fig-10-tension",
         "VI.B, figure 10",
-        "The longer cable 1 is, the more it has to pull: the correlation of its length and tension over the turn.",
+        "The longer cable 1 is, the larger is its tension (correlation of length and tension over the turn).",
         1.0,
         together,
         holds=together > 0,
         agrees="Length and tension rise together.",
-        differs=f"It is the other way round, on a circle of {FEASIBLE:g} m too ({near:.2f}): the longer cable is that "
-        "on the far side, and the load hangs on the near ones.",
+        differs=f"The opposite holds, on a circle of {FEASIBLE:g} m too ({near:.2f}): a long cable is on the far side "
+        "of the "
+        "platform, and the near cables carry the load.",
         figure="turn",
     )
 
 
 def _winding(robot: Robot, span: float) -> Claim:
-    """Eq. 13 to the letter on the printed circle, without any vibration."""
+    """Compare Eq. 13, taken literally, on the printed circle without vibration."""
     still, motion = np.zeros(6), circle(RADIUS)
     literal, paid_out = (
         float(driving_force(robot, *motion, still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max()) for how in WINDINGS
@@ -129,13 +129,14 @@ def _winding(robot: Robot, span: float) -> Claim:
     return compared(
         "eq-13",
         "Eqs. 12, 13",
-        f"Each step's winding adds E A / e de to the tension: the most of it in {STEP * 1e3:g} ms, without vibration.",
+        f"The winding of each step adds E A / e de to the tension (largest in {STEP * 1e3:g} ms, without vibration).",
         literal,
         paid_out,
         within=0.01 * span,
-        agrees="It is small beside the tension.",
-        differs="What the winch pays out stretches nothing; to the letter the steady winding alone would add "
-        f"the printed value, where the steady tension varies by {span:.0f} N over the turn.",
+        agrees="Both are the same beside the variation of the tension.",
+        differs="Cable that the winch pays out does not stretch. Taken literally, steady winding alone would add the "
+        "printed "
+        f"value in each step, while the steady tension varies by {span:.0f} N over the whole turn.",
         unit="N",
     )
 
@@ -144,60 +145,62 @@ def _superimposed() -> Claim:
     return undetermined(
         "fig-8",
         "VI.B, figures 8 and 9",
-        "The vibrating trajectory and length run about the expected ones with a small amplitude.",
+        "The vibrating trajectory and length oscillate about the expected ones with a small amplitude.",
         None,
         tuple(float(value) for value in HERTZ),
-        missing="Neither amplitude nor frequency is printed; assumed: sines along x, y and z, level.",
+        missing="Neither amplitude nor frequency is printed. Assumed: sines along x, y and z with these frequencies, "
+        "level.",
         unit="Hz",
         figure="vibration",
     )
 
 
 def _no_ratio(tensions: np.ndarray) -> Claim:
-    """Where T_1 changes its sign dT / T has no bound."""
+    """Check whether T_1 changes its sign, where dT / T has no bound."""
     crossing = TIMES[np.flatnonzero(np.diff(np.sign(tensions)))]
     when = ", ".join(f"{time:.1f} s" for time in crossing) or "none"
     return stated(
         "fig-11-circle",
         "VI.B, figure 11",
-        f"On the circle of {RADIUS:g} m dT / T of cable 1 has a largest value: zeros of its steady tension T.",
+        f"On the circle of {RADIUS:g} m dT / T of cable 1 has a largest value (zeros of its steady tension T).",
         "none",
         when,
         holds=not len(crossing),
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="T keeps its sign.",
-        differs="The steady tension of cable 1 passes zero there, so that any vibration gives a ratio without bound.",
+        agrees="T does not change its sign.",
+        differs="The steady tension of cable 1 passes zero there, so dT / T has no bound for any vibration.",
     )
 
 
 def _ratio(robot: Robot, amplitudes: dict[float, float]) -> Claim:
     steps = ", ".join(f"{amplitude * 1e6:.3g} um at {step * 1e3:g} ms" for step, amplitude in amplitudes.items())
-    found = float(largest_ratios(robot, np.array([amplitudes[STEP]]))[0])
+    ratio = float(largest_ratios(robot, np.array([amplitudes[STEP]]))[0])
     return undetermined(
         "fig-11",
         "VI.B, figure 11, conclusion 2",
-        f"The largest dT / T of cable 1 is 12.47 %: where that falls, on a circle of {FEASIBLE:g} m.",
+        f"The largest dT / T of cable 1 is 12.47 % (amplitude of the vibration for it, on a circle of {FEASIBLE:g} m).",
         f"{RATIO:.2%}",
-        f"{found:.2%} at {amplitudes[STEP] * 1e6:.2f} um",
-        missing=f"Amplitude, frequency and time step are not printed, and the ratio grows with the amplitude from "
-        f"0 up: it is the printed one at {steps} a step.",
+        f"{ratio:.2%} at {amplitudes[STEP] * 1e6:.2f} um",
+        missing="Amplitude, frequency and time step are not printed, and the ratio grows with the amplitude from zero. "
+        "It "
+        f"has the printed value at {steps} per step.",
         figure="ratio",
     )
 
 
 def _curves(robot: Robot, amplitude: float) -> Drawing:
-    """Figures 9 to 11 for the second about the largest ratio, where single waves can be seen."""
-    found, still = forces(robot, amplitude), forces(robot, 0.0)
-    rows = np.abs(TIMES - TIMES[np.abs(found.ratio[:, 0]).argmax()]) <= HALF_WINDOW
+    """Draw figures 9 to 11 for the second about the largest ratio, where single waves are visible."""
+    shaken, still = forces(robot, amplitude), forces(robot, 0.0)
+    rows = np.abs(TIMES - TIMES[np.abs(shaken.ratio[:, 0]).argmax()]) <= HALF_WINDOW
     damping = robot.cables[0].damping
     assert damping is not None
-    longer = found.dT_C[:, 0] * STEP / damping  # Eq. 11 backwards
+    longer = shaken.dT_C[:, 0] * STEP / damping  # Eq. 11 backwards
     panels = [
         Panel("length [m]", {"expected": still.lengths[rows, 0]}),
         Panel("added [um]", {"by vibration": 1e6 * longer[rows]}),
-        Panel("T [N]", {"expected": still.T[rows, 0], "with vibration": found.T[rows, 0]}),
-        Panel("dT [N]", {"by damping": found.dT_C[rows, 0], "by elasticity": found.dT_K[rows, 0]}),
-        Panel("dT / T [%]", {"with vibration": 100 * found.ratio[rows, 0]}, {"12.47 %": 100 * RATIO}),
+        Panel("T [N]", {"expected": still.T[rows, 0], "with vibration": shaken.T[rows, 0]}),
+        Panel("dT [N]", {"by damping": shaken.dT_C[rows, 0], "by elasticity": shaken.dT_K[rows, 0]}),
+        Panel("dT / T [%]", {"with vibration": 100 * shaken.ratio[rows, 0]}, {"12.47 %": 100 * RATIO}),
     ]
     return Drawing(
         f"Figures 9 to 11 about the largest ratio: cable 1, circle of {FEASIBLE:g} m, {amplitude * 1e6:.2g} um",
@@ -206,7 +209,7 @@ def _curves(robot: Robot, amplitude: float) -> Drawing:
 
 
 def _against_amplitude(robot: Robot) -> Drawing:
-    """The ratio for several steps, as far as it stays below 1."""
+    """Draw the ratio for several steps, as long as it is below 1."""
     ratios = {f"step {step * 1e3:g} ms": 100 * largest_ratios(robot, AMPLITUDES, step) for step in STEPS}
     shown = {name: np.where(values < 100, values, np.nan) for name, values in ratios.items()}
     panel = Panel("largest dT / T [%]", shown, {"12.47 % (printed)": 100 * RATIO}, logarithmic=True)

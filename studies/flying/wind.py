@@ -13,13 +13,13 @@ from ..accounts.claim import Claim, compared, stated, undetermined
 from .motion import TIMES
 
 PEAK = (5.0, 6.0, 2.0)  # printed in section VI [m/s]
-NOISE = 0.5  # printed, either way [m/s]
-STEADY = (0.35, 0.65)  # of the time, well inside the top of the trapezoid
+NOISE = 0.5  # printed, of either sign [m/s]
+STEADY = (0.35, 0.65)  # of the time, inside the top of the trapezoid
 AGAINST = np.array([-5.0, 0.0, 0.0])  # a wind that blows towards -x [m/s]
 
 
 def chapter() -> Chapter:
-    """Figure 5 as drawn by this run, and the force of the printed formula."""
+    """Check figure 5 as drawn by this run, and the force of the printed formula."""
     dynamics = Dynamics(load("wang-flying"))
     wind, calm = trapezoid(TIMES, PEAK, noise=NOISE), trapezoid(TIMES, PEAK, noise=0.0)
     still = np.zeros((len(TIMES), 6))
@@ -34,7 +34,7 @@ def _top(wind: np.ndarray) -> Claim:
     return compared(
         "fig-5-peak",
         "section VI, figure 5",
-        "The wind's largest speed along x, y and z, under the noise: its mean over the top of the trapezoid.",
+        "The largest wind speed along x, y and z without the noise (mean over the top of the trapezoid).",
         PEAK,
         tuple(float(value) for value in top),
         within=0.05,
@@ -54,8 +54,8 @@ def _noise(noise: np.ndarray) -> Claim:
         NOISE,
         most,
         holds=most <= NOISE,
-        agrees="No sample is beyond; the deviation, not printed, is taken for a third of that.",
-        differs="Some samples are beyond.",
+        agrees="No sample exceeds it. The standard deviation, which is not printed, is assumed as a third of it.",
+        differs="Some samples exceed it.",
         unit="m/s",
         figure="wind",
     )
@@ -66,17 +66,17 @@ def _shape() -> Claim:
     return undetermined(
         "fig-5-shape",
         "figure 5",
-        "When the wind rises, is steady and falls is drawn only.",
+        "The times at which the wind rises, is steady and falls are drawn only.",
         None,
         tuple(corner * TIMES[-1] for corner in corners),
-        missing="The corners of the trapezoid and the seed are not printed; assumed: rising and falling for 2 s each.",
+        missing="The corners of the trapezoid and the seed are not printed. Assumed: 2 s of rise and 2 s of fall.",
         unit="s",
         figure="wind",
     )
 
 
 def _sign(dynamics: Dynamics) -> Claim:
-    """V^2 forgets where the wind comes from."""
+    """Compare V^2, which has no direction, with V |V| in a wind along -x."""
     aero = dynamics.robot.platform.aero
     assert aero is not None
     printed = 0.5 * aero.drag * aero.air_density * AGAINST[0] ** 2 * aero.area
@@ -87,15 +87,16 @@ def _sign(dynamics: Dynamics) -> Claim:
         printed,
         float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), AGAINST)[0]),
         within=1e-9,
-        agrees="The force points where the wind blows.",
-        differs="The printed force is never negative, so a wind towards -x would pull the platform towards +x: it is "
-        "V |V|, V being the air's velocity relative to the platform.",
+        agrees="The force has the direction of the wind.",
+        differs="The printed force is never negative, so a wind towards -x would pull the platform towards +x. It must "
+        "be "
+        "V |V|, where V is the air's velocity relative to the platform.",
         unit="N",
     )
 
 
 def _lift(dynamics: Dynamics) -> Claim:
-    """C_l rho (V_x^2 + V_y^2) S / 2, up, at the strongest wind."""
+    """Compare C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind."""
     aero = dynamics.robot.platform.aero
     assert aero is not None
     printed = 0.5 * aero.lift * aero.air_density * (PEAK[0] ** 2 + PEAK[1] ** 2) * aero.area
@@ -106,8 +107,8 @@ def _lift(dynamics: Dynamics) -> Claim:
         printed,
         float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[2]),
         within=1e-9,
-        agrees="Computed with as printed; the wind along z, drawn in figure 5, has no part in any force.",
-        differs="This run's lift is another.",
+        agrees="The lift is as printed; the wind along z, drawn in figure 5, is part of no force.",
+        differs="The lift of this run is another.",
         unit="N",
     )
 

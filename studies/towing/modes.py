@@ -1,4 +1,4 @@
-"""Paper C's three ways to drive, for m = 3 to 6: a load carried between two poses where it rests, with least effort."""
+"""Paper C's three drives for m = 3 to 6: a load is carried between two rest poses with least effort."""
 
 from __future__ import annotations
 
@@ -13,61 +13,61 @@ from .equations import SIZES
 from .plans import DRIVES, FIXED, Drive, robot, task
 
 STEPS = 50
-SAID = {
+CHANGES = {
     "fixed-length": "by changing only the positions of the robot-ends, with cables of 1.2 m",
-    "variable-length": "by changing only the cables' lengths",
+    "variable-length": "by changing only the lengths of the cables",
     "both": "by changing robot-ends and lengths together",
 }
 SECTIONS = {"fixed-length": "5.1", "variable-length": "5.2", "both": "5.3"}
 
 
 def chapter() -> Chapter:
-    """A plan for every drive and every m."""
+    """Plan for every drive and every m."""
     plans: dict[Drive, dict[int, Plan]] = {
         drive: {m: plan(robot(name, drive), task(robot(name, drive), "effort", STEPS)) for m, name in SIZES.items()}
         for drive in DRIVES
     }
-    claims = [_carried(drive, found) for drive, found in plans.items()]
+    claims = [_carried(drive, by_m) for drive, by_m in plans.items()]
     claims.append(_kept(plans["fixed-length"]))
-    return Chapter(claims, {f"drive-{drive}": _drawing(drive, found[3]) for drive, found in plans.items()})
+    return Chapter(claims, {f"drive-{drive}": _drawing(drive, by_m[3]) for drive, by_m in plans.items()})
 
 
-def _carried(drive: Drive, found: dict[int, Plan]) -> Claim:
-    feasible = [one.feasible for one in found.values()]
-    most = max(float(np.nanmax(one.trajectory["tensions"].values)) for one in found.values())
-    least = min(float(np.nanmin(one.trajectory["tensions"].values)) for one in found.values())
+def _carried(drive: Drive, plans: dict[int, Plan]) -> Claim:
+    feasible = [one.feasible for one in plans.values()]
+    most = max(float(np.nanmax(one.trajectory["tensions"].values)) for one in plans.values())
+    least = min(float(np.nanmin(one.trajectory["tensions"].values)) for one in plans.values())
     return stated(
         f"drive-{drive}",
         f"sections 2, {SECTIONS[drive]}",
-        f"A load moves {SAID[drive]}, for m = 3, 4, 5, 6 (number of audited plans).",
-        float(len(found)),
+        f"A load moves {CHANGES[drive]}, for m = 3, 4, 5, 6 (number of audited plans).",
+        float(len(plans)),
         float(sum(feasible)),
         holds=all(feasible),
         otherwise=Verdict.NOT_DETERMINED,
-        agrees=f"Plans were found and audited, with tensions from {least:.1f} to {most:.1f} N.",
-        differs="Not every m has a plan that was found and passed its audit, which proves nothing for the others.",
+        agrees=f"Every plan passed its audit, with tensions from {least:.1f} N to {most:.1f} N.",
+        differs="Not every m has a plan that passed its audit, which is no proof that there is none.",
         figure=f"drive-{drive}",
     )
 
 
-def _kept(found: dict[int, Plan]) -> Claim:
-    """Lengths of the fixed drive between the nodes, as the audit sees them."""
-    off = max(float(np.abs(one.trajectory["cable_lengths"].values - FIXED).max()) for one in found.values())
+def _kept(plans: dict[int, Plan]) -> Claim:
+    """Check the lengths of the fixed drive on the dense grid of the audit."""
+    off = max(float(np.abs(one.trajectory["cable_lengths"].values - FIXED).max()) for one in plans.values())
     return stated(
         "drive-fixed-kept",
         "section 5.1",
-        "The lengths stay as they are (largest change on the way).",
+        "The lengths do not change (largest change along the motion).",
         0.0,
         off,
         holds=off < 1e-4,
-        agrees="To less than 0.1 mm, between the nodes of the plan too.",
+        agrees="They change by less than 0.1 mm, between the nodes of the plan too.",
         differs="They change by more than 0.1 mm between the nodes of the plan.",
         unit="m",
     )
 
 
-def _drawing(drive: Drive, found: Plan) -> Drawing:
-    t = found.trajectory
+def _drawing(drive: Drive, planned: Plan) -> Drawing:
+    t = planned.trajectory
     moved = np.linalg.norm(t["carrier_pose"].values[:, :, :3] - t["carrier_pose"].values[0, :, :3], axis=2)
     names = [f"cable {i + 1}" for i in range(t.sizes["cable"])]
     panels = [
@@ -76,6 +76,6 @@ def _drawing(drive: Drive, found: Plan) -> Drawing:
         Panel("robot-end moved [m]", dict(zip(names, moved.T, strict=True))),
     ]
     return Drawing(
-        f"Three robots carry 10 kg in 2 s, least effort, drive: {drive}. Of cable i the robot-end is that of robot i.",
+        f"Three robots carry 10 kg in 2 s with least effort, drive {drive}. Robot i holds cable i.",
         curves(t["time"].values, "time [s]", panels),
     )

@@ -1,9 +1,9 @@
 """Paper C's robots carry their load from one pose to another, in each of the three drive modes.
 
-Both poses are rest poses of the load: there the cables, pulling with their weight's share, hold it. A robot with fewer
-than six cables can rest in no others, so they are computed (`models.statics.equilibria`): from the lengths that the
-paper fixes, 1.2 m, with the robot-ends at home and shifted together; or, where winches change the lengths, from 1.25 m
-and 1.1 m. What happens in between, the load's attitude included, is for the planner to choose.
+At both poses the load rests on taut cables. A robot with fewer than six cables can rest at few poses only, so they are
+computed (`models.statics.equilibria`): with the lengths that the paper fixes, 1.2 m, and the robot-ends at home or
+shifted together; or, where winches change the lengths, with 1.25 m and 1.1 m. The planner chooses the motion in
+between, including the attitude of the load.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")
 Aim = Literal["effort", "time"]
 FIXED, LONG, SHORT = 1.2, 1.25, 1.1  # lengths [m]
 SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes
-TAUT = 0.1  # [N]: paper C wants tensions above zero
+TAUT = 0.1  # [N]: paper C requires tensions above zero
 SECONDS = 2.0  # of a motion with least effort
 SPAN = PositiveRange(min=0.1, max=4.0)  # [s], of a motion in least time
 OBJECTIVES = {
@@ -34,14 +34,14 @@ OBJECTIVES = {
 
 
 def robot(name: str, drive: Drive) -> Robot:
-    """A robot of the library with another drive and cables of 1.2 m."""
+    """Return a robot of the library with another drive and cables of 1.2 m."""
     data = load(name).model_dump(mode="json")
     cables = [{**cable, "length": FIXED} for cable in data["cables"]]
     return Robot.model_validate({**data, "drive": drive, "cables": cables})
 
 
 def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
-    """Carry the load of `mover` between two poses where it rests."""
+    """Return the task to carry the load of `mover` between two rest poses."""
     home = mover.carrier_home
     stays = mover.drive == "variable-length"
     there = home if stays else home + np.concatenate([SHIFT, np.zeros(3)])

@@ -17,30 +17,30 @@ from .plans import DRIVES, FIXED, robot
 from .workspace import PRINTED, SECTIONS, Loops, in_prism, loops, placed_as_both, reach, volume_of
 
 THICKNESS = 0.02  # of a section [m]
-READ = 0.08  # [m]: how near 60 000 random points come to the ends of ranges, which are corners of the workspaces
+READ = 0.08  # [m], distance of 60 000 random points from the ends of ranges, which are corners of the workspaces
 FIGURES = {"fixed-length": "figure-3", "variable-length": "figure-5", "both": "figure-6"}
 NAMES = {"fixed-length": "W1", "variable-length": "W2", "both": "W3"}
 TRIANGLE, RECTANGLE = 0.5, 1.0  # share of the smallest rectangle about it that a shape fills
 
 
 def chapter() -> Chapter:
-    """60 000 loops of each type, and volumes."""
-    found = {drive: loops(drive) for drive in DRIVES}
-    claims = [_boxes(found["both"])]
-    claims += [claim for drive in DRIVES for claim in _ranges(drive, found[drive])]
-    claims += [_least_height(), *_sections(found["fixed-length"]), _prism(found["variable-length"])]
-    claims += [_volumes(), _inside_both(found), _fixed_inside_variable()]
+    """Check ranges, sections and inclusion with 60 000 loops of each type, and volumes."""
+    samples = {drive: loops(drive) for drive in DRIVES}
+    claims = [_boxes(samples["both"])]
+    claims += [claim for drive in DRIVES for claim in _ranges(drive, samples[drive])]
+    claims += [_least_height(), *_sections(samples["fixed-length"]), _prism(samples["variable-length"])]
+    claims += [_volumes(), _inside_both(samples), _fixed_inside_variable()]
     drawings = {
         FIGURES[drive]: Drawing(
-            f"{NAMES[drive]}, {drive}: where forces balance, of 60 000 loops, seen from above and from the sides",
+            f"{NAMES[drive]}, {drive}: poses of 60 000 loops where forces balance, from above and from the sides",
             figures.projections({NAMES[drive]: system.points}, system.robot.home_anchors),
         )
-        for drive, system in found.items()
+        for drive, system in samples.items()
     }
     drawings["figure-4"] = Drawing(
-        "Cross sections of W1", figures.cross_sections(found["fixed-length"].points, SECTIONS, THICKNESS)
+        "Cross sections of W1", figures.cross_sections(samples["fixed-length"].points, SECTIONS, THICKNESS)
     )
-    drawings["figure-2"] = _drawn_boxes(found["both"])
+    drawings["figure-2"] = _drawn_boxes(samples["both"])
     return Chapter(claims, drawings)
 
 
@@ -50,10 +50,11 @@ def _boxes(both: Loops) -> Claim:
     return undetermined(
         "figure-2",
         "figure 2",
-        "The robot-ends' boxes, drawn without numbers: half-widths along x and y.",
+        "The boxes of the robot-ends are drawn without numbers (half-widths along x and y).",
         None,
         (float(half[0]), float(half[1])),
-        missing="Centres and heights are printed, widths are not; the computed ones are the smallest that contain the "
+        missing="Centres and heights are printed, widths are not. The computed widths are the smallest that contain "
+        "the "
         "ranges of section 5.3.",
         unit="m",
         figure="figure-2",
@@ -64,12 +65,12 @@ def _drawn_boxes(both: Loops) -> Drawing:
     rng = np.random.default_rng(0)
     low, high = reach(both.robot)
     points = {f"robot-end {i + 1}": rng.uniform(low[i], high[i], (3000, 3)) for i in range(len(low))}
-    return Drawing("Boxes of the robot-ends, as inferred", figures.projections(points, both.robot.home_anchors))
+    return Drawing("Inferred boxes of the robot-ends", figures.projections(points, both.robot.home_anchors))
 
 
-def _ranges(drive: str, found: Loops) -> list[Claim]:
+def _ranges(drive: str, samples: Loops) -> list[Claim]:
     claims = []
-    for axis, printed, computed in zip("xyz", PRINTED[drive], found.ranges, strict=True):
+    for axis, printed, computed in zip("xyz", PRINTED[drive], samples.ranges, strict=True):
         claims.append(
             compared(
                 f"range-{NAMES[drive]}-{axis}",
@@ -78,8 +79,8 @@ def _ranges(drive: str, found: Loops) -> list[Claim]:
                 printed,
                 tuple(computed.tolist()),
                 within=READ,
-                agrees=f"To {READ:g} m, what the boxes and 60 000 points leave open.",
-                differs="Loops with robot-ends anywhere in boxes that section 5.3 needs give the computed range, "
+                agrees=f"They agree to {READ:g} m, the precision of the boxes and of 60 000 points.",
+                differs="With robot-ends anywhere in the boxes that section 5.3 requires the range is "
                 f"{_beside(computed, printed)}.",
                 unit="m",
                 figure=FIGURES[drive],
@@ -89,7 +90,7 @@ def _ranges(drive: str, found: Loops) -> list[Claim]:
 
 
 def _beside(computed: np.ndarray, printed: tuple[float, float]) -> str:
-    """How a range (2,) lies beside the printed one."""
+    """Return how a range (2,) differs from the printed one."""
     below, above = computed[0] < printed[0], computed[1] > printed[1]
     if below == above:
         return "wider than printed" if below else "narrower than printed"
@@ -97,7 +98,7 @@ def _beside(computed: np.ndarray, printed: tuple[float, float]) -> str:
 
 
 def _least_height() -> Claim:
-    """With the robot-ends below the printed centres, at the least printed height, nothing is inferred."""
+    """Check the lowest load with the robot-ends at the printed x and y and at the lowest printed height."""
     system = robot("wang-ctmrts", "fixed-length")
     lowest, least = system.carrier_home.copy(), reach(system)[0][:, 2]
     lowest[:, 2] = least
@@ -106,13 +107,14 @@ def _least_height() -> Claim:
     return stated(
         "range-W1-least-height",
         "section 5.1",
-        "No load on cables of 1.2 m hangs lower than the least z of W1.",
+        "No load on cables of 1.2 m is lower than the lowest z of W1.",
         printed,
         float(rest),
         holds=bool(rest >= printed - 0.01),
-        agrees="With the robot-ends as low as is printed it hangs no lower.",
-        differs=f"With the robot-ends at the printed x and y and at z = {least.min():g} m, the least that is printed, "
-        "it hangs at the computed height, whatever the widths of the boxes.",
+        agrees="With the robot-ends at the lowest printed height it is not lower.",
+        differs=f"With the robot-ends at the printed x and y and at z = {least.min():g} m, the lowest printed height, "
+        "the "
+        "load is at the computed height, for any widths of the boxes.",
         unit="m",
     )
 
@@ -131,13 +133,16 @@ def _sections(fixed: Loops) -> list[Claim]:
             stated(
                 f"figure-4-{height:g}",
                 "figure 4",
-                f"The section at z = {height:g} m is approximately {shape} (share of the smallest rectangle about it).",
+                f"The section at z = {height:g} m is approximately {shape} (its share of the smallest enclosing "
+                "rectangle).",
                 ideal,
                 filled,
                 holds=nearer,
                 otherwise=Verdict.NOT_DETERMINED,
-                agrees=f"Nearer to {shape} than to the other.",
-                differs="The boxes are not printed; with those that section 5.3 needs it is nearer to the other shape.",
+                agrees=f"The share is nearer to that of {shape} than to that of the other shape.",
+                differs="The boxes are not printed. With the boxes that section 5.3 requires the share is nearer to "
+                "that of the "
+                "other shape.",
                 figure="figure-4",
             )
         )
@@ -145,9 +150,9 @@ def _sections(fixed: Loops) -> list[Claim]:
 
 
 def share_of_rectangle(points: np.ndarray) -> float:
-    """Area of the convex hull of points (n, 2) over that of the smallest rectangle about it: a triangle's is 1/2.
+    """Return the area of the convex hull of points (n, 2) over that of its smallest enclosing rectangle.
 
-    One side of the smallest rectangle lies along a side of the hull.
+    One side of the smallest rectangle lies along a side of the hull. For a triangle the share is 1/2.
     """
     hull = ConvexHull(points)
     corners = points[hull.vertices]
@@ -166,41 +171,41 @@ def _prism(variable: Loops) -> Claim:
     return stated(
         "section-5-prism",
         "sections 5, 5.2",
-        "The load has to be in the triangular prism below the robot-ends (share of W2 inside it).",
+        "The load must be in the triangular prism below the robot-ends (share of W2 inside it).",
         1.0,
         inside,
         holds=inside == 1.0,
-        agrees="Every point of W2 is.",
-        differs=f"Nearly: attachments are {arm:.3f} m off the load's middle, by which it can be outside.",
+        agrees="Every point of W2 is inside.",
+        differs=f"Attachments are {arm:.3f} m from the centre of the load, so it can be outside by as much.",
         figure="figure-5",
     )
 
 
 def _volumes() -> Claim:
     sizes = [volume_of(drive, samples=8000) for drive in DRIVES]
-    told = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
+    volumes = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
     return stated(
         "volumes",
         "sections 5, 6",
-        "The volumes grow from W1 to W2 to W3 (found, m^3).",
+        "The volumes grow from W1 to W2 to W3.",
         "W1 < W2 < W3",
         tuple(size.value for size in sizes),
         holds=sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low,
-        agrees=f"With intervals: {told}. They are of the places that a search finds, of W1 the most may be missing.",
-        differs=f"With intervals, they do not: {told}.",
+        agrees=f"With intervals: {volumes}. A search samples each workspace and can miss poses, most of all in W1.",
+        differs=f"They do not, with intervals: {volumes}.",
         unit="m^3",
     )
 
 
-def _inside_both(found: Mapping[str, Loops]) -> Claim:
+def _inside_both(samples: Mapping[str, Loops]) -> Claim:
     shares = []
     for drive in ("fixed-length", "variable-length"):
-        places = found[drive].places.only(found[drive].held)
+        places = samples[drive].places.only(samples[drive].held)
         shares.append(float(placed_as_both(places).mean()))
     return stated(
         "inclusion-W3",
         "section 5.3",
-        "W1 and W2 lie inside W3 (share of their points that do).",
+        "W1 and W2 lie inside W3 (shares of their points inside W3).",
         (1.0, 1.0),
         tuple(shares),
         holds=min(shares) == 1.0,
@@ -210,7 +215,7 @@ def _inside_both(found: Mapping[str, Loops]) -> Claim:
 
 
 def _fixed_inside_variable() -> Claim:
-    """Places above everything that robot-ends at 1.2 m can pull up, asked of both types."""
+    """Check poses above the robot-ends of W2, where cables from 1.2 m cannot pull up, for both types."""
     fixed, variable = robot("wang-ctmrts", "fixed-length"), robot("wang-ctmrts", "variable-length")
     arm = float(np.linalg.norm(variable.attachments, axis=1).max())
     highest = float(variable.carrier_home[:, 2].max()) + arm
@@ -223,13 +228,14 @@ def _fixed_inside_variable() -> Claim:
     return stated(
         "inclusion-W1-W2",
         "sections 5, 6",
-        "W1 lies inside W2: of places of W1 above the robot-ends of W2, the share in W2.",
+        "W1 lies inside W2 (share in W2 of the poses of W1 above the robot-ends of W2).",
         1.0,
         float(also.mean()) if held.any() else 1.0,
         holds=bool(also.all()),
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="No place of W1 was found outside W2.",
-        differs=f"{held.sum()} places of W1 above z = {highest:.3f} m were found, where three cables from 1.2 m would "
-        f"all pull down; the printed ranges say so too: z up to {PRINTED['fixed-length'][2][1]:g} m in W1, "
+        agrees="No sampled pose of W1 lies outside W2.",
+        differs=f"{held.sum()} sampled poses of W1 are above z = {highest:.3f} m, where all three cables of W2 would "
+        "pull "
+        f"down. The printed ranges contradict the statement too: z up to {PRINTED['fixed-length'][2][1]:g} m in W1, "
         f"{PRINTED['variable-length'][2][1]:g} m in W2.",
     )

@@ -14,7 +14,7 @@ CHAPTERS = {
     "The model, Eqs. 1 to 13": equations.chapter,
     "Tensions, Eqs. 11, 16, 17": tensions.chapter,
     "Workspaces, figures 2 to 6": ranges.chapter,
-    "Three ways to drive, three to six robots": modes.chapter,
+    "Three drives, three to six robots": modes.chapter,
 }
 
 

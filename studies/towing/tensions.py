@@ -1,4 +1,4 @@
-"""Paper C's tensions, equations 11, 16 and 17 and step (d): least norm, null space, and who can balance at all."""
+"""Paper C's tensions, equations 11, 16 and 17 and step (d): least norm, null space and rank."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAMPLES = 6000
 
 
 def chapter() -> Chapter:
-    """Least norm, null space, and the rank test of step (d)."""
+    """Check least norm, null space and the rank test of step (d)."""
     return Chapter(
         [_limit(), _singular(), _least_norm(), _freedom(), _scalar(), _rank_test(), _postures()],
         {"null-space": _along_null_space()},
@@ -27,7 +27,7 @@ def chapter() -> Chapter:
 
 
 def forces(robot: Robot, pose: np.ndarray | None = None) -> TensionProblem:
-    """The rows of force alone at rest, at a pose (6,); None: at home."""
+    """Return the balance of forces alone at rest, at a pose (6,); default: home."""
     A = Dynamics(robot).wrench_matrix(robot.home if pose is None else pose)[:3]
     return TensionProblem(A, [0.0, 0.0, robot.weight], robot.t_min, robot.t_max)
 
@@ -40,7 +40,7 @@ def _limit() -> Claim:
         "T_fmax = T_lim / n with 1.5 <= n <= 2.",
         most,
         tuple(most * n for n in SAFETY),
-        missing="Neither T_lim nor n is printed; T_lim between the computed values fits T_fmax = 500 N.",
+        missing="Neither T_lim nor n is printed. T_lim between the computed values gives T_fmax = 500 N.",
         unit="N",
     )
 
@@ -53,19 +53,19 @@ def _singular() -> Claim:
     return stated(
         "eq-16-inverse",
         "Eq. 16",
-        "J^+ = J^T (J J^T)^-1 is the Moore-Penrose inverse for m = 3 to 6.",
+        "J^+ = J^T (J J^T)^-1 is the Moore-Penrose inverse for m = 3, 4, 5, 6 (rank of J J^T).",
         (6.0, 6.0, 6.0, 6.0),
         tuple(ranks),
         holds=all(size == 6 for size in ranks),
         otherwise=Verdict.IMPOSSIBLE,
         agrees="J J^T has rank 6 for each m.",
-        differs="J J^T, 6 x 6, has the computed ranks for m = 3, 4, 5, 6: with fewer than six cables there is no "
-        "inverse. The pseudo-inverse by singular values always exists.",
+        differs="J J^T is 6 x 6, and with fewer than six cables its rank is smaller, so it has no inverse. The "
+        "pseudo-inverse by singular values always exists.",
     )
 
 
 def _least_norm() -> Claim:
-    """The method `min-norm` against the pseudo-inverse, where that lies inside the limits."""
+    """Compare the method `min-norm` with the pseudo-inverse, where that is inside the limits."""
     norms, own = [], []
     for m, name in SIZES.items():
         if m == 3:
@@ -79,12 +79,13 @@ def _least_norm() -> Claim:
     return compared(
         "eq-16-least-norm",
         "Eq. 16",
-        "J^+ b is the solution of least norm (rows of force, m = 4, 5, 6, at home).",
+        "J^+ b is the solution of least norm (norms for m = 4, 5, 6 at home, forces alone).",
         tuple(norms),
         tuple(own),
         within=1e-9 * max(norms),
-        agrees="No tensions inside the limits that balance the weight are smaller; the printed column is |J^+ b|.",
-        differs="Inside the limits the least norm is another.",
+        agrees="No tensions inside the limits that balance the weight have a smaller norm; the printed column is |J^+ "
+        "b|.",
+        differs="Inside the limits the least norm is another one.",
         unit="N",
     )
 
@@ -95,14 +96,15 @@ def _freedom() -> Claim:
     return stated(
         "eq-17-null-space",
         "Eq. 17",
-        "Null(J) lambda is a choice that is left, with up to six cables for six rows.",
+        "Null(J) lambda leaves a choice of tensions with up to six cables and six rows (size of the null space).",
         "a choice",
         tuple(float(size) for size in left),
         holds=all(size > 0 for size in left[1:]),
-        agrees="There is a null space for m = 4, 5 and 6.",
+        agrees="There is a null space for m = 4, 5, 6.",
         differs="The null space has the computed sizes for m = 3, 4, 5, 6: independent columns leave no choice, and "
-        "six are dependent only where the robot is singular, as regular hexagons make it. Of the rows of force alone "
-        f"it has {', '.join(str(int(size)) for size in of_forces)}.",
+        "six "
+        "columns are dependent only where the robot is singular, as with these regular hexagons. For the three rows of "
+        f"force alone the sizes are {', '.join(str(int(size)) for size in of_forces)}.",
     )
 
 
@@ -111,20 +113,21 @@ def _scalar() -> Claim:
     return stated(
         "eq-17-lambda",
         "Eq. 17",
-        "lambda in (0, 1) is any scalar: each keeps the bounds of Eq. 11 (rows of force, m = 4, lambda in N).",
+        "Any scalar lambda in (0, 1) keeps the bounds of Eq. 11 (range that does, forces alone, m = 4, lambda in N).",
         (0.0, 1.0),
         (low, high),
         holds=low <= 0.0 and high >= 1.0 and high - low <= 1.1,
-        agrees="The choices that keep the bounds are those.",
-        differs="The bounds of Eq. 11 leave the computed interval, not (0, 1)"
-        f"{'' if low <= 0 else ', and T prime itself breaks them'}; with m - rank > 1 lambda is a vector. The tensions "
-        f"at T' are {', '.join(f'{tension:.1f}' for tension in at)} N.",
+        agrees="The range that keeps the bounds is the printed one.",
+        differs="The bounds of Eq. 11 give the computed range, not (0, 1)"
+        f"{'' if low <= 0 else ', and T prime itself exceeds them'}. With m - rank > 1 lambda is a vector. The "
+        "tensions "
+        f"T' are {', '.join(f'{tension:.1f}' for tension in at)} N.",
         unit="N",
     )
 
 
 def _choices() -> tuple[float, float, np.ndarray]:
-    """Ends of lambda inside the limits, m = 4, for a null vector of length one, and T' (4,) [N]."""
+    """Return the range of lambda inside the limits, m = 4, for a null vector of length one, and T' (4,) [N]."""
     problem = forces(load(SIZES[4]))
     special, null = _null_space(problem)
     with np.errstate(divide="ignore"):
@@ -133,7 +136,7 @@ def _choices() -> tuple[float, float, np.ndarray]:
 
 
 def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
-    """T' and the null vector of length one whose first entry is positive, (m,) each, where there is just one."""
+    """Return T' and the null vector of length one whose first entry is positive, (m,) each, if there is only one."""
     null = np.linalg.svd(problem.A)[2][-1]
     return np.linalg.pinv(problem.A) @ problem.w, null * np.sign(null[0])
 
@@ -145,16 +148,18 @@ def _along_null_space() -> Drawing:
     choices = np.linspace(1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low, 101)
     lines = {f"cable {i + 1}": special[i] + choices * null[i] for i in range(4)}
     return Drawing(
-        "Tensions T' + lambda Null(J) of four cables at home, rows of force; inside the limits between dotted lines",
-        curves(choices, "lambda [N]", [Panel("tension [N]", lines, {"0 N": 0.0})], marks={"least": low, "most": high}),
+        "Tensions T' + lambda Null(J) of four cables at home, forces alone; inside the limits between the dotted lines",
+        curves(
+            choices, "lambda [N]", [Panel("tension [N]", lines, {"0 N": 0.0})], marks={"smallest": low, "largest": high}
+        ),
     )
 
 
 def _rank_test() -> Claim:
-    """Relative residual of the six rows at random postures inside W2, with the tensions nearest to balance."""
-    found = loops("variable-length", count=SAMPLES)
-    places = found.places.only(found.held)
-    robot = found.robot
+    """Check the relative residual of the six rows at random postures of W2, with tensions nearest to balance."""
+    samples = loops("variable-length", count=SAMPLES)
+    places = samples.places.only(samples.held)
+    robot = samples.robot
     A = Dynamics(robot).wrench_matrix(places.pose, places.carriers)
     A *= robot.wrench_scale[:, None]
     w = np.array([0.0, 0.0, robot.weight, 0.0, 0.0, 0.0])
@@ -164,33 +169,37 @@ def _rank_test() -> Claim:
     return stated(
         "step-d-rank",
         "step (d)",
-        "Random postures with rank(A) = rank(A, b) are those of the workspace (share of those with forces in balance).",
+        "Random postures with rank(A) = rank(A, b) form the workspace (their share of the postures with forces in "
+        "balance).",
         "some",
         passed,
         holds=passed > 0.0,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="Some random postures pass.",
-        differs=f"None of {len(relative)} does: three cables balance six rows on a set without volume. One in a "
-        f"hundred comes within {np.quantile(relative, 0.01):.2f} of the weight. The figures are of forces alone.",
+        agrees="Some random postures have equal ranks.",
+        differs=f"None of {len(relative)} postures has equal ranks: three cables balance six rows on a set without "
+        "volume "
+        f"only. For 1 % of them the residual is at most {np.quantile(relative, 0.01):.2f} of the weight. The paper's "
+        "figures show the balance of forces alone.",
     )
 
 
 def _postures() -> Claim:
-    """Where a posture in balance is found, and whether its cables pull where the position is in the prism."""
-    found = loops("variable-length", count=SAMPLES, seed=1)
-    inside = in_prism(found.robot, found.places.pose[:, :3])
-    pose, tensions = EquilibriumPosture().postures(found.robot, found.places)
+    """Check where there is a posture in balance, and whether its cables pull if and only if it is in the prism."""
+    samples = loops("variable-length", count=SAMPLES, seed=1)
+    inside = in_prism(samples.robot, samples.places.pose[:, :3])
+    pose, tensions = EquilibriumPosture().postures(samples.robot, samples.places)
     solved = np.isfinite(pose[:, 0])
     pull = (tensions > 0).all(axis=1)
     return stated(
         "step-e-unique",
         "section 4",
-        "Where rank(A) = rank(A, b) = m the load is in balance (shares: positions at which a posture in balance is "
-        "found; of these, pulling just where the prism says).",
+        "Where rank(A) = rank(A, b) = m the load is in balance (share of positions with a posture in balance; share of "
+        "these whose cables pull if and only if the position is in the prism).",
         (1.0, 1.0),
         (float(solved.mean()), float((pull == inside)[solved].mean())),
         holds=bool(solved.mean() > 0.98 and (pull == inside)[solved].mean() > 0.98),
-        agrees="Solving for three angles and three tensions together finds one nearly everywhere, with cables that "
-        "pull inside the prism below the robot-ends.",
-        differs="Solving for three angles and three tensions together finds fewer.",
+        agrees="Solving for three angles and three tensions together gives one nearly everywhere, with cables that "
+        "pull "
+        "inside the prism below the robot-ends.",
+        differs="Solving for three angles and three tensions together gives fewer.",
     )
