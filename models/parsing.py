@@ -25,7 +25,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def to_yaml(model: BaseModel) -> str:
-    """The YAML text of a model, which `parse_yaml` reads back to an equal one."""
+    """Return the YAML text of a model, which `parse_yaml` reads back to an equal one."""
     stream = io.StringIO()
     yaml = YAML()
     yaml.default_flow_style = None
@@ -80,7 +80,7 @@ def parse_yaml(text: str, model: type[Model], where: str) -> Model:
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise InputError(f"{where}: is not YAML ({_problem(error)}); accepted: a plain YAML mapping") from None
     if not isinstance(data, dict):
-        raise InputError(f"{where}: holds {brief(data)}; accepted: a mapping with {_keys(_schema(model))}")
+        raise InputError(f"{where}: must hold a mapping with {_keys(_schema(model))}, got {brief(data)}")
     return validate(data, model, where)
 
 
@@ -93,55 +93,86 @@ def validate(data: dict[str, Any], model: type[Model], where: str) -> Model:
 
 
 def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
-    """One line for pydantic's first complaint: where, field, what is accepted, the value, and how many follow."""
-    # A misspelt key is why another one is missing: it comes first.
+    """Return one line for a failed check: where, field, what is accepted, the value, and how many others follow.
+
+    A key that is not known comes before a missing one: it usually is the missing one, misspelt.
+    """
     details = _without_branches(error.errors(include_url=False))
-    details.sort(key=lambda one: one["type"] != "extra_forbidden")
-    first = details[0]
-    field, holder = _walk(first["loc"], _schema(model))
-    key = str(first["loc"][-1]) if first["loc"] else ""
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        message = f"is not a known key{_close(key, holder)}; accepted: {_keys(holder)}"
-    elif first["type"] == "missing":
-        description = holder.get("properties", {}).get(key, {}).get("description")
-        message = "is missing; accepted: " + (description or "a value")
-    elif first["type"] == "union_tag_invalid":
-        context = first.get("ctx", {})
-        field, message = f"{field}.kind", f"{context['tag']!r} is unknown; accepted: {context['expected_tags']}"
-    elif first["type"] == "union_tag_not_found":
-        field, message = f"{field}.kind", "is missing; accepted: one of " + ", ".join(_tags(first["loc"], model))
-    elif first["type"] == "too_short":
-        context = first.get("ctx", {})
-        message = f"has {context['actual_length']} items; accepted: at least {context['min_length']}"
-    elif first["type"] in ("model_type", "model_attributes_type", "dict_type"):
-        message = f"is {brief(first['input'])}; accepted: a mapping with {_keys(_schema_at(first['loc'], model))}"
-    else:
-        message = message[:1].lower() + message[1:]
-        if first["type"] != "value_error" or not isinstance(first["input"], dict):
-            message += f", got {brief(first['input'])}"
+    details = [_misspelt_kind(detail, model) for detail in details]
+    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # A list whose items are wrong is counted by pydantic once more as too short.
     others = [other for other in details[1:] if other["type"] != "too_short"]
     more = f" (and {len(others)} more)" if others else ""
-    return ": ".join(part for part in (where, _printable(field), _printable(message)) if part) + more
+    line = _printable(_sentence(details[0], model))
+    return (f"{where}: {line}" if where else line) + more
+
+
+def _sentence(detail: Any, model: type[BaseModel]) -> str:
+    """Return "field must be ..., got ..." for one complaint of pydantic."""
+    place, kind, value, context = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
+    field, holder = _walk(place, _schema(model))
+    key = str(place[-1]) if place else ""
+    field = _printable(field)
+    if kind == "extra_forbidden":
+        return f"{field} is not a known key{_close(key, _known(holder))} (known keys: {_keys(holder)})"
+    if kind == "missing":
+        description = holder.get("properties", {}).get(key, {}).get("description")
+        return f"{field} is missing" + (f": {description}" if description else "")
+    if kind == "union_tag_invalid":
+        tags = _tags(place, model)
+        meant = _close(str(context["tag"]), tags)
+        return f"{field}.kind must be one of {', '.join(tags)}, got {brief(context['tag'])}{meant}"
+    if kind == "union_tag_not_found":
+        return f"{field}.kind is missing: one of {', '.join(_tags(place, model))}"
+    if kind == "too_short":
+        return f"{field} must have at least {context['min_length']} items, got {context['actual_length']}"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        message = f"must be a mapping with {_keys(_schema_at(place, model))}, got {brief(value)}"
+    else:
+        message = detail["msg"]
+        if kind != "value_error" or not isinstance(value, dict):
+            message += f", got {brief(value)}"
+    if not field:
+        return message
+    if message.partition(" ")[0] in _known(_schema_at(place, model)):  # a part's own check names one of its fields
+        return f"{field}.{message}"
+    return f"{field} {message}" if message.startswith("must ") else f"{field}: {message}"
+
+
+def _misspelt_kind(detail: Any, model: type[BaseModel]) -> Any:
+    """Return the complaint that a union's tag is missing as one of a misspelt key, where a key looks like the tag."""
+    if detail["type"] != "union_tag_not_found" or not isinstance(detail["input"], dict):
+        return detail
+    for key in detail["input"]:
+        if isinstance(key, str) and difflib.get_close_matches(key.lower(), ["kind"], n=1):
+            return detail | {"type": "extra_forbidden", "loc": (*detail["loc"], key)}
+    return detail
+
+
+def _plainly(message: str) -> str:
+    """Return pydantic's message without its preamble, as "must be ..." where it has that form."""
+    message = message.removeprefix("Value error, ")
+    message = re.sub(r"^Input should ", "must ", message)
+    return message[:1].lower() + message[1:]
 
 
 _TYPE = re.compile(r"(function-(after|before|plain|wrap)|literal|tuple|constrained-\w+)\[.*\]$")  # as pydantic names it
 
 
 def _without_branches(details: list[Any]) -> list[Any]:
-    """Pydantic's complaints with one for each choice of types instead of one for each type.
+    """Return pydantic's complaints with one for each choice of types instead of one for each type.
 
     It names the types in the place. A mapping is meant for the type that takes one, and so is a list; of a plain value
     all types say what they would have.
     """
-    told: list[Any] = []
+    details = [detail | {"msg": _plainly(detail["msg"])} for detail in details]
+    result: list[Any] = []
     while details:
         first = details[0]
         place = first["loc"]
         at = next((i for i, key in enumerate(place) if _TYPE.match(str(key))), None)
         if at is None:
-            told.append(first)
+            result.append(first)
             details = details[1:]
             continue
         branches = [one for one in details if one["loc"][:at] == place[:at]]
@@ -149,16 +180,15 @@ def _without_branches(details: list[Any]) -> list[Any]:
         taking = [one for one in branches if one["type"] not in ("float_type", "literal_error", "tuple_type")]
         listed = [one for one in branches if str(one["loc"][at]).startswith("tuple[") and one["type"] != "tuple_type"]
         if isinstance(first["input"], dict) and taking:
-            told += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in taking]
+            result += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in taking]
         elif listed:
-            told += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in listed]
+            result += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in listed]
         else:
-            plain = [
-                one["msg"].removeprefix("Value error, ") for one in branches if not one["type"].startswith("model")
-            ]
-            plain = [text[:1].lower() + text[1:] for text in plain]
-            told.append(first | {"loc": place[:at], "msg": ", or ".join(dict.fromkeys(plain))})
-    return told
+            plain = [one["msg"] for one in branches if not one["type"].startswith("model")]
+            first_one, *rest = dict.fromkeys(plain)
+            rest = [text.removeprefix("must be ") for text in rest]
+            result.append(first | {"loc": place[:at], "msg": " or ".join([first_one, *rest])})
+    return result
 
 
 @cache
@@ -185,7 +215,7 @@ class _PlainComposer(Composer):
 
 
 def _problem(error: Exception) -> str:
-    """What is wrong and where, in one line, from a YAML error of several."""
+    """Return what is wrong and where, in one line, from a YAML error of several."""
     problem = getattr(error, "problem", None) or str(error) or type(error).__name__
     mark = getattr(error, "problem_mark", None)
     place = f", line {mark.line + 1}" if mark is not None else ""
@@ -193,23 +223,27 @@ def _problem(error: Exception) -> str:
 
 
 def _printable(text: str) -> str:
-    """One line that a terminal shows as it is: a file's own words may hold line breaks and escape sequences."""
+    """Return one line that a terminal shows as it is: a file's own words may hold line breaks and escape sequences."""
     shown = "".join(char if char.isprintable() else repr(char)[1:-1] for char in " ".join(text.splitlines()))
     return shown if len(shown) <= LONGEST_PART else f"{shown[: LONGEST_PART - 3]}..."
 
 
 def brief(value: Any) -> str:
-    """`repr` of a value, cut to 60 characters; it is one line whatever the value is."""
+    """Return the `repr` of a value, cut to 60 characters; it is one line whatever the value is."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _keys(schema: dict[str, Any]) -> str:
-    return ", ".join(schema.get("properties", {})) or "its own keys"
+    return ", ".join(_known(schema)) or "keys of its own"
 
 
-def _close(key: str, holder: dict[str, Any]) -> str:
-    close = difflib.get_close_matches(key, holder.get("properties", {}), n=1)
+def _known(schema: dict[str, Any]) -> list[str]:
+    return [*schema.get("properties", {}), *(["kind"] if "discriminator" in schema else [])]
+
+
+def _close(text: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(text, known, n=1) or difflib.get_close_matches(text.lower(), known, n=1)
     return f", did you mean {close[0]!r}?" if close else ""
 
 
@@ -224,7 +258,7 @@ def _resolve(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict[str, Any]:
-    """The schema one level down: of a union's variant, a list's item, a key, or any key of a mapping."""
+    """Return the schema one level down: of a union's variant, a list's item, a key, or any key of a mapping."""
     variants = node.get("discriminator", {}).get("mapping", {})
     if part in variants:
         return _resolve({"$ref": variants[part]}, schema)
@@ -236,7 +270,7 @@ def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict
 
 
 def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """The dotted name of a place in the data, and the schema of the object that holds it.
+    """Return the dotted name of a place in the data, and the schema of the object that holds it.
 
     Pydantic puts a union's tag into the place (carriers, 0, prescribed, home); a user's file has no such level.
     """
@@ -251,7 +285,7 @@ def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str,
 
 
 def _schema_at(location: tuple[int | str, ...], model: type[BaseModel]) -> dict[str, Any]:
-    """The schema of what stands at a place."""
+    """Return the schema of what stands at a place."""
     node = _schema(model)
     for part in location:
         node = _step(node, part, _schema(model))
@@ -259,5 +293,5 @@ def _schema_at(location: tuple[int | str, ...], model: type[BaseModel]) -> dict[
 
 
 def _tags(location: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
-    """Tags of the union at a place."""
+    """Return the tags of the union at a place."""
     return sorted(_schema_at(location, model).get("discriminator", {}).get("mapping", {}))

@@ -29,7 +29,7 @@ LARGEST = 1e9  # of any number in a file: beyond it squares and products stop be
 
 def _plain_number(value: Any) -> Any:
     if isinstance(value, bool | str):
-        raise ValueError(f"accepted: a number, not {'text' if isinstance(value, str) else 'true or false'}")
+        raise ValueError("must be a number")
     return value
 
 
@@ -86,7 +86,7 @@ def _check_positive_definite(inertia: Inertia) -> Inertia:
     smallest = float(np.linalg.eigvalsh(inertia_matrix(inertia))[0])
     if not smallest > 0:
         raise ValueError(
-            f"the inertia must be positive definite (all principal moments > 0 kg m^2), the smallest is {smallest:g}"
+            f"must be positive definite (all principal moments > 0 kg m^2), but the smallest moment is {smallest:g}"
         )
     return inertia
 
@@ -130,23 +130,23 @@ class Platform(Part):
     @classmethod
     def _in_order(cls, dof: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
         if len(set(dof)) != len(dof):
-            raise ValueError("each coordinate may be there once")
+            raise ValueError("must name each coordinate once")
         ordered: tuple[Coordinate, ...] = tuple(name for name in COORDINATES if name in dof)
         turning = [name for name in ordered if name in COORDINATES[3:]]
         if turning and ordered not in TURNING_DOF:
             sets = "; ".join(", ".join(names) for names in TURNING_DOF)
-            raise ValueError(f"accepted: any of x, y, z; or {sets}")
+            raise ValueError(f"must be any of x, y, z; or {sets}")
         return ordered
 
     @model_validator(mode="after")
     def _turns_with_inertia(self) -> Self:
         if self.inertia is None and any(name in self.dof for name in COORDINATES[3:]):
             raise ValueError(
-                "inertia is missing; accepted: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2], or a dof without angles"
+                "inertia is missing: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2]; only a dof without angles needs none"
             )
         locked = [name for name in COORDINATES[3:] if name not in self.dof]
         if self.home and len(locked) < 3 and any(self.home[COORDINATES.index(name)] for name in locked):
-            raise ValueError(f"home: {', '.join(locked)} cannot move; accepted: 0 rad for them")
+            raise ValueError(f"home must have 0 rad for {', '.join(locked)}, which cannot move")
         return self
 
 
@@ -246,7 +246,7 @@ class Pulley(Part):
     @classmethod
     def _has_a_direction(cls, axis: Vector3) -> Vector3:
         if not np.linalg.norm(axis) > 0:
-            raise ValueError("the swivel axis needs a direction")
+            raise ValueError("must have a direction, the swivel axis cannot be zero")
         return axis
 
 
@@ -295,21 +295,21 @@ class Robot(Part):
         names = [carrier.name for carrier in self.carriers]
         for index, name in enumerate(names):
             if name == "world":
-                raise ValueError(f"carriers[{index}].name: 'world' means the global frame; accepted: any other name")
+                raise ValueError(f"carriers[{index}].name must not be 'world', which means the global frame")
             if name in names[:index]:
-                raise ValueError(f"carriers[{index}].name: {name!r} is there twice, each carrier needs its own name")
+                raise ValueError(f"carriers[{index}].name must be unique, got {name!r} twice")
         for index, cable in enumerate(self.cables):
             if cable.carrier not in names:
-                raise ValueError(f"cables[{index}].carrier: {cable.carrier!r} is unknown, accepted: {', '.join(names)}")
+                raise ValueError(f"cables[{index}].carrier must be one of {', '.join(names)}, got {cable.carrier!r}")
         lengths = np.linalg.norm(self.home_anchors - self.home_attachments, axis=1)
         if self.drive == "fixed-length":
             for index, cable in enumerate(self.cables):
                 if cable.length is None:
-                    raise ValueError(f"cables[{index}].length: is missing; drive fixed-length needs a number > 0 [m]")
+                    raise ValueError(f"cables[{index}].length is missing: with drive fixed-length, a number > 0 [m]")
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(
-                f"cables[{shortest}]: its anchor and attachment coincide at home, a cable needs a length > 0 m"
+                f"cables[{shortest}] must have a length > 0 m at home, but its anchor and attachment coincide there"
             )
         if self.pulley_radii.any():
             self._check_pulleys()
@@ -324,7 +324,7 @@ class Robot(Part):
         outside = (across > 1e-9) & (across**2 - 2 * across * self.pulley_radii + up**2 > 0)
         for index in np.flatnonzero((self.pulley_radii > 0) & ~outside):
             raise ValueError(
-                f"cables[{index}].pulley: at home the attachment must lie off the swivel axis and outside the sheave"
+                f"cables[{index}].pulley: the attachment must lie off the swivel axis and outside the sheave at home"
             )
 
     @property

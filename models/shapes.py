@@ -38,5 +38,5 @@ class Block(Part):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if any(low >= high for low, high in zip(self.min, self.max, strict=True)):
-            raise ValueError(f"min: {self.min} is not below max: {self.max}; accepted: smaller in each coordinate")
+            raise ValueError(f"min must be smaller than max in each coordinate, got {self.min} and {self.max}")
         return self

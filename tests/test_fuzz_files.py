@@ -311,11 +311,11 @@ def test_mutated_caspr_files(seed, tmp_path):
     ("old", "new", "message"),
     [
         ("mass: 1.2", "mass: true", r"platform\.mass: .*a number, .*got True"),
-        ("mass: 1.2", "mass: 1e308", r"platform\.mass: input should be less than or equal to \d+, got 1e\+308"),
+        ("mass: 1.2", "mass: 1e308", r"platform\.mass must be less than or equal to \d+, got 1e\+308"),
         ("mass: 1.2", "mass: !!int", r"is not YAML \(has a YAML tag \(.*int,?\), line 4\)"),
         ("[0, 0, 2]", "!!set {0.1, 0, 2}", r"is not YAML \(has a YAML tag \(.*set\), line 8\)"),
-        ("source", '"a\\nb\\e[31m": 1\nsource', r"a b\\x1b\[31m: is not a known key"),
-        ("source", f"{'k' * 900}: 1\nsource", r"kkk\.\.\.: is not a known key"),
+        ("source", '"a\\nb\\e[31m": 1\nsource', r"a b\\x1b\[31m is not a known key"),
+        ("source", f"{'k' * 900}: 1\nsource", r"kkk.* is not a known key"),
         (
             "[0, 0.1, 0]",
             "[0, 0.1, 1]",

@@ -27,48 +27,56 @@ cables:
 
 # A change to the file above, and what the one line must name: the field, the value, what is accepted.
 WRONG = {
-    "missing mass": ("mass: 1.2, ", "", r"platform\.mass: is missing; accepted: \[kg\]"),
-    "no mass": ("mass: 1.2", "mass: 0", r"platform\.mass: input should be greater than 0, got 0"),
-    "mass in words": ("mass: 1.2", "mass: heavy", r"platform\.mass: accepted: a number, not text, got 'heavy'"),
-    "mass NaN": ("mass: 1.2", "mass: .nan", r"platform\.mass: .*finite number, got nan"),
-    "mass infinite": ("mass: 1.2", "mass: .inf", r"platform\.mass: .*finite number, got inf"),
-    "negative inertia": ("[1, 1, 1,", "[1, -1, 1,", r"platform\.inertia: .*positive definite.*smallest is -1.*got"),
-    "indefinite inertia": ("1, 0, 0, 0]", "1, 2, 0, 0]", r"platform\.inertia: .*positive definite"),
-    "five inertias": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 0]", r"platform\.inertia\[5\]: is missing"),
+    "missing mass": ("mass: 1.2, ", "", r"platform\.mass is missing: \[kg\]"),
+    "no mass": ("mass: 1.2", "mass: 0", r"platform\.mass must be greater than 0, got 0"),
+    "mass in words": ("mass: 1.2", "mass: heavy", r"platform\.mass must be a number, got 'heavy'"),
+    "mass NaN": ("mass: 1.2", "mass: .nan", r"platform\.mass must be .*finite number, got nan"),
+    "mass infinite": ("mass: 1.2", "mass: .inf", r"platform\.mass must be .*finite number, got inf"),
+    "negative inertia": (
+        "[1, 1, 1,",
+        "[1, -1, 1,",
+        r"platform\.inertia must be positive definite.*smallest moment is -1.*got",
+    ),
+    "indefinite inertia": ("1, 0, 0, 0]", "1, 2, 0, 0]", r"platform\.inertia must be positive definite"),
+    "five inertias": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 0]", r"platform\.inertia\[5\] is missing"),
     "limits crossed": (
         "t_min: 1, t_max: 10",
         "t_min: 20, t_max: 10",
-        r"cables\[1\]: t_min must not exceed.*20 N.*10 N",
+        r"cables\[1\]\.t_min must not exceed.*20 N.*10 N",
     ),
-    "pushing cable": ("t_min: 1,", "t_min: -1,", r"cables\[1\]\.t_min: .*greater than or equal to 0, got -1"),
+    "pushing cable": ("t_min: 1,", "t_min: -1,", r"cables\[1\]\.t_min must be greater than or equal to 0, got -1"),
     "unknown carrier": (
         "carrier: cart",
         "carrier: card",
-        r"cables\[1\]\.carrier: 'card' is unknown, accepted: frame, cart",
+        r"cables\[1\]\.carrier must be one of frame, cart, got 'card'",
     ),
-    "unknown kind": ("kind: ground", "kind: grond", r"carriers\[0\]\.kind: 'grond' is unknown; accepted: .*'ground'"),
+    "unknown kind": ("kind: ground", "kind: grond", r"carriers\[0\]\.kind must be one of ground, .*, got 'grond'"),
     "no kind": (
         ", kind: ground",
         "",
-        r"carriers\[0\]\.kind: is missing; accepted: one of ground, mobile, prescribed, quadrotor",
+        r"carriers\[0\]\.kind is missing: one of ground, mobile, prescribed, quadrotor",
     ),
-    "same carrier twice": ("name: cart", "name: frame", r"carriers\[1\]\.name: 'frame' is there twice"),
-    "typing error": ("attachment: [0, 0.1, 0]", "atachment: [0, 0.1, 0]", "did you mean 'attachment'"),
+    "same carrier twice": ("name: cart", "name: frame", r"carriers\[1\]\.name must be unique, got 'frame' twice"),
+    "typing error": (
+        "attachment: [0, 0.1, 0]",
+        "atachment: [0, 0.1, 0]",
+        r"cables\[0\]\.atachment is not a known key, did you mean 'attachment'\?",
+    ),
     "unknown key": (
         "source: a test",
         "source: a test\nsorce: b",
-        r"sorce: is not a known key, did you mean 'source'\?",
+        r"sorce is not a known key, did you mean 'source'\?",
     ),
-    "key of a carrier": ("speed_max: 1,", "speed_max: 1, speed: 1,", r"carriers\[1\]\.speed: is not a known key"),
-    "home out of reach": ("home: [0, 0, 3,", "home: [0, 0, 5,", r"carriers\[1\]: home must lie in reach.*z 5"),
+    "key of a carrier": ("speed_max: 1,", "speed_max: 1, speed: 1,", r"carriers\[1\]\.speed is not a known key"),
+    "home out of reach": ("home: [0, 0, 3,", "home: [0, 0, 5,", r"carriers\[1\]\.home must lie in reach.*z 5"),
     "box inside out": (
         "min: [-1, -1, 2]",
         "min: [-1, 3, 2]",
-        r"carriers\[1\]\.reach: min must not exceed max.*along y",
+        r"carriers\[1\]\.reach\.min must not exceed max.*along y",
     ),
-    "zero length": ("anchor: [0, 0, 2]", "anchor: [0, 0.1, 0.75]", r"cables\[0\]: its anchor and attachment coincide"),
-    "no cables": (GOOD[GOOD.index("cables:") :], "cables: []\n", r"cables: has 0 items; accepted: at least 1"),
-    "position of two": ("attachment: [0, 0, 0]", "attachment: [0, 0]", r"cables\[1\]\.attachment\[2\]: is missing"),
+    "zero length": ("anchor: [0, 0, 2]", "anchor: [0, 0.1, 0.75]", r"cables\[0\] must have a length > 0 m at home"),
+    "no cables": (GOOD[GOOD.index("cables:") :], "cables: []\n", r"cables must have at least 1 items, got 0"),
+    "position of two": ("attachment: [0, 0, 0]", "attachment: [0, 0]", r"cables\[1\]\.attachment\[2\] is missing"),
     "duplicate key": (
         "source: a test",
         "source: a test\nsource: b",
@@ -78,6 +86,38 @@ WRONG = {
     "not YAML": ("name: crane", "name: [crane", r"is not YAML \(.*line \d+\)"),
     "a tag": ("name: crane", "name: !!python/object:os.system crane", "is not YAML"),
 }
+
+
+# A misspelt key at every level of a robot file, what is meant, and the field that the message names.
+MISSPELT = {
+    "name": ("name: crane", "nmae: crane", "nmae", "name"),
+    "source": ("source: a", "sorce: a", "sorce", "source"),
+    "platform": ("platform:", "plattform:", "plattform", "platform"),
+    "carriers": ("carriers:", "carrier:", "carrier", "carriers"),
+    "cables": ("cables:", "cabels:", "cabels", "cables"),
+    "mass": ("mass:", "mas:", "platform.mas", "mass"),
+    "a capital": ("mass:", "Mass:", "platform.Mass", "mass"),
+    "inertia": ("inertia:", "intertia:", "platform.intertia", "inertia"),
+    "kind": ("kind: ground", "knd: ground", "carriers[0].knd", "kind"),
+    "home": ("home:", "hone:", "carriers[1].hone", "home"),
+    "speed": ("speed_max", "speed_mx", "carriers[1].speed_mx", "speed_max"),
+    "reach": ("reach:", "raech:", "carriers[1].raech", "reach"),
+    "corner": ("min: [", "mn: [", "carriers[1].reach.mn", "min"),
+    "anchor": ("anchor: [0, 0, 2]", "ancor: [0, 0, 2]", "cables[0].ancor", "anchor"),
+    "t_min": ("t_min: 1,", "tmin: 1,", "cables[1].tmin", "t_min"),
+    "t-max": ("t_max: 10, stiff", "t-max: 10, stiff", "cables[1].t-max", "t_max"),
+    "stiffness": ("stiffness", "stifness", "cables[1].stifness", "stiffness"),
+}
+
+
+@pytest.mark.parametrize("case", MISSPELT)
+def test_a_misspelt_key_is_reported_before_a_missing_one(case):
+    old, new, field, meant = MISSPELT[case]
+    assert old in GOOD
+    with pytest.raises(InputError) as caught:
+        parse_yaml(GOOD.replace(old, new, 1), Robot, "my.yaml")
+    assert str(caught.value).startswith(f"my.yaml: {field} is not a known key, did you mean {meant!r}?")
+    assert "\n" not in str(caught.value)
 
 
 def test_the_base_of_the_wrong_ones_is_right():
@@ -105,9 +145,9 @@ def test_wrong_file_gives_one_line_with_file_field_and_value(case, tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "holds None"),
-        (b"just words", "holds 'just words'; accepted: a mapping with name, source"),
-        (b"- 1\n- 2\n", r"holds \[1, 2\]"),
+        (b"", "must hold a mapping with .*, got None"),
+        (b"just words", "must hold a mapping with name, source.*, got 'just words'"),
+        (b"- 1\n- 2\n", r"got \[1, 2\]"),
         (b"\xff\xfe\x00", "is not text"),
         (b"a: \x00", "is not YAML"),
         (b"x" * 50_000_000, r"has 50\.0 MB; accepted: a YAML file of at most 1 MB"),

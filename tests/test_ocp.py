@@ -516,19 +516,19 @@ WRONG = {
     "tilt in degrees": ({"path": CIRCLE, "base": {"kind": "free", "tilt_max": 10}}, "base.tilt_max: .*less than 1.5"),
     "path without kind": (
         {"path": CIRCLE, "base": {"kind": "free", "around": {"quad": {"pose": [0, 0, 0]}}}},
-        "base.around.quad.kind: is missing; accepted: one of circle, line, rest, samples, timed, waypoints",
+        "base.around.quad.kind is missing: one of circle, line, rest, samples, timed, waypoints",
     ),
     "same point twice": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -1], [0, 0, -2]]}, "duration": 2},
         r"path: points\[1\] must differ from points\[0\]",
     ),
-    "kind": ({"path": {"kind": "spiral"}}, "path.kind: 'spiral' is unknown; accepted"),
+    "kind": ({"path": {"kind": "spiral"}}, "path.kind must be one of .*, got 'spiral'"),
     "times": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 0]}},
         r"path: times must increase, got times\[1\] = 0 s after 0 s",
     ),
     "NaN": ({"path": {**CIRCLE, "radius": float("nan")}}, "path.radius: .*got nan"),
-    "key": ({"path": CIRCLE, "marign": 1}, "marign: is not a known key, did you mean 'margin'"),
+    "key": ({"path": CIRCLE, "marign": 1}, "marign is not a known key, did you mean 'margin'"),
     "steps": ({"path": CIRCLE, "steps": 1}, "steps: .*greater than or equal to 4, got 1"),
 }
 

@@ -120,10 +120,10 @@ WRONG = {
         {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
         "duration must be a number .s., got a range, while path of kind circle has times of its own",
     ),
-    "tube": ({"tube": {"position": "loose"}}, "tube.position: accepted: a number, not text, or .*'free', got 'loose'"),
+    "tube": ({"tube": {"position": "loose"}}, "tube.position must be a number or .*'free', got 'loose'"),
     "range of what": (
         {"duration": {"min": 2, "mx": 3}},
-        "duration.(max: is missing|mx: is not a known key, did you mean 'max')",
+        "duration.(max is missing|mx is not a known key, did you mean 'max')",
     ),
     "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min must be at most max, 1, got 2"),
     "soft": (
@@ -132,9 +132,9 @@ WRONG = {
     ),
     "box": (
         {"limits": {"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [1, 0, 1]}]}},
-        r"keep_out.*is not below max",
+        r"keep_out.*min must be smaller than max",
     ),
-    "speed": ({"limits": {"platform_speed": -1}}, "limits.platform_speed: .*greater than 0, got -1"),
+    "speed": ({"limits": {"platform_speed": -1}}, "limits.platform_speed must be greater than 0, got -1"),
 }
 
 

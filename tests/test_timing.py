@@ -325,7 +325,7 @@ QUAD = {"kind": "line", "start": [0, 0, 0], "end": [1, 0, 0]}
 @pytest.mark.parametrize(
     ("robot", "path", "options", "message"),
     [
-        ("wang-flying", {"kind": "spiral"}, {}, "path.kind: 'spiral' is unknown"),
+        ("wang-flying", {"kind": "spiral"}, {}, "path.kind must be one of .*, got 'spiral'"),
         ("wang-flying", {**CENTRE, "end": [0, 0, -1]}, {}, "nothing moves there"),
         ("wang-flying", {**CENTRE, "frame": "moon"}, {}, "path.frame: 'moon'"),
         ("wang-flying", CENTRE, {"carriers": {"moon": QUAD}}, "got 'moon'"),
