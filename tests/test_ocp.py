@@ -513,7 +513,10 @@ WRONG = {
         {"path": {"kind": "rest", "pose": [0.395, -0.216506350946, -0.1]}, "duration": 1},
         "attachment of cable 1 coincide at t = 0.000 s",
     ),
-    "tilt in degrees": ({"path": CIRCLE, "base": {"kind": "free", "tilt_max": 10}}, "base.tilt_max: .*less than 1.5"),
+    "tilt in degrees": (
+        {"path": CIRCLE, "base": {"kind": "free", "tilt_max": 10}},
+        "base.tilt_max must be less than 1.5",
+    ),
     "path without kind": (
         {"path": CIRCLE, "base": {"kind": "free", "around": {"quad": {"pose": [0, 0, 0]}}}},
         "base.around.quad.kind is missing: one of circle, line, rest, samples, timed, waypoints",
@@ -525,11 +528,11 @@ WRONG = {
     "kind": ({"path": {"kind": "spiral"}}, "path.kind must be one of .*, got 'spiral'"),
     "times": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -2]], "times": [0, 0]}},
-        r"path: times must increase, got times\[1\] = 0 s after 0 s",
+        r"path.times must increase, got times\[1\] = 0 s after 0 s",
     ),
-    "NaN": ({"path": {**CIRCLE, "radius": float("nan")}}, "path.radius: .*got nan"),
+    "NaN": ({"path": {**CIRCLE, "radius": float("nan")}}, "path.radius must be .*got nan"),
     "key": ({"path": CIRCLE, "marign": 1}, "marign is not a known key, did you mean 'margin'"),
-    "steps": ({"path": CIRCLE, "steps": 1}, "steps: .*greater than or equal to 4, got 1"),
+    "steps": ({"path": CIRCLE, "steps": 1}, "steps must be greater than or equal to 4, got 1"),
 }
 
 

@@ -115,7 +115,7 @@ def test_a_plan_to_start_from_saves_iterations():
 
 
 WRONG = {
-    "range": ({"duration": {"min": 2, "max": 1}}, "task: duration: min must be at most max, 1, got 2"),
+    "range": ({"duration": {"min": 2, "max": 1}}, "task: duration.min must be at most max, 1, got 2"),
     "range of a circle": (
         {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
         "duration must be a number .s., got a range, while path of kind circle has times of its own",
@@ -125,7 +125,7 @@ WRONG = {
         {"duration": {"min": 2, "mx": 3}},
         "duration.(max is missing|mx is not a known key, did you mean 'max')",
     ),
-    "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length: min must be at most max, 1, got 2"),
+    "length": ({"limits": {"cable_length": {"min": 2, "max": 1}}}, "cable_length.min must be at most max, 1, got 2"),
     "soft": (
         {"limits": {"cable_speed": 1, "soft": {"cable_sped": 0.1}}},
         "soft must name limits of this task .cable_speed, .*got 'cable_sped', did you mean 'cable_speed'",
