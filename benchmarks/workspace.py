@@ -28,7 +28,7 @@ from ..workspace import (
     StaticEquilibrium,
     WrenchClosure,
     WrenchFeasible,
-    make_ready,
+    load_kernels,
 )
 from .machine import machine
 
@@ -60,7 +60,7 @@ def report_throughput(count: int, runs: int) -> None:
     print("robot             m  condition                 places   held   wall s  places/s   process s  places/s")
     for name in ("wang-flying", "nist-robocrane", "ipanema-2", "cogiro"):
         robot = load(name)
-        make_ready(robot)
+        load_kernels(robot)
         places = random_places(robot, count)
         for label, condition, most in conditions:
             some = places.only(slice(0, most))

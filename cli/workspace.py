@@ -1,4 +1,4 @@
-"""`towline workspace`: which poses are reachable."""
+"""`towline workspace`: sample which poses are reachable."""
 
 from __future__ import annotations
 
@@ -25,45 +25,61 @@ def workspace(
     robot: RobotArgument,
     condition: Annotated[
         list[str] | None,
-        typer.Option(help="A kind, or JSON with its keys; several: all hold. None: static-equilibrium."),
+        typer.Option(
+            help="A kind, or JSON with a kind and its keys; of several all must hold. Default: static-equilibrium."
+        ),
     ] = None,
     box: Annotated[
-        str | None, typer.Option(help="Positions: 'x y z; x y z', lowest; highest [m]; none: about the robot.")
+        str | None, typer.Option(help="Positions [m]: 'x y z; x y z', minima; maxima. Default: a box about the robot.")
     ] = None,
     attitude: Annotated[
-        str | None, typer.Option(help="'roll pitch yaw', or lowest; highest [rad]; none: that of home.")
+        str | None, typer.Option(help="'roll pitch yaw' [rad], or minima; maxima. Default: that of home.")
     ] = None,
-    carriers: Annotated[str, typer.Option(help="home, or reach: mobile carriers anywhere in their boxes.")] = "home",
+    carriers: Annotated[
+        str, typer.Option(help="home; or reach: mobile carriers anywhere in their reach boxes.")
+    ] = "home",
     lengths: Annotated[
-        str | None, typer.Option(help="'min max' of three cables [m], instead of positions, which follow from them.")
+        str | None,
+        typer.Option(help="'min max' of three cable lengths [m], from which positions follow; instead of --box."),
     ] = None,
-    samples: Annotated[float, typer.Option(help="How many; 1e8 is a number too.")] = 60_000,
+    samples: Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")] = 60_000,
     method: Annotated[str, typer.Option(help="random, sobol, halton, grid or adaptive.")] = "random",
-    seed: Annotated[int, typer.Option(help="Of the random streams.")] = 0,
-    size: Annotated[float | None, typer.Option(help="Of adaptive: edge of the smallest cells [m].")] = None,
-    workers: Annotated[int, typer.Option(help="Processes of this machine.")] = 1,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, tcp://host:8786 (extra cluster).")
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+    size: Annotated[
+        float | None,
+        typer.Option(help="With the method adaptive: edge of the smallest cells [m]. Default: as the samples allow."),
     ] = None,
-    checkpoint: Annotated[Path | None, typer.Option("--checkpoint", help="New file to append the answers to.")] = None,
+    workers: Annotated[int, typer.Option(help="Number of processes on this machine.")] = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, tcp://host:8786 (extra cluster)."),
+    ] = None,
+    checkpoint: Annotated[
+        Path | None, typer.Option("--checkpoint", help="New file to which results are appended, to be resumed later.")
+    ] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", metavar="FILE", help="Checkpoint to go on with, or to begin.")
+        Path | None,
+        typer.Option("--resume", metavar="FILE", help="Checkpoint to continue, or to create if there is none."),
     ] = None,
     keep: Annotated[
-        str, typer.Option(help="Samples in the file, a million at most: accepted, all, none.")
+        str, typer.Option(help="Which samples the file contains, a million at most: accepted, all or none.")
     ] = "accepted",
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="NetCDF file, or .zarr folder, to write; none: ROBOT-workspace.nc in this folder."),
+        typer.Option("--out", help="NetCDF file or .zarr folder to write. Default: ROBOT-workspace.nc in this folder."),
     ] = None,
-    figure: Annotated[Path | None, typer.Option("--figure", help="PNG file to draw what was reached in.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="PNG file for a picture of the positions reached.")
+    ] = None,
     mesh: Annotated[
         Path | None,
-        typer.Option("--mesh", help="STL file for the boundary at one attitude, carriers at home (extra mesh)."),
+        typer.Option(
+            "--mesh", help="STL file for the boundary, at one attitude and with carriers at home (extra mesh)."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Sample where a robot's platform can be, or find that it can be nowhere (exit code 1)."""
+    """Sample which poses of a robot's platform fulfil a condition; the exit code is 1 if none does."""
     from ..figures import style
     from ..figures.workspace import reached
     from ..models import load
@@ -71,28 +87,28 @@ def workspace(
     from ..writing import check_writable
 
     loaded = load(robot)
-    asked = _condition(condition)
+    required = _condition(condition)
     region = _region(box, attitude, carriers, lengths)
     target = out if out is not None else Path(f"{loaded.name}-workspace.nc")
     if checkpoint is not None and resume is not None:
-        raise InputError(f"--checkpoint: {checkpoint} beside --resume {resume}; accepted: one of them")
+        raise InputError(f"--checkpoint must not be given with --resume, got {checkpoint} and {resume}")
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
-        raise InputError(f"--mesh: {mesh} of a region whose attitude or carriers vary; accepted: positions that vary")
+        raise InputError(f"--mesh must be of a region in which only positions vary, got {mesh} of another")
     taken = {kept.resolve(): "the checkpoint" for kept in (checkpoint, resume) if kept is not None}
     if target.suffix == ".zarr" and target.exists():
-        raise InputError(f"--out: {target} is there already; accepted: a new .zarr folder, or a NetCDF file")
+        raise InputError(f"--out must be a new .zarr folder or a NetCDF file, got {target}, which exists")
     for what, file in (("--out", target), ("--figure", figure), ("--mesh", mesh)):
         place = None if file is None else check_writable(file)
         if place in taken:
-            raise InputError(f"{what}: {file} is {taken[place]}; accepted: another file for what is found")
+            raise InputError(f"{what} must be another file than {taken[place]}, got {file}")
         if place is not None:
-            taken[place] = f"{what} already"
-    # Before the samples, so that what is wrong with it is told before hours of work.
-    surface = None if mesh is None else _boundary(loaded, asked, region)
+            taken[place] = what
+    # Before the samples, so that an error in it is reported before hours of work.
+    surface = None if mesh is None else _boundary(loaded, required, region)
     with _progress(f"sampling {loaded.name}", quiet=as_json) as progress:
-        found = sample(
+        result = sample(
             loaded,
-            asked,
+            required,
             region,
             _count(samples),
             method,
@@ -105,16 +121,19 @@ def workspace(
             progress=progress,
             keep=keep,
         )
-    written = [save(found, target)]
+    written = [save(result, target)]
     if figure is not None:
-        written.append(style.save(reached(found), figure))
+        written.append(style.save(reached(result), figure))
     if mesh is not None and surface is not None:
         written.append(surface.save(mesh))
-    summary = _summary(found)
+    summary = _summary(result)
+    reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
-        print_json({**summary, "file": str(target), "figure": _name(figure), "mesh": _name(mesh)})
+        print_json({**summary, "reason": reason, "file": str(target), "figure": _name(figure), "mesh": _name(mesh)})
     else:
-        _show(found, summary, size)
+        _show(result, summary, size)
+        if reason is not None:
+            typer.echo(f"  {reason}")
         typer.echo("  Written")
         for path in written:
             typer.echo(f"    {path}")
@@ -147,8 +166,8 @@ def _condition(texts: list[str] | None) -> Condition:
                 data = json.loads(text)
             except json.JSONDecodeError as error:
                 raise InputError(
-                    f"--condition: {text!r} is not JSON ({error.msg}, character {error.pos + 1}); accepted: a kind, or "
-                    'JSON as {"kind": ...}'
+                    f'--condition must be a kind or JSON such as {{"kind": "margin", "above": 5}}, got {text!r} '
+                    f"({error.msg}, character {error.pos + 1})"
                 ) from None
         conditions.append(condition_from(data))
     if not conditions:
@@ -159,19 +178,23 @@ def _condition(texts: list[str] | None) -> Condition:
 def _region(box: str | None, attitude: str | None, carriers: str, lengths: str | None) -> dict[str, Any]:
     region: dict[str, Any] = {"carriers": carriers}
     if box is not None:
-        region["position"] = _ends("--box", box)
+        region["position"] = _ends("--box", box, "x y z")
     if attitude is not None:
-        region["attitude"] = _ends("--attitude", attitude) if ";" in attitude else tuple(_three("--attitude", attitude))
+        region["attitude"] = (
+            _ends("--attitude", attitude, "roll pitch yaw")
+            if ";" in attitude
+            else tuple(_three("--attitude", attitude))
+        )
     if lengths is not None:
-        least, most = numbers("--lengths", lengths, 2).tolist()
-        region["lengths"] = {"min": least, "max": most}
+        low, high = numbers("--lengths", lengths, 2).tolist()
+        region["lengths"] = {"min": low, "max": high}
     return region
 
 
-def _ends(option: str, text: str) -> dict[str, tuple[float, ...]]:
+def _ends(option: str, text: str, names: str) -> dict[str, tuple[float, ...]]:
     parts = text.split(";")
     if len(parts) != 2:
-        raise InputError(f"{option}: {text!r}; accepted: the lowest and the highest, apart by ';'")
+        raise InputError(f"{option} must be '{names}; {names}', got {text!r}")
     return {"min": tuple(_three(option, parts[0])), "max": tuple(_three(option, parts[1]))}
 
 
@@ -181,13 +204,13 @@ def _three(option: str, text: str) -> list[float]:
 
 def _count(samples: float) -> int:
     if not float(samples).is_integer() or samples > 1e15:
-        raise InputError(f"--samples: is {samples:g}; accepted: a whole number from 1 on")
+        raise InputError(f"--samples must be a whole number from 1, got {samples:g}")
     return int(samples)
 
 
 @contextmanager
 def _progress(what: str, quiet: bool) -> Iterator[Progress]:
-    """A bar with rate and remaining time on standard error, if a person is watching."""
+    """Show a bar with rate and remaining time on standard error, if that is a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
@@ -196,54 +219,61 @@ def _progress(what: str, quiet: bool) -> Iterator[Progress]:
         TextColumn("{task.description}"),
         BarColumn(bar_width=20),
         TaskProgressColumn(),
-        TextColumn("{task.fields[told]}", markup=False),
+        TextColumn("{task.fields[rate]}", markup=False),
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
-        line = shown.add_task(what, told="", total=None)
+        line = shown.add_task(what, rate="", total=None)
 
-        def tell(done: int, total: int, accepted: int) -> None:
+        def advance(done: int, total: int, accepted: int) -> None:
             task = shown.tasks[line]
             rate = task.speed or task.finished_speed or 0.0
-            told = f"{rate:,.0f}/s  accepted {accepted / max(done, 1):.2%}"
-            shown.update(line, completed=done, total=total, told=told)
+            text = f"{rate:,.0f}/s  accepted {accepted / max(done, 1):.2%}"
+            shown.update(line, completed=done, total=total, rate=text)
 
-        yield tell
+        yield advance
 
 
-def _summary(found: xr.Dataset) -> dict[str, Any]:
-    low, high = found["bounds"].values.tolist()
+def _summary(result: xr.Dataset) -> dict[str, Any]:
+    low, high = result["bounds"].values.tolist()
     return {
-        "robot": found.attrs["robot"],
-        "samples": found.attrs["samples"],
-        "accepted": found.attrs["accepted"],
-        "volume": float(found["volume"]),
-        "volume_interval": found["volume_interval"].values.tolist(),
-        "volume_unit": found["volume"].attrs["units"],
+        "robot": result.attrs["robot"],
+        "samples": result.attrs["samples"],
+        "accepted": result.attrs["accepted"],
+        "volume": float(result["volume"]),
+        "volume_interval": result["volume_interval"].values.tolist(),
+        "volume_unit": result["volume"].attrs["units"],
         "bounds": {name: [low[i], high[i]] for i, name in enumerate("xyz")},
-        "seconds": found.attrs["seconds"],
-        "poses_per_s": found.attrs["poses_per_s"],
-        "method": found.attrs["method"],
-        "seed": found.attrs["seed"],
-        "condition": found.attrs["condition"],
-        "region": found.attrs["region"],
+        "seconds": result.attrs["seconds"],
+        "poses_per_s": result.attrs["poses_per_s"],
+        "method": result.attrs["method"],
+        "seed": result.attrs["seed"],
+        "condition": result.attrs["condition"],
+        "region": result.attrs["region"],
     }
 
 
-def _show(found: xr.Dataset, summary: dict[str, Any], size: float | None) -> None:
+def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None) -> None:
     import math
 
+    from ..text import quantity
+
     accepted, samples = summary["accepted"], summary["samples"]
-    typer.echo(f"{summary['robot']}: {accepted:,} of {samples:,} samples accepted ({accepted / samples:.2%})")
+    typer.echo(
+        f"{summary['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted ({accepted / samples:.2%})"
+    )
     low, high = summary["volume_interval"]
     unit = summary["volume_unit"].replace("1", "")
-    between = "" if math.isnan(low) else f", between {low:.6g} and {high:.6g} ({found['volume_interval'].long_name})"
-    typer.echo(f"  volume {summary['volume']:.6g} {unit}{between}")
-    if "cell_edges" in found:
-        longest = float(found["cell_edges"].max())
-        more = f", not {size:g} m: that takes more samples" if size is not None and longest > size * (1 + 1e-9) else ""
-        typer.echo(f"  smallest cells {longest:.3g} m long{more}")
+    between = f", from {quantity(low, digits=6)} to {quantity(high, unit, digits=6)}"
+    about = "" if math.isnan(low) else f"{between} ({result['volume_interval'].long_name})"
+    typer.echo(f"  volume {quantity(summary['volume'], unit, digits=6)}{about}")
+    if "cell_edges" in result:
+        longest = float(result["cell_edges"].max())
+        larger = size is not None and longest > size * (1 + 1e-9)
+        more = f", not {size:g} m, which takes more samples" if larger else ""
+        typer.echo(f"  edges of the smallest cells up to {quantity(longest, 'm', digits=3)}{more}")
     if accepted:
         for name, (least, most) in summary["bounds"].items():
-            typer.echo(f"  {name} from {least:.4g} to {most:.4g} m")
-    typer.echo(f"  {summary['poses_per_s']:,.0f} poses/s, {summary['seconds']:.2f} s with start-up")
+            typer.echo(f"  {name} from {quantity(least)} to {quantity(most, 'm')}")
+    rate = quantity(summary["poses_per_s"], "poses/s", digits=3)
+    typer.echo(f"  {rate}, {quantity(summary['seconds'], 's', digits=3)} with start-up")

@@ -21,7 +21,7 @@ RECORD = 16 + CHUNK // 8 + 4  # bytes
 
 
 class Counting(StaticEquilibrium):
-    """Rest, that counts how many places it was asked about."""
+    """Rest; counts how many places it was evaluated at."""
 
     def _holds(self, robot, places):
         counts.append(len(places.pose))
@@ -101,7 +101,7 @@ def test_garbage_at_the_end_is_dropped(tmp_path, whole):
 
 
 def test_what_is_there_is_not_asked_again(tmp_path):
-    """The condition is asked about one place, to see whether it can be, and about the chunks that are missing."""
+    """The condition is evaluated at one place, to check whether it applies, and in the chunks that are missing."""
     file = tmp_path / "run.checkpoint"
     counts.clear()
     first = run(file, False, Counting())
@@ -148,7 +148,7 @@ def test_a_checkpoint_of_another_robot_is_refused(tmp_path, whole):
     file.write_bytes(whole[0])
     robot = load("wang-flying")
     heavier = robot.model_copy(update={"platform": robot.platform.model_copy(update={"mass": 2.0})})
-    with pytest.raises(InputError, match="is of another run: its robot is"):
+    with pytest.raises(InputError, match="of another run, whose robot is"):
         sample(heavier, StaticEquilibrium(), samples=SAMPLES, seed=4, checkpoint=file, resume=True)
     assert file.read_bytes() == whole[0]
 
@@ -156,10 +156,10 @@ def test_a_checkpoint_of_another_robot_is_refused(tmp_path, whole):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda content: b"", "is no checkpoint of towline"),
-        (lambda content: b"robot: mine\n" * 100, "is no checkpoint of towline"),
-        (lambda content: content[: len(MAGIC) + 2], "its header is damaged"),
-        (lambda content: content[:60] + b"?" + content[61:], "its header is damaged"),
+        (lambda content: b"", "which is no checkpoint of towline"),
+        (lambda content: b"robot: mine\n" * 100, "which is no checkpoint of towline"),
+        (lambda content: content[: len(MAGIC) + 2], "with a damaged header"),
+        (lambda content: content[:60] + b"?" + content[61:], "with a damaged header"),
         (lambda content: content[: -2 * RECORD] + b"?" + content[-2 * RECORD + 1 :], "is damaged after chunk"),
         (lambda content: content + content, "is damaged after chunk 4"),
     ],
@@ -177,7 +177,7 @@ def test_a_damaged_or_foreign_file_is_left_as_it_is(tmp_path, whole, damage, mes
 def test_nothing_is_overwritten(tmp_path):
     file = tmp_path / "notes.txt"
     file.write_text("mine")
-    with pytest.raises(InputError, match="is there already; accepted: a new path, or resume"):
+    with pytest.raises(InputError, match="checkpoint must be a new file unless it is resumed"):
         run(file, False)
     assert file.read_text() == "mine"
     with pytest.raises(InputError, match="is a folder"):
@@ -203,7 +203,9 @@ def test_a_full_disk_is_told_and_what_is_there_is_gone_on_with(tmp_path, whole):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole[0]) - RECORD, before[1]))
-        with pytest.raises(InputError, match=r"run.checkpoint: cannot be written \(File too large\) after chunk 2"):
+        with pytest.raises(
+            InputError, match=r"run.checkpoint cannot be written after chunk 2 \(File too large\); it can be resumed"
+        ):
             run(file, False)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -221,7 +223,7 @@ def test_a_full_disk_is_told_and_what_is_there_is_gone_on_with(tmp_path, whole):
 def test_one_run_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
     file = tmp_path / "run.checkpoint"
-    with open_checkpoint(file, {"a": 1}, False), pytest.raises(InputError, match="another run is writing to it"):
+    with open_checkpoint(file, {"a": 1}, False), pytest.raises(InputError, match="to which another run is writing"):
         open_checkpoint(file, {"a": 1}, True).__enter__()
     with open_checkpoint(file, {"a": 1}, True) as again:
         assert again.stored == 0

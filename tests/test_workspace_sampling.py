@@ -243,27 +243,42 @@ def test_fewer_processors_inside_of_a_block():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"samples": 0}, "samples: is 0; accepted: a whole number from 1"),
-        ({"samples": 2.5}, "samples: is 2.5"),
-        ({"method": "dice"}, "method: 'dice' is unknown; accepted: random, sobol, halton, grid, adaptive"),
-        ({"seed": -1}, "seed: is -1"),
-        ({"workers": 0}, "workers: is 0"),
-        ({"keep": "some"}, "keep: 'some' is unknown; accepted: accepted, all, none"),
-        ({"resume": True}, "resume: needs a checkpoint"),
-        ({"size": 0.1}, "size: method 'random' has no cells"),
-        ({"method": "adaptive", "size": -1.0}, "size: is -1.0; accepted: a number > 0"),
-        ({"method": "adaptive", "size": "fine"}, "size: is 'fine'; accepted: a number > 0"),
-        ({"method": "adaptive", "samples": 4}, "samples: is 4; accepted: 8 and more"),
-        ({"region": {"position": {"min": [0, 0, 0], "max": [0, 0, 0]}}}, "is empty"),
+        ({"samples": 0}, "samples must be a whole number from 1"),
+        ({"samples": 2.5}, "got 2.5"),
+        ({"method": "dice"}, "method must be one of random, sobol, halton, grid, adaptive, got 'dice'"),
+        ({"seed": -1}, "seed must be a whole number"),
+        ({"workers": 0}, "workers must be"),
+        ({"keep": "some"}, "keep must be one of accepted, all, none, got 'some'"),
+        ({"resume": True}, "checkpoint must be a path if resume is True"),
+        ({"size": 0.1}, "size must be None unless method is adaptive, got 0.1"),
+        ({"method": "adaptive", "size": -1.0}, "size must be a number from 1e-09 to 1e+09 [m], or None, got -1.0"),
+        ({"method": "adaptive", "size": "fine"}, "size must be a number"),
+        ({"method": "adaptive", "samples": 4}, "samples must be at least 8, the corners of a cell, got 4"),
+        ({"region": {"position": {"min": [0, 0, 0], "max": [0, 0, 0]}}}, "region.position must have min below max"),
         ({"region": {"position": {"min": [1, 0, 0], "max": [0, 1, 1]}}}, "along x min is 1 and max is 0"),
-        ({"region": {"attitude": {"min": [0, 0, 0], "max": [0, 0, 1]}}}, "cannot move so"),
+        ({"region": {"attitude": {"min": [0, 0, 0], "max": [0, 0, 1]}}}, "equal min and max of yaw"),
         ({"region": {"attitude": {"min": [0, 0, 1], "max": [0, 0, 0]}}}, "of yaw min is 1 and max is 0"),
-        ({"region": {"carriers": "reach"}}, "has no mobile carriers"),
-        ({"region": {"carriers": {"nobody": {"min": [0, 0, 0], "max": [1, 1, 1]}}}}, "'nobody' is unknown"),
+        ({"region": {"carriers": "reach"}}, "without mobile carriers"),
+        (
+            {"region": {"carriers": {"nobody": {"min": [0, 0, 0], "max": [1, 1, 1]}}}},
+            "region.carriers must have the names frame, got 'nobody'",
+        ),
         ({"region": {"lengths": {"min": 2, "max": 1}}}, "min is 2 and max is 1"),
-        ({"region": {"lengths": {"min": 0.1, "max": 0.2}}}, "never meet"),
+        ({"region": {"lengths": {"min": 0.1, "max": 0.2}}}, "long enough for the three cables to meet"),
         ({"region": {"box": 1}}, "is not a known key"),
         ({"region": 5}, "region"),
+        ({"samples": np.nan}, "samples must be a whole number"),
+        ({"samples": True}, "samples must be a whole number"),
+        ({"samples": 10**13}, "got 10000000000000"),
+        ({"points_max": -1}, "points_max must be"),
+        ({"method": None}, "method must be one of"),
+        ({"keep": []}, "keep must be one of"),
+        ({"scheduler": 8786}, "scheduler must be the address"),
+        ({"checkpoint": 5}, "checkpoint must be a path"),
+        ({"resume": "yes"}, "resume must be True or False"),
+        ({"progress": 1}, "progress must be a function"),
+        ({"method": "adaptive", "samples": 10**7}, "samples with method adaptive must be"),
+        ({"method": "adaptive", "size": np.nan}, "size must be a number"),
     ],
 )
 def test_wrong_input_is_one_line(arguments, message):
@@ -274,10 +289,10 @@ def test_wrong_input_is_one_line(arguments, message):
 
 
 def test_the_name_of_a_robot_is_no_robot():
-    with pytest.raises(InputError, match="robot: is 'wang-flying'; accepted: a Robot"):
+    with pytest.raises(InputError, match="robot must be a Robot, got 'wang-flying'"):
         sample("wang-flying", REST)
 
 
 def test_many_cables_have_no_place_by_lengths():
-    with pytest.raises(InputError, match="has 8 cables; accepted: robots with three"):
+    with pytest.raises(InputError, match="three cables that moves in space, got one with 8"):
         sample(load("ipanema-1"), REST, {"lengths": {"min": 1, "max": 2}})

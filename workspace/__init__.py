@@ -1,9 +1,9 @@
-"""Which poses are reachable: conditions on places of platform and carriers, asked of 10^4 to 10^9 of them.
+"""Which poses are reachable: conditions, evaluated at 10^3 to 10^9 places of platform and carriers.
 
-Conditions stand alone or are joined by & and |; `sample` asks them; `hints` is a first look.
+Conditions stand alone or are joined by & and |. `sample` evaluates them, `boundary` makes a mesh of where they
+hold, `hints` takes a first look.
 """
 
-from .balance import make_ready
 from .boundary_mesh import boundary
 from .condition import AllOf, AnyOf, Condition, condition_from
 from .conditions import (
@@ -19,6 +19,7 @@ from .conditions import (
     WrenchFeasible,
     WrenchWithTolerance,
 )
+from .feasibility import load_kernels
 from .first_look import hints
 from .places import Places
 from .region import Region
@@ -44,7 +45,7 @@ __all__ = [
     "boundary",
     "condition_from",
     "hints",
-    "make_ready",
+    "load_kernels",
     "sample",
     "save",
 ]

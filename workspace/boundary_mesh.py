@@ -1,4 +1,4 @@
-"""The boundary of a workspace as a mesh of triangles, from values on a grid: marching cubes (scikit-image), and STL."""
+"""The boundary of a workspace as a mesh of triangles: marching cubes (scikit-image) on a grid, saved as STL."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..inputs import required, shown, whole_number
 from ..models import Robot
 from ..writing import whole_file
 from .condition import Condition
 from .places import Places
-from .sampling import whole
 
 __all__ = ["Mesh", "boundary", "boundary_of_values"]
 
@@ -24,14 +24,14 @@ _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribut
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles, counter-clockwise seen from outside.
+    """Triangles, counter-clockwise when looked at from outside.
 
     Attributes
     ----------
     vertices
         In {G}, (n, 3) [m].
     faces
-        Indices of vertices, (k, 3); none if there is nothing to bound.
+        Indices of vertices, (k, 3); empty if the workspace is.
     """
 
     vertices: np.ndarray  # (n, 3)
@@ -39,12 +39,12 @@ class Mesh:
 
     @property
     def volume(self) -> float:
-        """Volume inside [m^3], by the divergence theorem."""
+        """Enclosed volume [m^3], by the divergence theorem."""
         a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
         return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6.0)
 
     def save(self, path: str | Path) -> Path:
-        """Save as binary STL, in metres; whole or not at all."""
+        """Save as binary STL in metres, whole or not at all; raise InputError if it cannot be written."""
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         sizes = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -65,28 +65,30 @@ def boundary(
     cells: int = 48,
     attitude: ArrayLike | None = None,
 ) -> Mesh:
-    """Mesh of the boundary of the positions where a condition holds, at one attitude, with the carriers at home.
+    """Compute the boundary of the positions where a condition holds, at one attitude, with the carriers at home.
 
     Parameters
     ----------
     robot, condition
-        Whose positions, and what is to hold there.
+        The robot, and the condition that holds inside the boundary.
     low, high
-        Corners of the box to look in, (3,) in {G} [m].
+        Corners of the box of positions, (3,) in {G} [m].
     cells
-        Along the longest edge of the box. The mesh is right to about half the size of a cell.
+        Cells along the longest edge of the box. The mesh is accurate to about half the size of a cell.
     attitude
-        (roll, pitch, yaw) [rad]; None: that of home.
+        (roll, pitch, yaw) [rad]; default: that of home.
 
     Raises
     ------
     InputError
-        If the box is flat, or there are too few cells or too many.
+        If an argument has a wrong type or value, or the box is flat.
     """
+    required("robot", robot, Robot)
+    required("condition", condition, Condition)
     low, high = _three("low", low), _three("high", high)
     if not (high > low).all():
-        raise InputError(f"box: from {low.tolist()} to {high.tolist()}; accepted: three numbers each, low below high")
-    whole("cells", cells, 2, MOST_CELLS)
+        raise InputError(f"low must be below high in all three numbers, got {low.tolist()} and {high.tolist()}")
+    whole_number("cells", cells, 2, MOST_CELLS)
     angles = robot.home[3:] if attitude is None else _three("attitude", attitude)
     counts = np.maximum(np.ceil((high - low) / ((high - low).max() / cells)).astype(int), 1) + 1
     axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
@@ -98,19 +100,19 @@ def boundary(
 
 
 def _three(field: str, values: ArrayLike) -> np.ndarray:
-    """Return (3,), or raise `InputError` if values are not three finite numbers."""
-    accepted = f"{field}: is {values!r}; accepted: three finite numbers"
+    """Return values as an array (3,); raise InputError if they are not three finite numbers."""
+    message = f"{field} must be three finite numbers, got {shown(values)}"
     try:
         array = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(accepted) from None
+        raise InputError(message) from None
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise InputError(accepted)
+        raise InputError(message)
     return array
 
 
 def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
-    """Mesh of where values on a grid cross zero, positive inside; closed at the faces of the box.
+    """Compute the surface where values on a grid, positive inside, cross zero; it is closed at the faces of the box.
 
     Parameters
     ----------
@@ -120,12 +122,12 @@ def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) ->
     try:
         from skimage.measure import marching_cubes
     except ImportError:
-        raise InputError("scikit-image: is not installed; accepted: pip install 'towline[mesh]'") from None
+        raise InputError("boundary needs scikit-image: pip install 'towline[mesh]'") from None
     if not (values > 0).any():
         return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
     spacing = (np.asarray(high) - low) / (np.array(values.shape) - 1)
-    # Just outside the box nothing is inside, so that the mesh is closed.
+    # A layer of cells outside the box counts as outside, so that the mesh is closed.
     padded = np.pad(values, 1, constant_values=float(min(values.min(), -values.max())))
     vertices, faces, _, _ = marching_cubes(padded, 0.0, spacing=tuple(spacing), gradient_direction="ascent")
-    # The layer added is a cell away; what it bounds ends at the box.
+    # Vertices in the layer are moved back to the box.
     return Mesh(np.clip(vertices - spacing + low, low, high), faces.astype(np.intp))

@@ -1,13 +1,13 @@
-r"""Checkpoints: the answers so far in a file that only grows, so that a run that was killed goes on where it was.
+r"""Checkpoints: the results so far in a file that only grows, so that a run that was stopped can be resumed.
 
-A line that tells what the file is, a header, records:
+The file has a first line that identifies it, a header, and records:
 
     towline workspace checkpoint 1\n
-    length of the header (uint32), header (JSON: all that decides on the answers), its CRC-32
+    length of the header (uint32), header (JSON: everything the flags depend on), its CRC-32
     for each chunk in turn: chunk (uint64), samples (uint32), accepted (uint32), flags (one bit a sample), CRC-32
 
-Integers are little-endian. A record that was cut short by the end of the process is dropped; any other damage is told,
-and such a file is never written to.
+Integers are little-endian. A record that was cut short by the end of the process is dropped; any other damage
+is an error, and such a file is never written to.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ MAGIC = b"towline workspace checkpoint 1\n"
 ACCEPTED = "a checkpoint of this run"
 _HEAD, _SUM = struct.Struct("<QII"), struct.Struct("<I")
 _LONGEST = _HEAD.size + CHUNK // 8 + _SUM.size  # of a record
-_SAFE_EVERY = 1.0  # [s] between writes that outlive a power cut
+_SAFE_EVERY = 1.0  # [s] between writes that survive a power cut
 
 
 class Checkpoint:
-    """An open checkpoint: reads what it has, chunk by chunk, then appends.
+    """Read the chunks of an open checkpoint one by one, then append.
 
     Attributes
     ----------
     stored
-        How many chunks it had when it was opened.
+        Number of chunks that it had when it was opened.
     """
 
     def __init__(self, path: Path, stream: FileIO, start: int, stored: int):
@@ -52,29 +52,29 @@ class Checkpoint:
         self._safe_at = time.monotonic()
         stream.seek(start)
 
-    def answer(self, chunk: int, size: int) -> bytes | None:
-        """The packed flags of a chunk, or None if it is not there; to be asked for chunk after chunk.
+    def flags(self, chunk: int, size: int) -> bytes | None:
+        """Return the packed flags of a chunk, or None if the file does not have it; chunks are read in their order.
 
         Raises
         ------
         InputError
-            If the chunk there is not of this size.
+            If the chunk in the file has another number or size.
         """
         if chunk >= self.stored:
             return None
         record = _record(self._stream)
         if record is None or chunk != self._read or record[:2] != (chunk, size):
-            raise InputError(f"{self._path}: chunk {chunk} is not of this run; accepted: {ACCEPTED}")
+            raise InputError(f"checkpoint must be {ACCEPTED}, got {self._path} whose chunk {chunk} is of another run")
         self._read += 1
         return record[2]
 
     def append(self, chunk: int, size: int, flags: bytes) -> None:
-        """Add a chunk; those that are there already are not added again.
+        """Append a chunk, unless the file has it already.
 
         Raises
         ------
         InputError
-            If there is no room for it. What was there before is safe.
+            If it cannot be written, as on a full disk. The file can be resumed.
         """
         if chunk < self.stored:
             return
@@ -90,8 +90,7 @@ class Checkpoint:
                 self._safe_at = time.monotonic()
         except OSError as error:
             raise InputError(
-                f"{self._path}: cannot be written ({error.strerror}) after chunk {chunk}; accepted: to resume it, once "
-                "there is room"
+                f"checkpoint {self._path} cannot be written after chunk {chunk} ({error.strerror}); it can be resumed"
             ) from None
 
 
@@ -102,24 +101,24 @@ def open_checkpoint(path: Path, header: dict[str, Any], resume: bool) -> Iterato
     Parameters
     ----------
     resume
-        False: a new file. True: go on with the file, or begin it if there is none.
+        False: create a new file. True: continue the file, or create it if there is none.
 
     Raises
     ------
     InputError
-        If the file cannot be written; if it is there and `resume` is False; if it is no checkpoint, of another run,
-        damaged, or in use. It is left as it was then.
+        If the file cannot be written; if it exists and `resume` is False; if it is no checkpoint, of another run,
+        damaged, or in use. The file is not changed then.
     """
     target = check_writable(path)
     if target.exists() and not resume:
-        raise InputError(f"{path}: is there already; accepted: a new path, or resume to go on with it")
+        raise InputError(f"checkpoint must be a new file unless it is resumed, got {path}, which exists")
     text = json.dumps(header, sort_keys=True).encode()
     try:
         if not target.exists() and not begin(target, MAGIC + _SUM.pack(len(text)) + text + _SUM.pack(zlib.crc32(text))):
-            raise InputError(f"{path}: another run has just begun it; accepted: a checkpoint that is not in use")
+            raise InputError(f"checkpoint must not be in use, got {path}, which another run has just begun")
         stream = FileIO(target, "r+b")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); accepted: a writable place") from None
+        raise InputError(f"checkpoint must be a file that can be written, got {path} ({error.strerror})") from None
     with stream:
         _lock(path, stream)
         _check_header(path, stream, header)
@@ -132,12 +131,12 @@ def open_checkpoint(path: Path, header: dict[str, Any], resume: bool) -> Iterato
 
 
 def begin(target: Path, content: bytes) -> bool:
-    """Make a new file, whole or not at all; False if there is one by now, which is left as it is."""
+    """Create a new file, whole or not at all; return False if it exists by now, and leave it as it is."""
     temporary = target.with_name(f".{uuid.uuid4().hex}")
     try:
         temporary.write_bytes(content)
         try:
-            os.link(temporary, target)  # other than a renaming it never replaces a file
+            os.link(temporary, target)  # unlike renaming, this never replaces a file
         except FileExistsError:
             return False
         except OSError:  # a file system without links
@@ -148,7 +147,7 @@ def begin(target: Path, content: bytes) -> bool:
 
 
 def _lock(path: Path, stream: FileIO) -> None:
-    """Keep other processes away as long as the stream is open, where the system can."""
+    """Lock the file as long as the stream is open, where the system has locks."""
     try:
         import fcntl
     except ModuleNotFoundError:
@@ -156,28 +155,30 @@ def _lock(path: Path, stream: FileIO) -> None:
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(f"{path}: another run is writing to it; accepted: a checkpoint that is not in use") from None
+        raise InputError(f"checkpoint must not be in use, got {path}, to which another run is writing") from None
     except OSError:  # a network file system without locks
         return
 
 
 def _check_header(path: Path, stream: FileIO, header: dict[str, Any]) -> None:
-    """Read the header, and raise unless it is this run's."""
+    """Read the header; raise InputError unless it is that of this run."""
     if stream.read(len(MAGIC)) != MAGIC:
-        raise InputError(f"{path}: is no checkpoint of towline; accepted: {ACCEPTED}, or a new path")
+        raise InputError(f"checkpoint must be {ACCEPTED} or a new file, got {path}, which is no checkpoint of towline")
     size = stream.read(_SUM.size)
     text = stream.read(_SUM.unpack(size)[0]) if len(size) == _SUM.size else b""
     if stream.read(_SUM.size) != _SUM.pack(zlib.crc32(text)) or not text:
-        raise InputError(f"{path}: its header is damaged; accepted: {ACCEPTED}")
-    there = json.loads(text)
-    for name in {**header, **there}:
-        if header.get(name) != there.get(name):
-            ours, theirs = (_brief(values.get(name)) for values in (header, there))
-            raise InputError(f"{path}: is of another run: its {name} is {theirs}, not {ours}; accepted: {ACCEPTED}")
+        raise InputError(f"checkpoint must be {ACCEPTED}, got {path} with a damaged header")
+    stored = json.loads(text)
+    for name in {**header, **stored}:
+        if header.get(name) != stored.get(name):
+            ours, theirs = (_brief(values.get(name)) for values in (header, stored))
+            raise InputError(
+                f"checkpoint must be {ACCEPTED}, got {path} of another run, whose {name} is {theirs}, not {ours}"
+            )
 
 
 def _scan(path: Path, stream: FileIO) -> tuple[int, int]:
-    """How many whole records there are, and where they end."""
+    """Return how many whole records there are, and where they end."""
     chunk, end = 0, stream.tell()
     length = os.fstat(stream.fileno()).st_size
     while (record := _record(stream)) is not None and record[0] == chunk:
@@ -186,12 +187,12 @@ def _scan(path: Path, stream: FileIO) -> tuple[int, int]:
     stream.read(_LONGEST)
     # A power cut can leave a file as long as it was to be, with zeros where nothing was written.
     if length - end > _LONGEST and any(any(block) for block in iter(lambda: stream.read(_LONGEST), b"")):
-        raise InputError(f"{path}: is damaged after chunk {chunk}, byte {end}; accepted: {ACCEPTED}")
+        raise InputError(f"checkpoint must be {ACCEPTED}, got {path}, which is damaged after chunk {chunk}, byte {end}")
     return chunk, end
 
 
 def _record(stream: FileIO) -> tuple[int, int, bytes] | None:
-    """The next record, (chunk, samples, flags), or None if there is no whole one."""
+    """Return the next record, (chunk, samples, flags), or None if there is no whole one."""
     head = stream.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None

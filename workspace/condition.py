@@ -13,16 +13,18 @@ import numpy as np
 from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError
 
 from ..errors import InputError
+from ..inputs import required, shown
 from ..models import Robot
 from ..models.parsing import one_line
 from ..models.robot import Part
 from .places import Places
+from .workload import compiled_code, is_decided, worth_compiled_code
 
 __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
 
 
 class Condition(Part, ABC):
-    """A question about a place that has the answer yes or no. A condition of your own has a `kind` and `_holds`."""
+    """A property of a place that holds or does not. A condition of your own has a `kind` and `_holds`."""
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
 
@@ -35,17 +37,24 @@ class Condition(Part, ABC):
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
         super().__pydantic_init_subclass__(**options)
-        if "kind" in cls.__annotations__:  # its own: a subclass that only inherits one does not take its parent's place
+        if "kind" in cls.__annotations__:  # its own: a subclass that only inherits one does not replace its parent
             Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Whether the condition holds at each of n places, (n,) of bool; False where a number of one is not finite.
+        """Return where the condition holds among n places, (n,) of bool; False where a number is not finite.
 
         Raises
         ------
         InputError
-            If the robot is none that the condition can be asked about.
+            If an argument has a wrong type or shape, or the condition does not apply to the robot.
         """
+        required("places", places, Places).check(required("robot", robot, Robot))
+        if is_decided():
+            return self._holds_where_finite(robot, places)
+        with compiled_code(worth_compiled_code(len(places) * self.problems_per_place(robot))):
+            return self._holds_where_finite(robot, places)
+
+    def _holds_where_finite(self, robot: Robot, places: Places) -> np.ndarray:
         finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
         if finite.all():
             return self._holds(robot, places)
@@ -55,26 +64,35 @@ class Condition(Part, ABC):
 
     @abstractmethod
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Answer for places of finite numbers, (n,) of bool."""
+        """Return where the condition holds among places of finite numbers, (n,) of bool."""
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """How much is missing, (n,): zero exactly where the condition holds, a slope towards it for those who search.
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return how far each place is from fulfilling the condition, (n,): zero exactly where it holds.
 
-        In a unit of the condition's own; here 1 where it does not hold. Numbers of the places have to be finite.
+        The number has a unit of the condition's own and falls towards the places that fulfil it, for searches; here it
+        is 1 where the condition does not hold. Numbers of the places must be finite.
         """
         return np.where(self.holds(robot, places), 0.0, 1.0)
 
+    def problems_per_place(self, robot: Robot) -> int:
+        """Return how many tension problems one place takes at most; compiled code is used for many of them."""
+        return 1
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return why the condition holds nowhere, or at isolated poses only, whatever the region; None if it may."""
+        return None
+
     def __and__(self, other: Condition) -> AllOf:
-        """Both hold."""
+        """Return the condition that both hold."""
         return AllOf(kind="all", conditions=(*_parts(self, AllOf), *_parts(other, AllOf)))
 
     def __or__(self, other: Condition) -> AnyOf:
-        """At least one holds."""
+        """Return the condition that at least one of the two holds."""
         return AnyOf(kind="any", conditions=(*_parts(self, AnyOf), *_parts(other, AnyOf)))
 
 
 def condition_from(data: Any) -> Condition:
-    """A condition from its data: a mapping, as `model_dump` makes it or as a file has it.
+    """Make a condition from its data: a mapping, as `model_dump` returns it or as a file has it.
 
     Raises
     ------
@@ -85,9 +103,9 @@ def condition_from(data: Any) -> Condition:
         return data
     accepted = ", ".join(sorted(Condition.kinds))
     if not isinstance(data, dict) or "kind" not in data:
-        raise InputError(f"condition: is {data!r}; accepted: a mapping with a kind, one of {accepted}")
+        raise InputError(f"condition must be a mapping with a kind, one of {accepted}, got {shown(data)}")
     if not isinstance(data["kind"], str) or data["kind"] not in Condition.kinds:
-        raise InputError(f"condition.kind: {data['kind']!r} is unknown; accepted: {accepted}")
+        raise InputError(f"condition.kind must be one of {accepted}, got {shown(data['kind'])}")
     return Condition.kinds[data["kind"]](**{str(name): value for name, value in data.items()})
 
 
@@ -95,31 +113,48 @@ AnyCondition = Annotated[SerializeAsAny[Condition], BeforeValidator(condition_fr
 
 
 class AllOf(Condition):
-    """All of some conditions hold. They are asked in their order, each only where those before it hold."""
+    """All of some conditions hold. Each is evaluated only where those before it hold."""
 
     kind: Literal["all"] = "all"
-    conditions: tuple[AnyCondition, ...] = Field(min_length=1)
+    conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions that all must hold")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return _one_by_one(self.conditions, robot, places, undecided=True)
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """The sum of what each lacks, each as a share of 1: x / (1 + x)."""
-        return np.sum([_share(one.lacks(robot, places)) for one in self.conditions], axis=0)
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return the sum of the shortfalls x, each as a share of 1: x / (1 + x)."""
+        return np.sum([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
+
+    def problems_per_place(self, robot: Robot) -> int:
+        """Return the sum over the conditions."""
+        return sum(one.problems_per_place(robot) for one in self.conditions)
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return the reason of the first condition that has one."""
+        return next((reason for one in self.conditions if (reason := one.why_nowhere(robot))), None)
 
 
 class AnyOf(Condition):
-    """At least one of some conditions holds. They are asked in their order, each only where none before it holds."""
+    """At least one of some conditions holds. Each is evaluated only where none before it holds."""
 
     kind: Literal["any"] = "any"
-    conditions: tuple[AnyCondition, ...] = Field(min_length=1)
+    conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions of which one must hold")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return _one_by_one(self.conditions, robot, places, undecided=False)
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """What that one lacks which lacks least, as a share of 1: x / (1 + x)."""
-        return np.min([_share(one.lacks(robot, places)) for one in self.conditions], axis=0)
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return the smallest of the shortfalls x, as a share of 1: x / (1 + x)."""
+        return np.min([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
+
+    def problems_per_place(self, robot: Robot) -> int:
+        """Return the sum over the conditions."""
+        return sum(one.problems_per_place(robot) for one in self.conditions)
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return the first reason, if every condition has one."""
+        reasons = [one.why_nowhere(robot) for one in self.conditions]
+        return reasons[0] if all(reasons) else None
 
 
 def _share(amount: np.ndarray) -> np.ndarray:
@@ -127,6 +162,7 @@ def _share(amount: np.ndarray) -> np.ndarray:
 
 
 def _parts(condition: Condition, joined: type[AllOf] | type[AnyOf]) -> tuple[Condition, ...]:
+    required("condition", condition, Condition)
     return condition.conditions if isinstance(condition, joined) else (condition,)
 
 

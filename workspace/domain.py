@@ -1,4 +1,4 @@
-"""`Domain`: a region for one robot: which quantities vary between which ends, and the places that numbers stand for."""
+"""`Domain`: a region for one robot: which quantities vary, and the places that points of the unit cube stand for."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
+from ..inputs import shown
 from ..models import Robot
 from ..models.robot import COORDINATES, Box
 from .places import Places
@@ -19,30 +20,30 @@ THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
 
 @dataclass(frozen=True)
 class Domain:
-    """What varies, and between which ends.
+    """Ranges of the quantities that describe a place.
 
     Attributes
     ----------
     low, high
-        Ends of position, attitude, carriers' positions and cable lengths, in this order, (k,) [m, rad]. With `hangs`
-        those of the position are of the box that holds every place the lengths allow.
-    hangs
+        Ends of position, attitude, carriers' positions and cable lengths, in this order, (k,) [m, rad]. With
+        `position_from_lengths` those of the position are of a box that contains every position the lengths allow.
+    position_from_lengths
         Whether the position follows from three cable lengths.
     """
 
     robot: Robot
     low: np.ndarray
     high: np.ndarray
-    hangs: bool
+    position_from_lengths: bool
 
     @classmethod
     def of(cls, robot: Robot, region: Region) -> Domain:
-        """The domain of a region for a robot.
+        """Return the domain of a region for a robot.
 
         Raises
         ------
         InputError
-            If the robot cannot be where the region says, or nothing in it varies.
+            If the robot cannot be in the region, or nothing in it varies.
         """
         boxes = _carrier_boxes(robot, region)
         home = robot.carrier_home[:, :3]
@@ -57,11 +58,11 @@ class Domain:
         elif region.lengths is None:
             position = surrounding_box(robot, boxes)
         else:
-            position = _hanging_box(robot, region, carriers)
+            position = _box_of_lengths(robot, region, carriers)
         if region.lengths is None and not (position[1] - position[0] > THINNEST).any():
             raise InputError(
-                f"region.position: the box from {_told(position[0])} to {_told(position[1])} is empty; accepted: min "
-                "below max along an axis at least"
+                "region.position must have min below max along at least one axis, got a box from "
+                f"{_text(position[0])} to {_text(position[1])}"
             )
         lengths = ([], []) if region.lengths is None else ([region.lengths.min] * 3, [region.lengths.max] * 3)
         parts = [
@@ -73,19 +74,19 @@ class Domain:
         low, high = (np.concatenate([np.asarray(part[end], dtype=float) for part in parts]) for end in (0, 1))
         domain = cls(robot, low, high, region.lengths is not None)
         if not domain.varying.size:
-            raise InputError("region: nothing in it varies; accepted: min below max in one quantity at least")
+            raise InputError("region must have min below max in at least one quantity, got one in which nothing varies")
         return domain
 
     @cached_property
     def varying(self) -> np.ndarray:
-        """Indices of the quantities that vary."""
+        """Indices of the quantities that vary, (d,)."""
         thick = self.high - self.low > THINNEST
-        thick[:3] &= not self.hangs
+        thick[:3] &= not self.position_from_lengths
         return np.flatnonzero(thick)
 
     @property
     def extent(self) -> np.ndarray:
-        """How far each of them varies, (d,) [m, rad]."""
+        """Range of each quantity that varies, (d,) [m, rad]."""
         return (self.high - self.low)[self.varying]
 
     @property
@@ -100,7 +101,7 @@ class Domain:
 
     @cached_property
     def carriers_vary(self) -> bool:
-        """Whether carriers move."""
+        """Whether the positions of carriers vary."""
         return bool((self.high - self.low)[6 : 6 + 3 * len(self.robot.carriers)].max() > THINNEST)
 
     @property
@@ -111,11 +112,11 @@ class Domain:
 
     @property
     def measure_unit(self) -> str:
-        """The unit of `measure`."""
+        """Unit of `measure`."""
         return {1: "m", 2: "m^2", 3: "m^3"}.get(int((self.high[:3] - self.low[:3] > THINNEST).sum()), "1")
 
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:
-        """The places that points of the unit cube stand for, and whether there is such a place.
+        """Return the places that points of the unit cube stand for, and whether there is such a place.
 
         Parameters
         ----------
@@ -124,7 +125,7 @@ class Domain:
 
         Returns
         -------
-        Places, and (n,) of bool, false where three cables of those lengths do not meet; the pose is that of home there.
+        Places, and (n,) of bool: false where three cables of those lengths do not meet, where the pose is that of home.
         """
         count, carriers = len(units), len(self.robot.carriers)
         values = np.empty((count, len(self.low)))
@@ -135,7 +136,7 @@ class Domain:
         if self.carriers_vary:
             where = where.copy()
             where[:, :, :3] = values[:, 6 : 6 + 3 * carriers].reshape(count, carriers, 3)
-        if not self.hangs:
+        if not self.position_from_lengths:
             return Places(pose, where), np.ones(count, dtype=bool)
         pose[:, :3] = three_cable_pose(self.robot, pose[:, 3:], where, values[:, -3:])
         exists = np.isfinite(pose[:, 0])
@@ -144,23 +145,25 @@ class Domain:
 
 
 def _carrier_boxes(robot: Robot, region: Region) -> dict[str, Box]:
-    """Boxes of the carriers that may move, by name."""
+    """Return the boxes of the carriers that may move, by name."""
     if region.carriers == "home":
         return {}
     if region.carriers == "reach":
         boxes = reach_boxes(robot)
         if not boxes:
-            raise InputError(f"region.carriers: reach: robot {robot.name!r} has no mobile carriers; accepted: home")
+            raise InputError(
+                f"region.carriers must be home for robot {robot.name!r} without mobile carriers, got reach"
+            )
         return boxes
     names = [carrier.name for carrier in robot.carriers]
     for name in region.carriers:
         if name not in names:
-            raise InputError(f"region.carriers: {name!r} is unknown; accepted: {', '.join(names)}")
+            raise InputError(f"region.carriers must have the names {', '.join(names)}, got {shown(name)}")
     return dict(region.carriers)
 
 
 def _attitude(robot: Robot, region: Region) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of roll, pitch and yaw [rad]."""
+    """Return the ends of roll, pitch and yaw [rad]."""
     if region.attitude is None:
         return robot.home[3:], robot.home[3:]
     if isinstance(region.attitude, AngleBox):
@@ -176,20 +179,20 @@ def _check_locked(robot: Robot, field: str, ends: tuple[np.ndarray, np.ndarray],
         name = COORDINATES[first + i]
         if name not in robot.platform.dof and high - low > THINNEST:
             raise InputError(
-                f"region.{field}: {name} from {low:g} to {high:g}, but robot {robot.name!r} cannot move so; accepted: "
-                "equal min and max"
+                f"region.{field} must have equal min and max of {name}, which robot {robot.name!r} cannot change, got "
+                f"{low:g} to {high:g}"
             )
 
 
-def _hanging_box(robot: Robot, region: Region, carriers: list[Box]) -> tuple[np.ndarray, np.ndarray]:
-    """The box that holds every place three cables of at most the largest length allow."""
+def _box_of_lengths(robot: Robot, region: Region, carriers: list[Box]) -> tuple[np.ndarray, np.ndarray]:
+    """Return a box that contains every position that three cables of at most the largest length allow."""
     assert region.lengths is not None
     if robot.m != 3 or (robot.dof_mask[:3] == 0).any():
         raise InputError(
-            f"region.lengths: robot {robot.name!r} has {robot.m} cables; accepted: robots with three, moving in space"
+            f"region.lengths must be of a robot with three cables that moves in space, got one with {robot.m}"
         )
     if robot.pulley_radii.any():
-        raise InputError(f"region.lengths: robot {robot.name!r} has pulleys; accepted: robots whose anchors are points")
+        raise InputError(f"region.lengths must be of a robot whose anchors are points, got {robot.name!r} with pulleys")
     lows, highs = [], []
     for cable, owner in enumerate(robot.carrier_of_cable):
         own = robot.home_anchors[cable] - robot.carrier_home[owner, :3]
@@ -199,10 +202,10 @@ def _hanging_box(robot: Robot, region: Region, carriers: list[Box]) -> tuple[np.
     low, high = np.max(lows, axis=0), np.min(highs, axis=0)
     if (low >= high).any():
         raise InputError(
-            f"region.lengths: at most {region.lengths.max:g} m; the three cables never meet; accepted: longer ones"
+            f"region.lengths must be long enough for the three cables to meet, got at most {region.lengths.max:g} m"
         )
     return low, high
 
 
-def _told(vector: np.ndarray) -> str:
+def _text(vector: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:g}" for value in vector) + ")"

@@ -1,26 +1,36 @@
-"""A first look at the workspace: random positions about home, and whether the robot can rest there."""
+"""A first look at the workspace: random positions about home, and whether tensions hold the platform there."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..distribution import pose_problem
+from ..inputs import required, whole_number
 from ..models import Dynamics
 from ..solvers import solve
 from .region import surrounding_box
 
+MOST = 1_000_000  # positions
+
 
 def hints(dynamics: Dynamics, count: int = 400, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """A first look at the workspace: random positions about home and whether the robot can rest there.
+    """Draw random positions about home, and check at each whether tensions inside the limits hold the platform at rest.
 
-    The positions fill the box of home, anchors and carriers at random, by `seed`, at the attitude of home. For the
-    workspace itself, with volumes and conditions, this is no substitute.
+    The positions are uniform in the box of home and anchors, at the attitude of home. `sample` computes the workspace
+    itself, with volumes and conditions.
 
     Returns
     -------
-    Positions (count, 3) [m] and flags (count,).
+    Positions (count, 3) in {G} [m], and flags (count,).
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or value.
     """
-    robot = dynamics.robot
+    robot = required("dynamics", dynamics, Dynamics).robot
+    whole_number("count", count, 1, MOST)
+    whole_number("seed", seed, 0, 2**63 - 1)
     low, high = surrounding_box(robot, {})
     poses = np.tile(robot.home, (count, 1))
     poses[:, :3] = low + np.random.default_rng(seed).uniform(size=(count, 3)) * (high - low)

@@ -1,8 +1,8 @@
-"""Halton's sequence with scrambled digits, from any index on at the same cost (scipy's winds on point by point).
+"""Halton's sequence with scrambled digits, from any index on at the same cost (scipy's advances point by point).
 
     x_j(i) = sum_k pi_jk(digit k of i in base p_j) / p_j^(k + 1)        p_j the j-th prime, pi_jk a random permutation
 
-Source: A. Owen, "A randomized Halton algorithm in R", 2017. Digits are looked up some at a time.
+Source: A. Owen, "A randomized Halton algorithm in R", 2017. Several digits are looked up at a time.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
 def halton(start: int, count: int, dimension: int, seed: int) -> np.ndarray:
-    """Points start to start + count of the sequence, (count, dimension), each below 1."""
+    """Return points start to start + count of the sequence, (count, dimension), each below 1."""
     points = np.empty((count, dimension))
     for axis, tables in enumerate(_tables(dimension, seed)):
         index = np.arange(start, start + count)
         value = np.zeros(count)
         for table in tables:
-            if index[-1] == 0:  # and so all of them
+            if index[-1] == 0:  # and so are all
                 value += table[0]
             else:
                 index, digits = np.divmod(index, len(table))
@@ -33,7 +33,7 @@ def halton(start: int, count: int, dimension: int, seed: int) -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def _tables(dimension: int, seed: int) -> list[list[np.ndarray]]:
-    """For each axis: what each group of digits adds."""
+    """Return for each axis what each group of digits adds."""
     stream = np.random.Generator(np.random.Philox(key=np.array([seed, 0], dtype=np.uint64)))
     every = []
     for base in _primes(dimension):
@@ -52,10 +52,10 @@ def _tables(dimension: int, seed: int) -> list[list[np.ndarray]]:
 
 
 def _primes(count: int) -> list[int]:
-    found: list[int] = []
+    primes: list[int] = []
     candidate = 2
-    while len(found) < count:
-        if all(candidate % prime for prime in found):
-            found.append(candidate)
+    while len(primes) < count:
+        if all(candidate % prime for prime in primes):
+            primes.append(candidate)
         candidate += 1
-    return found
+    return primes

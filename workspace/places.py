@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..errors import InputError
+from ..inputs import required, shown
 from ..models import Robot
 
 __all__ = ["Places"]
@@ -14,7 +16,7 @@ __all__ = ["Places"]
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where platform and carriers are, n times.
+    """Poses of platform and carriers, n times.
 
     Attributes
     ----------
@@ -29,14 +31,38 @@ class Places:
 
     @classmethod
     def at_home(cls, robot: Robot, pose: ArrayLike) -> Places:
-        """Poses (n, 6) in {G} [m, rad] with every carrier at home."""
-        poses = np.atleast_2d(np.asarray(pose, dtype=float))
-        home = robot.carrier_home
+        """Return the places of poses (n, 6) or (6,) in {G} [m, rad] with every carrier at home.
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong type or shape.
+        """
+        home = required("robot", robot, Robot).carrier_home
+        try:
+            poses = np.atleast_2d(np.asarray(pose, dtype=float))
+        except (TypeError, ValueError):
+            raise InputError(f"pose must be an array of numbers of shape (n, 6), got {shown(pose)}") from None
+        if poses.ndim != 2 or poses.shape[1] != 6:
+            raise InputError(f"pose must have the shape (n, 6), got {np.shape(pose)}")
         return cls(poses, np.broadcast_to(home, (len(poses), *home.shape)))
 
     def __len__(self) -> int:
         return len(self.pose)
 
     def only(self, rows: np.ndarray | slice) -> Places:
-        """The places of some rows: indices, flags (n,) or a slice."""
+        """Return the places of some rows: indices, flags (n,) or a slice."""
         return Places(self.pose[rows], self.carriers[rows])
+
+    def check(self, robot: Robot) -> None:
+        """Check that the shapes are those of a robot.
+
+        Raises
+        ------
+        InputError
+            If one is not.
+        """
+        n, carriers = np.shape(self.pose)[:1], len(robot.carriers)
+        for name, value, shape in (("pose", self.pose, (*n, 6)), ("carriers", self.carriers, (*n, carriers, 6))):
+            if not isinstance(value, np.ndarray) or value.shape != shape or value.dtype.kind not in "fiu":
+                raise InputError(f"places.{name} must be an array of numbers of shape {shape}, got {shown(value)}")

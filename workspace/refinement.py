@@ -1,7 +1,7 @@
 """Adaptive refinement of the boundary: cells whose corners differ are halved along each axis, level by level.
 
-The corners of all cells lie on a lattice, twice as fine on each level; those that are known are not asked again. A cell
-whose corners agree is taken to be all inside or all outside: what is thinner than the first cells can be missed.
+The corners of all cells lie on a lattice, twice as fine on each level; those that are known are not evaluated again.
+A cell whose corners agree is taken to be all inside or all outside: what is thinner than the first cells can be missed.
 """
 
 from __future__ import annotations
@@ -12,16 +12,18 @@ from itertools import product
 import numpy as np
 
 from ..errors import InputError
+from ..inputs import number, whole_number
 from .domain import Domain
 from .sampling import cells_of
 
 AT_ONCE = 2**16  # cells
 FIRST_CELLS = 16  # along each axis, where the axes are equally long and the samples suffice
 MOST = 2_000_000  # samples: some 400 bytes each
+SMALLEST, LARGEST = 1e-9, 1e9  # [m], edge of a cell
 
 
 class Refinement:
-    """The levels of one run.
+    """Halve cells level by level.
 
     Attributes
     ----------
@@ -36,15 +38,11 @@ class Refinement:
     """
 
     def __init__(self, domain: Domain, samples: int, size: float | None):
-        if domain.hangs or (domain.varying >= 3).any():
-            raise InputError("method: adaptive refines positions; accepted: a region in which nothing else varies")
-        number = isinstance(size, int | float | np.number) and not isinstance(size, bool)
-        if size is not None and not (number and 0 < size < np.inf):
-            raise InputError(f"size: is {size!r}; accepted: a number > 0 [m], or None for as fine as the samples allow")
-        if samples > MOST:
-            raise InputError(
-                f"samples: is {samples}; accepted: at most {MOST} with method adaptive, which remembers its corners"
-            )
+        if domain.position_from_lengths or (domain.varying >= 3).any():
+            raise InputError("region must have positions only that vary with method adaptive, got one with others")
+        if size is not None:
+            number("size", size, SMALLEST, LARGEST, also=" [m], or None")
+        whole_number("samples with method adaptive", samples, 1, MOST)
         self.inside = self.mixed = self.estimate = 0.0
         self._extent, self._samples, self._size = domain.extent, samples, size
         d = len(self._extent)
@@ -54,7 +52,7 @@ class Refinement:
         self._known, self._flags = np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
 
     def levels(self) -> Generator[np.ndarray, np.ndarray, None]:
-        """Points to ask for, (n, d) of the unit cube; takes whether each was accepted, (n,)."""
+        """Yield points to evaluate, (n, d) of the unit cube, and receive whether each was accepted, (n,) of bool."""
         cells = np.stack(np.unravel_index(np.arange(self._count.prod()), self._count), axis=1)
         used = 0
         while True:
@@ -86,16 +84,16 @@ class Refinement:
             cells = self._halve(cells)
 
     def _keys(self, cells: np.ndarray) -> np.ndarray:
-        """Numbers on the lattice of the corners of cells (n, d), (n, 2^d)."""
+        """Return the numbers on the lattice of the corners of cells (n, d), (n, 2^d)."""
         corners = cells[:, None, :] + self._corners
         return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1)))
 
     def _hits(self, cells: np.ndarray) -> np.ndarray:
-        """How many corners of cells (n, d) are accepted, (n,)."""
+        """Return how many corners of cells (n, d) are accepted, (n,)."""
         return self._flags[np.searchsorted(self._known, self._keys(cells))].sum(axis=1, dtype=np.int8)
 
     def _halve(self, cells: np.ndarray) -> np.ndarray:
-        """The halves of cells (n, d) on the next, finer lattice, to which all that is known goes."""
+        """Return the halves of cells (n, d) on the next, finer lattice; flags that are known move to it."""
         known = np.stack(np.unravel_index(self._known, self._count + 1), axis=1) * 2
         self._count = self._count * 2
         # Twice the indices in the same order: the keys stay sorted.
@@ -104,17 +102,17 @@ class Refinement:
 
 
 def _pieces(cells: np.ndarray) -> list[np.ndarray]:
-    """Cells (n, d) some at a time: all their corners at once would take most of the memory."""
+    """Return cells (n, d) in parts: all their corners at once would take most of the memory."""
     return [cells[start : start + AT_ONCE] for start in range(0, max(len(cells), 1), AT_ONCE)]
 
 
 def _first_cells(extent: np.ndarray, samples: int) -> tuple[int, ...]:
-    """Cells of the first level, with no more corners than samples."""
+    """Return the cells of the first level, with no more corners than samples."""
     most = FIRST_CELLS ** len(extent)
     while True:
         cells = cells_of(extent, most)
         if np.prod(np.array(cells) + 1) <= samples:
             return cells
         if most == 1:
-            raise InputError(f"samples: is {samples}; accepted: {2 ** len(extent)} and more, the corners of a cell")
+            raise InputError(f"samples must be at least {2 ** len(extent)}, the corners of a cell, got {samples}")
         most = most // 2

@@ -1,4 +1,4 @@
-"""`Region`: where to look, as data: a box of positions, attitudes, places of the carriers, cable lengths."""
+"""`Region`: ranges of the positions, attitudes, carriers' positions or cable lengths to sample, as data."""
 
 from __future__ import annotations
 
@@ -27,36 +27,36 @@ class AngleBox(Part):
 
 
 class Region(Part):
-    """Where to look. What has equal ends stays there: a slice is a box without thickness.
+    """Describe where to sample. A quantity with equal ends is constant: a slice is a box without thickness.
 
-    Samples are uniform in each of the quantities that vary, which are independent of each other.
+    Samples are uniform in each quantity that varies, independent of each other.
     """
 
     position: Box | None = Field(
-        default=None, description="of the platform frame in {G} [m]; none: a box about home and anchors"
+        default=None, description="of the platform frame in {G} [m]; default: a box about home and anchors"
     )
     attitude: Vector3 | AngleBox | None = Field(
-        default=None, description="(roll, pitch, yaw) or a box of them [rad]; none: that of home"
+        default=None, description="(roll, pitch, yaw) or a box of them [rad]; default: that of home"
     )
     carriers: Literal["home", "reach"] | dict[Name, Box] = Field(
         default="home",
-        description="home; reach: each mobile carrier anywhere in its reach box; or boxes of carriers in {G} by name",
+        description="home; reach: mobile carriers anywhere in their reach boxes; or boxes in {G} [m] by name",
     )
     lengths: PositiveRange | None = Field(
         default=None,
-        description="of each of three cables [m]; the position then follows from carriers, attitude and lengths, and "
-        "is the lower of the two there are",
+        description="of each of three cables [m]; the position then follows from carriers, attitude and lengths: the "
+        "lower of the two points where the cables meet",
     )
 
     @model_validator(mode="after")
-    def _says_position_once(self) -> Self:
+    def _one_source_of_positions(self) -> Self:
         if self.position is not None and self.lengths is not None:
-            raise ValueError("position and lengths are both given; accepted: one of them, each tells where it is")
+            raise ValueError("position and lengths must not both be given: the position follows from the lengths")
         return self
 
 
 def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray, np.ndarray]:
-    """A box of positions about home and anchors, (3,) and (3,) [m]; locked coordinates stay at home.
+    """Return the corners of a box about home and anchors, (3,) and (3,) [m]; locked coordinates stay at home.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
             corners += [own + carriers[carrier.name].min, own + carriers[carrier.name].max]
     every = np.vstack(corners)
     low, high = every.min(axis=0), every.max(axis=0)
-    # A robot on top of its anchors, or below them, has room there too.
+    # A robot above or below its anchors has space there too.
     spread = np.maximum(high - low, 0.5 * (high - low).max())
     low = np.minimum(low, (low + high - spread) / 2)
     moving = robot.dof_mask[:3] > 0
@@ -78,5 +78,5 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
 
 
 def reach_boxes(robot: Robot) -> dict[str, Box]:
-    """Reach boxes of the mobile carriers, by name."""
+    """Return the reach boxes of the mobile carriers, by name."""
     return {carrier.name: carrier.reach for carrier in robot.carriers if isinstance(carrier, MobileCarrier)}

@@ -1,4 +1,4 @@
-"""`sample`: the workspace of a robot under a condition, from some thousand samples to 10^9."""
+"""`sample`: evaluate a condition at 10^3 to 10^9 places of a robot; `save`: write the result."""
 
 from __future__ import annotations
 
@@ -16,26 +16,28 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
+from ..inputs import required, shown, whole_number
 from ..models import Robot
 from ..netcdf import Contents, save_netcdf
 from ..writing import whole_folder
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
-from .counts import Job, Question
 from .domain import Domain
-from .execution import Run, executor
-from .outcome import Outcome
+from .execution import Evaluate, executor
+from .jobs import Job, RunSettings
 from .refinement import Refinement
 from .region import Region
-from .sampling import CHUNK, Sampler, check_sampling, whole
+from .sampling import CHUNK, Sampler, check_sampling
+from .totals import Totals
 
 if TYPE_CHECKING:
     import xarray as xr
 
 KEEP = ("accepted", "all", "none")
+MOST_WORKERS = 1024
 MOST_POINTS = 10_000_000
 LARGEST_JOB = 8  # chunks
-OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # what a file does not have: it is the same whoever computed it
+OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # left out of files, which are the same whoever computed them
 
 Progress = Callable[[int, int, int], None]
 
@@ -57,161 +59,176 @@ def sample(
     keep: str = "accepted",
     points_max: int = 1_000_000,
 ) -> xr.Dataset:
-    """Sample where a condition holds; the result is the same to the last bit for every number of workers.
+    """Sample the places where a condition holds.
 
-    Memory does not grow with the number of samples: beyond `points_max` of them only counts are kept.
+    The result is the same to the last bit for every number of workers. Memory does not grow with the number of samples:
+    beyond `points_max` of them only counts are kept.
 
     Parameters
     ----------
     robot
         From `load` or `Robot.model_validate`.
     condition
-        From `workspace`, or as a mapping with a `kind`.
+        A `Condition`, or a mapping with its `kind` and keys.
     region
-        Where to look, a `Region` or a mapping of its keys; None: a box about home and anchors, the rest at home.
+        A `Region`, or a mapping of its keys; default: a box about home and anchors, everything else at home.
     samples
-        How many. A grid has at most as many, refinement asks for at most as many.
+        Number of samples. A grid and adaptive refinement have at most this many.
     method
         random; sobol or halton (low discrepancy); grid; adaptive: cells whose corners differ are halved.
     seed
         Of the random streams, and of the scrambling of sobol and halton.
     size
-        Of adaptive: edge at which cells are small enough [m]; None: as the samples allow.
+        Of adaptive: edge below which cells are not halved any more [m]; default: as small as the samples allow.
     workers
         Processes of this machine, each using one processor; 1: this process.
     scheduler
-        Address of a Dask scheduler whose workers do it instead (extra `cluster`).
+        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
     checkpoint
-        File that the answers are appended to as they come.
+        File to which results are appended as they come.
     resume
-        Whether to go on with the checkpoint if it is there. It has to be of the same run.
+        Whether to continue the checkpoint if the file exists. It must be of the same run.
     progress
-        Called with (samples done, samples in all, samples accepted); in all is an upper bound for adaptive.
+        Function that is called with (samples done, samples in total, samples accepted); the total is an upper bound for
+        adaptive.
     keep
-        Which samples are in the dataset: accepted, all or none.
+        Which samples the dataset contains: accepted, all or none.
     points_max
-        How many of them at most, the first ones in the order of the samples.
+        Maximum number of samples that it contains, the first ones in the order of the samples.
 
     Returns
     -------
     Dataset with the variables
         position (point, axis) [m]
-            Of the samples kept; likewise attitude (point, angle) [rad] and carrier_position (point, carrier, axis) [m]
-            where those vary, and accepted (point) if all are kept.
+            Of the samples kept; attitude (point, angle) [rad] and carrier_position (point, carrier, axis) [m] where
+            those vary; accepted (point) if all samples are kept.
         tried, reached (x, y, z)
             Samples in each of 32 x 32 x 32 cells of the box of positions, and those of them that were accepted.
         bounds (end, axis) [m]
             Of the accepted positions; nan where there are none.
         volume, volume_interval (end) [m^3]
-            Share of the samples that was accepted times the volume of the box, the mean over what varies beside the
-            position, with the interval of Clopper and Pearson at 95 %: an area or a length of a box without thickness
-            along some axes. With `lengths`: of the cells reached, no interval; a grid has none either. Adaptive:
-            between the cells that lie inside, and these with those that the boundary passes through.
+            Share of accepted samples times the volume of the box, with the interval of Clopper and Pearson at 95 %. It
+            is the mean over everything that varies beside the position, and an area or a length if the box has no
+            thickness along some axes. With `lengths` it is the volume of the cells reached, without an interval; a grid
+            has no interval either. Adaptive: from the cells that lie inside, to these and those that the boundary
+            passes through.
         boundary (cell, axis) [m], cell_edges (axis) [m]
             Of adaptive: centres of the smallest cells with corners that differ, and their edges.
 
-    Its attributes are what was asked, `samples` and `accepted`, and of this run `seconds` and `poses_per_s`.
+    Its attributes are the arguments, `samples` and `accepted`, and of this run `seconds` and `poses_per_s`.
 
     Raises
     ------
     InputError
         If an argument is wrong, the region is empty, the checkpoint cannot be written, is damaged or of another run, or
-        there is no such scheduler. No file was changed then.
+        there is no such scheduler. No file has been changed then.
     SolverError
-        If workers end before their work, or the extra `cluster` is not there.
+        If workers end before their work is done, or the extra `cluster` is not installed.
     """
     start = time.perf_counter()
-    if not isinstance(robot, Robot):
-        raise InputError(f"robot: is {robot!r}; accepted: a Robot, as load('wang-flying') returns it")
+    required("robot", robot, Robot)
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
     region = _region(region)
     check_sampling(method, samples, seed)
-    whole("workers", workers, 1, 1024)
-    whole("points_max", points_max, 0, MOST_POINTS)
+    whole_number("workers", workers, 1, MOST_WORKERS)
+    whole_number("points_max", points_max, 0, MOST_POINTS)
     if keep not in KEEP:
-        raise InputError(f"keep: {keep!r} is unknown; accepted: {', '.join(KEEP)}")
+        raise InputError(f"keep must be one of {', '.join(KEEP)}, got {shown(keep)}")
+    if scheduler is not None and not isinstance(scheduler, str):
+        raise InputError(f"scheduler must be the address of a Dask scheduler or None, got {shown(scheduler)}")
+    if checkpoint is not None and not isinstance(checkpoint, str | os.PathLike):
+        raise InputError(f"checkpoint must be a path or None, got {shown(checkpoint)}")
+    if not isinstance(resume, bool):
+        raise InputError(f"resume must be True or False, got {shown(resume)}")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function or None, got {shown(progress)}")
     if resume and checkpoint is None:
-        raise InputError("resume: needs a checkpoint; accepted: the path of one")
+        raise InputError("checkpoint must be a path if resume is True, got None")
     if size is not None and method != "adaptive":
-        raise InputError(f"size: method {method!r} has no cells to halve; accepted: None, or method adaptive")
+        raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
     domain = Domain.of(robot, region)
     refinement = Refinement(domain, samples, size) if method == "adaptive" else None
     sampler = None if refinement else Sampler(method, samples, seed, tuple(domain.extent.tolist()))
-    # One place, for wrong input that the condition alone can see, before a file or a worker is there.
+    # At one place, for wrong input that only the condition can detect, before there is a file or a worker.
     condition.holds(robot, domain.places(np.full((1, len(domain.extent)), 0.5))[0])
-    asked = {
+    requested = {
         "robot": robot.name,
         "condition": json.dumps(condition.model_dump(mode="json"), sort_keys=True),
         "region": json.dumps(region.model_dump(mode="json"), sort_keys=True),
         "method": method,
         "seed": int(seed),
     }
-    wanted = int(samples) if sampler is None else sampler.samples
-    outcome = Outcome(domain, points_max if keep != "none" else 0)
-    packed = Question(robot, condition, domain, sampler, keep, wanted).packed()
-    header = _header(robot, {**asked, "samples": wanted, "size": size})
+    total = int(samples) if sampler is None else sampler.samples
+    totals = Totals(domain, points_max if keep != "none" else 0)
+    packed = RunSettings(robot, condition, domain, sampler, keep, total).packed()
+    header = _header(robot, {**requested, "samples": total, "size": size})
     opened = open_checkpoint(Path(checkpoint), header, resume) if checkpoint is not None else nullcontext()
-    with executor(packed, workers, scheduler) as run, opened as stored:
-        work = _Work(run, outcome, stored, progress, wanted)
+    with executor(packed, workers, scheduler) as evaluate, opened as stored:
+        work = _Work(evaluate, totals, stored, progress, total)
         if refinement is None:
             assert sampler is not None
-            work.through(sampler)
+            work.sample(sampler)
         else:
             work.refine(refinement)
-    found = outcome.dataset(keep, method, refinement)
+    result = totals.dataset(keep, method, refinement)
     seconds = time.perf_counter() - start
-    found.attrs = {
-        **asked,
-        "samples": outcome.tried,
-        "accepted": outcome.accepted,
+    result.attrs = {
+        **requested,
+        "samples": totals.tried,
+        "accepted": totals.accepted,
         "keep": keep,
         "towline": __version__,
         "seconds": seconds,
-        "poses_per_s": outcome.tried / seconds,
+        "poses_per_s": totals.tried / seconds,
         "workers": "cluster" if scheduler is not None else str(workers),
     }
-    return found
+    return result
 
 
-def save(found: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save what `sample` found, whole or not at all: as NetCDF, or as a Zarr folder if the path ends in .zarr.
+def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
+    """Save a result of `sample`, whole or not at all: as NetCDF, or as a Zarr folder if the path ends in .zarr.
 
-    `xarray.load_dataset` reads the one, `xarray.open_zarr` the other (extra `cluster`). What is of the run and not of
-    the result, as the seconds it took, is left out: equal results are equal NetCDF files.
+    `xarray.load_dataset` reads the one, `xarray.open_zarr` the other (extra `cluster`). Attributes of the run, such as
+    the seconds it took, are left out: equal results are equal NetCDF files.
 
     Raises
     ------
     InputError
-        If the place cannot be written to, or is a Zarr folder that is there already.
+        If an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists already.
     """
+    import xarray as xr
+
+    required("result", result, xr.Dataset)
+    if not isinstance(file, str | os.PathLike):
+        raise InputError(f"file must be a path, got {shown(file)}")
     path = Path(file)
-    lasting = found.copy(deep=False)
-    lasting.attrs = {name: value for name, value in found.attrs.items() if name not in OF_THIS_RUN}
+    lasting = result.copy(deep=False)
+    lasting.attrs = {name: value for name, value in result.attrs.items() if name not in OF_THIS_RUN}
     if path.suffix == ".zarr":
         return _save_zarr(lasting, path)
     compressed = [str(name) for name, variable in lasting.data_vars.items() if variable.size > CHUNK]
     return save_netcdf(Contents.of(lasting), path, compressed)
 
 
-def _save_zarr(found: xr.Dataset, path: Path) -> Path:
+def _save_zarr(result: xr.Dataset, path: Path) -> Path:
     if find_spec("zarr") is None:
-        raise InputError(f"{path}: zarr is not installed; accepted: pip install 'towline[cluster]', or a path to .nc")
+        raise InputError(f"file must end in .nc unless zarr is installed (pip install 'towline[cluster]'), got {path}")
     with whole_folder(path) as temporary:
-        found.to_zarr(temporary, mode="w", zarr_format=2, consolidated=True)
+        result.to_zarr(temporary, mode="w", zarr_format=2, consolidated=True)
     return path
 
 
 class _Work:
-    """Goes through the chunks of a run: what the checkpoint has is taken from it, what comes is added to it."""
+    """Evaluate the chunks of a run: those that the checkpoint has are read from it, the others are appended to it."""
 
     def __init__(
-        self, run: Run, outcome: Outcome, checkpoint: Checkpoint | None, progress: Progress | None, wanted: int
+        self, evaluate: Evaluate, totals: Totals, checkpoint: Checkpoint | None, progress: Progress | None, total: int
     ):
-        self._run, self._outcome, self._checkpoint = run, outcome, checkpoint
-        self._progress, self._wanted = progress, wanted
+        self._evaluate, self._totals, self._checkpoint = evaluate, totals, checkpoint
+        self._progress, self._total = progress, total
 
-    def through(self, sampler: Sampler) -> None:
-        """Go through all chunks of a sampler."""
+    def sample(self, sampler: Sampler) -> None:
+        """Evaluate all chunks of a sampler."""
         together = _together(sampler.chunks)
 
         def jobs() -> Iterator[Job]:
@@ -219,11 +236,11 @@ class _Work:
                 chunks = range(first, min(first + together, sampler.chunks))
                 yield self._job(first, [sampler.size(chunk) for chunk in chunks], None)
 
-        for _ in self._answers(jobs(), 0):
+        for _ in self._flags(jobs(), 0):
             pass
 
     def refine(self, refinement: Refinement) -> None:
-        """Go through all levels of a refinement."""
+        """Evaluate all levels of a refinement."""
         levels = refinement.levels()
         units = next(levels)
         first = 0
@@ -236,7 +253,7 @@ class _Work:
                     some = tuple(pieces[start : start + together])
                     yield self._job(first + start, [len(piece) for piece in some], some)
 
-            flags = np.concatenate(list(self._answers(jobs(), first)))
+            flags = np.concatenate(list(self._flags(jobs(), first)))
             first += len(pieces)
             try:
                 units = levels.send(flags)
@@ -244,25 +261,25 @@ class _Work:
                 break
 
     def _job(self, first: int, sizes: list[int], units: tuple[np.ndarray, ...] | None) -> Job:
-        known = [self._checkpoint.answer(first + i, n) if self._checkpoint else None for i, n in enumerate(sizes)]
-        return Job(first, tuple(known), units, self._outcome.has_room)
+        known = [self._checkpoint.flags(first + i, n) if self._checkpoint else None for i, n in enumerate(sizes)]
+        return Job(first, tuple(known), units, self._totals.keeps_more)
 
-    def _answers(self, jobs: Iterator[Job], first: int) -> Iterator[np.ndarray]:
-        """Flags (n,) of the samples, chunk after chunk."""
+    def _flags(self, jobs: Iterator[Job], first: int) -> Iterator[np.ndarray]:
+        """Yield which samples were accepted, (n,) of bool, chunk after chunk."""
         chunk = first
-        for count in self._run(jobs):
-            self._outcome.add(count)
-            for size, answer in zip(count.sizes, count.answers, strict=True):
+        for result in self._evaluate(jobs):
+            self._totals.add(result)
+            for size, flags in zip(result.sizes, result.flags, strict=True):
                 if self._checkpoint:
-                    self._checkpoint.append(chunk, size, answer)
+                    self._checkpoint.append(chunk, size, flags)
                 chunk += 1
-                yield np.unpackbits(np.frombuffer(answer, np.uint8), count=size).astype(bool)
+                yield np.unpackbits(np.frombuffer(flags, np.uint8), count=size).astype(bool)
             if self._progress is not None:
-                self._progress(self._outcome.tried, self._wanted, self._outcome.accepted)
+                self._progress(self._totals.tried, self._total, self._totals.accepted)
 
 
 def _together(chunks: int) -> int:
-    """Chunks in a job: few enough that all workers have some, enough that sending them is little."""
+    """Return how many chunks make a job: few enough that all workers have jobs, enough that sending them is cheap."""
     return min(LARGEST_JOB, max(1, chunks // 64))
 
 
@@ -272,10 +289,10 @@ def _region(region: Region | Mapping[str, Any] | None) -> Region:
     return Region.model_validate({} if region is None else region)
 
 
-def _header(robot: Robot, asked: dict[str, Any]) -> dict[str, Any]:
-    """All that decides on the answers."""
+def _header(robot: Robot, requested: dict[str, Any]) -> dict[str, Any]:
+    """Return everything that the flags depend on."""
     import scipy
 
     data = hashlib.sha256(robot.model_dump_json().encode()).hexdigest()
     versions = {"towline": __version__, "numpy": np.__version__, "scipy": scipy.__version__}
-    return {**asked, "robot": f"{robot.name} {data[:16]}", "chunk": CHUNK, **versions}
+    return {**requested, "robot": f"{robot.name} {data[:16]}", "chunk": CHUNK, **versions}

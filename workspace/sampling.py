@@ -1,7 +1,7 @@
-"""Samplers: points of the unit cube in chunks, each chunk by itself, so that it matters not who computes which.
+"""Samplers: points of the unit cube in chunks, each chunk by itself, so that any process can compute any chunk.
 
 Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Low-discrepancy sequences,
-Sobol's (scipy's) and Halton's, are scrambled by the seed and wound on to where the chunk begins. A grid has the
+Sobol's (scipy's) and Halton's, are scrambled by the seed and advanced to where the chunk begins. A grid has the
 midpoints of equal cells.
 """
 
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs import shown, whole_number
 from .halton import halton
 
 CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
@@ -31,38 +32,38 @@ class Sampler:
     ----------
     method
         random, sobol, halton or grid.
-    wanted
-        How many samples were asked for; a grid has at most as many, `samples`.
+    requested
+        Number of samples that was requested; a grid has at most this many, `samples`.
     extent
-        How far the quantities vary, (d,) [m, rad]; the cells of a grid are about equally long in all of them.
+        Ranges of the quantities, (d,) [m, rad]; the cells of a grid are about equally long in all of them.
     """
 
     method: str
-    wanted: int
+    requested: int
     seed: int
     extent: tuple[float, ...]
 
     @cached_property
     def cells(self) -> tuple[int, ...]:
-        """Cells of the grid along each quantity, none otherwise."""
-        return cells_of(np.array(self.extent), self.wanted) if self.method == "grid" else ()
+        """Cells of the grid along each quantity; empty for other methods."""
+        return cells_of(np.array(self.extent), self.requested) if self.method == "grid" else ()
 
     @property
     def samples(self) -> int:
-        """How many samples there are."""
-        return int(np.prod(self.cells)) if self.cells else self.wanted
+        """Number of samples."""
+        return int(np.prod(self.cells)) if self.cells else self.requested
 
     @property
     def chunks(self) -> int:
-        """How many chunks there are."""
+        """Number of chunks."""
         return -(-self.samples // CHUNK)
 
     def size(self, chunk: int) -> int:
-        """Samples in a chunk; only the last one has fewer than `CHUNK`."""
+        """Return the number of samples in a chunk; only the last chunk has fewer than `CHUNK`."""
         return min(CHUNK, self.samples - chunk * CHUNK)
 
     def units(self, chunk: int) -> np.ndarray:
-        """The points of a chunk, (n, d), between 0 and 1."""
+        """Return the points of a chunk, (n, d), between 0 and 1."""
         count, dimension = self.size(chunk), len(self.extent)
         if self.method == "random":
             key = np.array([self.seed, chunk], dtype=np.uint64)
@@ -76,7 +77,7 @@ class Sampler:
 
 
 def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:
-    """Cells along each axis, about equally long, at least one each and at most so many in all."""
+    """Return the cells along each axis: about equally long, at least one each, and at most `most` in total."""
     counts = np.ones(len(extent), dtype=np.int64)
     # From the shortest axis on: where it takes less than one cell, the others share what is left.
     order = np.argsort(extent, kind="stable")
@@ -91,16 +92,16 @@ def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:
 
 
 class _Sobol:
-    """Chunks of Sobol's sequence, scrambled; winding on from chunk to chunk is cheap, back it starts anew."""
+    """Chunks of Sobol's sequence, scrambled; advancing is cheap, going back starts again from the first point."""
 
     def __init__(self, dimension: int, seed: int):
         from scipy.stats import qmc
 
-        self._engine: Any = qmc.Sobol(dimension, bits=32, rng=seed)  # above 32 bits scipy cannot wind on
+        self._engine: Any = qmc.Sobol(dimension, bits=32, rng=seed)  # above 32 bits scipy cannot advance
         self._at = 0
 
     def points(self, start: int) -> np.ndarray:
-        """The `CHUNK` points from index `start` on."""
+        """Return the `CHUNK` points from index `start` on."""
         if start < self._at:
             self._engine.reset()
             self._at = 0
@@ -121,14 +122,8 @@ def _sobol(dimension: int, seed: int) -> _Sobol:
 
 
 def check_sampling(method: str, samples: int, seed: int) -> None:
-    """Raise `InputError` if there is no such way to sample."""
+    """Check the arguments of a sampler; raise InputError if one is wrong."""
     if method not in METHODS:
-        raise InputError(f"method: {method!r} is unknown; accepted: {', '.join(METHODS)}")
-    whole("samples", samples, 1, MOST_SOBOL if method == "sobol" else MOST)
-    whole("seed", seed, 0, 2**63 - 1)
-
-
-def whole(field: str, value: object, least: int, most: int) -> None:
-    """Raise `InputError` if a value is no whole number from `least` to `most`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise InputError(f"{field}: is {value!r}; accepted: a whole number from {least} to {most}")
+        raise InputError(f"method must be one of {', '.join(METHODS)}, got {shown(method)}")
+    whole_number("samples", samples, 1, MOST_SOBOL if method == "sobol" else MOST)
+    whole_number("seed", seed, 0, 2**63 - 1)

@@ -1,4 +1,4 @@
-"""Where a platform on three cables hangs, if its attitude and the cables' lengths are given."""
+"""Position of a platform on three cables whose attitude and cable lengths are given."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["three_cable_pose"]
 
 
 def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Positions of a platform on three cables of given lengths at given attitudes.
+    """Return positions of a platform on three cables of given lengths at given attitudes.
 
     |A_i - P - R b_i| = l_i: P lies on spheres about A_i - R b_i with the radii l_i. Of the two points that three
     spheres share it is the lower, along gravity.
@@ -25,7 +25,7 @@ def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, l
     carriers
         Poses in {G}, (n, c, 6) [m, rad].
     lengths
-        (3,) of all or (n, 3) [m].
+        (3,) of all places or (n, 3) [m].
 
     Returns
     -------
@@ -48,5 +48,5 @@ def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, l
 
 
 def _square(vectors: np.ndarray) -> np.ndarray:
-    """Squared lengths, (n, 1)."""
+    """Return squared lengths, (n, 1)."""
     return np.einsum("ni,ni->n", vectors, vectors)[:, None]

@@ -1,4 +1,4 @@
-"""How large a workspace is, with an interval for what chance may have done.
+"""The volume of a workspace with its confidence interval.
 
 Of n independent samples, uniform in a box of volume V, k lie in the workspace: k is binomial with p = v / V, and the
 interval of p is that of Clopper and Pearson, which covers at least as often as its level says.
@@ -8,16 +8,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import InputError
+import numpy as np
+
+from ..inputs import number, whole_number
 
 __all__ = ["LEVEL", "Volume", "share_interval", "volume"]
 
 LEVEL = 0.95
+LEAST_LEVEL = 1e-9  # and 1 minus it the highest
+MOST_SAMPLES = 10**15
 
 
 @dataclass(frozen=True)
 class Volume:
-    """A volume and its confidence interval, in the unit of the box: [m^3], or [m^2] of a plane.
+    """A volume and its confidence interval, in the unit of the box: [m^3], or [m^2] for a plane.
 
     Attributes
     ----------
@@ -26,9 +30,9 @@ class Volume:
     low, high
         Ends of the interval.
     level
-        How often at least such an interval covers the true volume.
+        Probability that such an interval covers the true volume, at least.
     accepted, samples
-        What it was computed from.
+        Numbers of samples it was computed from.
     """
 
     value: float
@@ -45,13 +49,13 @@ class Volume:
 def volume(accepted: int, samples: int, box: float, level: float = LEVEL) -> Volume:
     """Estimate a volume from independent samples that were uniform in a box.
 
-    Samples of a low-discrepancy sequence or a grid are more even than chance: for them the interval is wider than need
-    be, though not by a proof.
+    Samples of a low-discrepancy sequence or a grid are more even than random ones: for them the interval is usually
+    wider than necessary.
 
     Parameters
     ----------
     accepted, samples
-        How many of how many lie in the workspace.
+        Number of samples in the workspace, and number of all samples.
     box
         Volume of the box.
     level
@@ -60,22 +64,18 @@ def volume(accepted: int, samples: int, box: float, level: float = LEVEL) -> Vol
     Raises
     ------
     InputError
-        If the numbers do not fit each other.
+        If a number is out of its range.
     """
-    if samples < 1:
-        raise InputError(f"samples: is {samples}; accepted: 1 and more")
-    if not 0 <= accepted <= samples:
-        raise InputError(f"accepted: is {accepted}; accepted: 0 to {samples}, the number of samples")
-    if not box > 0:
-        raise InputError(f"box: is {box}; accepted: a volume > 0")
-    if not 0 < level < 1:
-        raise InputError(f"level: is {level}; accepted: a number between 0 and 1")
+    samples = whole_number("samples", samples, 1, MOST_SAMPLES)
+    accepted = whole_number("accepted", accepted, 0, samples)
+    box = number("box", box, np.finfo(float).tiny, np.finfo(float).max)
+    level = number("level", level, LEAST_LEVEL, 1.0 - LEAST_LEVEL)
     low, high = share_interval(accepted, samples, level)
-    return Volume(accepted / samples * box, low * box, high * box, level, int(accepted), int(samples))
+    return Volume(accepted / samples * box, low * box, high * box, level, accepted, samples)
 
 
 def share_interval(accepted: int, samples: int, level: float = LEVEL) -> tuple[float, float]:
-    """Interval of Clopper and Pearson of a share, of which `accepted` of `samples` independent samples were seen."""
+    """Return the interval of Clopper and Pearson of a share, from `accepted` of `samples` independent samples."""
     from scipy.special import betaincinv
 
     tail = (1.0 - level) / 2.0

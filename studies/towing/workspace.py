@@ -29,7 +29,7 @@ import numpy as np
 
 from ...models import Robot
 from ...models.robot import Box, MobileCarrier
-from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, make_ready
+from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, load_kernels
 from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
 from .plans import DRIVES, Drive, robot
@@ -84,7 +84,7 @@ def loops(drive: Drive, condition: Condition | None = None, count: int = LOOPS, 
     With `EquilibriumPosture` and fixed lengths the returned poses are those at which the load rests.
     """
     system, condition = robot("wang-ctmrts", drive), condition or ForceBalance()
-    make_ready(system)
+    load_kernels(system)
     condition.holds(system, Places.at_home(system, system.home))
     start = time.perf_counter()
     places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]))

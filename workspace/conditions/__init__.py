@@ -1,4 +1,4 @@
-"""What a place may be asked: one condition a file, each of them answered for many places at once."""
+"""Conditions on places, one a file; each is evaluated at many places at once."""
 
 from .dynamic import Dynamic
 from .equilibrium_posture import EquilibriumPosture

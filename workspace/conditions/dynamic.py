@@ -1,4 +1,4 @@
-"""Dynamic: from rest, the platform can be given every acceleration of a set."""
+"""Dynamic: from rest, the cables can give the platform every acceleration of a set."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from pydantic import Field
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.robot import Finite
-from ..balance import can_give
 from ..condition import Condition
+from ..feasibility import feasible, too_few_cables
 from ..places import Places
 
 __all__ = ["Dynamic"]
 
 
 class Dynamic(Condition):
-    """Tensions inside the limits give each of some accelerations to a platform at rest.
+    """Tensions inside the limits give a platform at rest each of some accelerations.
 
-    What they need is linear in the acceleration at a given pose, so every acceleration of their convex hull can be
-    given too.
+    At a given pose the required wrench is linear in the acceleration, so tensions give every acceleration of their
+    convex hull too.
     """
 
     kind: Literal["dynamic"] = "dynamic"
@@ -32,4 +32,12 @@ class Dynamic(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         accelerations = np.array(self.accelerations) * robot.dof_mask
         wrenches = dynamics_of(robot).required_wrench(places.pose, np.zeros(6), accelerations[:, None])
-        return can_give(robot, places, wrenches)
+        return feasible(robot, places, wrenches)
+
+    def problems_per_place(self, robot: Robot) -> int:
+        """Return the number of accelerations."""
+        return len(self.accelerations)
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return a sentence if the robot has fewer cables than degrees of freedom."""
+        return too_few_cables(robot)

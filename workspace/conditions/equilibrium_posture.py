@@ -1,12 +1,12 @@
-"""Equilibrium posture, the third of paper C's conditions: at a position, the platform finds an attitude to hang at.
+"""Equilibrium posture, the third of paper C's conditions: at a position, an attitude at which the platform rests.
 
-Attitude (roll, pitch, yaw) and tensions are solved for together, six equations
+Attitude (roll, pitch, yaw) and tensions are solved for together, from six equations
 
     S (A(x, theta) t - w) = 0,      S: moments divided by `Robot.length`
 
-by Newton's method from the level platform. With three cables there are six unknowns; with more, each step is the one of
-least norm, tensions in units of the weight, and which tensions balance at the attitude found is asked again. Where the
-drive keeps the cables' lengths, the position is unknown too, and l_i(x, theta) = L_i are three more equations.
+by Newton's method from the level platform. With three cables there are six unknowns. With more, each step is the one of
+least norm, tensions in units of the weight, and the resulting attitude is checked for tensions inside the limits. Where
+the drive keeps the cables' lengths, the position is unknown too, and l_i(x, theta) = L_i are three more equations.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ import numpy as np
 
 from ...errors import InputError
 from ...models import Robot
-from ...models.batch import call, compiled
+from ...models.batch import call
 from ...models.dynamics import dynamics_of
-from ..balance import can_give, rest_wrench
 from ..condition import Condition
+from ..feasibility import feasible, rest_wrench
 from ..places import Places
 
 __all__ = ["EquilibriumPosture"]
 
 STEPS = 20
-STRIDE = 0.5  # [rad], the most that one step turns the platform
+STRIDE = 0.5  # [rad], maximum change of an angle in one step
 SOLVED = 1e-9  # of the weight, largest residual
 AT_ONCE = 4096
 
 
 class EquilibriumPosture(Condition):
-    """At the position of the place, the platform has an attitude at which tensions inside the limits hold it at rest.
+    """At the position of the place, there is an attitude at which tensions inside the limits hold the platform at rest.
 
-    The attitude of the place does not count. One attitude is looked for, the one that Newton's method finds from level:
-    no is "not found". With the drive fixed-length the position is found as well, beginning at that of the place: where
-    the platform then hangs is what `postures` returns.
+    The attitude of the place is ignored. Newton's method searches for one attitude, starting from level: where the
+    condition does not hold, none was found, which proves nothing. With the drive fixed-length the position is unknown
+    too, and starts at that of the place: `postures` returns the resulting pose.
     """
 
     kind: Literal["equilibrium-posture"] = "equilibrium-posture"
@@ -49,23 +49,25 @@ class EquilibriumPosture(Condition):
             low, high = robot.t_min, robot.t_max
             return np.all((tensions >= low) & (tensions <= high), axis=1)
         held = np.all(np.isfinite(pose), axis=1)
-        held[held] = can_give(robot, Places(pose[held], places.carriers[held]), rest_wrench(robot)[None])
+        held[held] = feasible(robot, Places(pose[held], places.carriers[held]), rest_wrench(robot)[None])
         return held
 
     def postures(self, robot: Robot, places: Places) -> tuple[np.ndarray, np.ndarray]:
-        """Poses (n, 6) with the attitudes found and tensions (n, m) [N], of any sign; nan where none was found.
+        """Return poses (n, 6) at rest and their tensions (n, m) [N], of any sign; nan where Newton did not converge.
 
         Raises
         ------
         InputError
-            If the platform cannot turn about all three axes, has fewer than three cables or no weight.
+            If the platform cannot turn about all three axes, or has fewer than three cables or no weight.
         """
         if robot.drive == "fixed-length" and robot.m > 3:
-            raise InputError(f"robot: {robot.name!r} has {robot.m} cables of fixed length; accepted: three")
+            raise InputError(
+                f"robot must have three cables if their lengths are fixed, got {robot.name!r} with {robot.m}"
+            )
         if robot.dof_mask.sum() < 6 or robot.m < 3 or robot.weight == 0:
             raise InputError(
-                f"robot: {robot.name!r} has {robot.m} cables, weight {robot.weight:g} N and the dof "
-                f"{', '.join(robot.platform.dof)}; accepted: three cables or more, a weight, and all six coordinates"
+                f"robot must have three cables or more, a weight and all six dof, got {robot.name!r} with {robot.m}, "
+                f"{robot.weight:g} N and {', '.join(robot.platform.dof)}"
             )
         pose = places.pose.copy()
         pose[:, 3:] = 0.0
@@ -77,9 +79,9 @@ class EquilibriumPosture(Condition):
 
 
 def _solve(robot: Robot, pose: np.ndarray, tensions: np.ndarray, carriers: np.ndarray) -> None:
-    """Take pose (n, 6) and tensions (n, m) to a balance in place, or to nan."""
-    key: Any = robot  # frozen, so it has a hash, which a type checker does not see
-    function = _balance(key)
+    """Change pose (n, 6) and tensions (n, m) in place to those of a balance, or to nan."""
+    key: Any = robot  # frozen, so it has a hash, which type checkers do not know
+    function = _balance_function(key)
     unknown = slice(3 if robot.fixed_lengths is None else 0, 6)
     turned = 3 - unknown.start
     left = np.arange(len(pose))
@@ -121,8 +123,8 @@ def _one(J: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _balance(robot: Any) -> ca.Function:
-    """Residual of the balance in units of the weight, of fixed lengths in `Robot.length`, and its Jacobian.
+def _balance_function(robot: Any) -> ca.Function:
+    """Return a Function of the residual, in units of weight and length, and its Jacobian.
 
     The Jacobian is for (position where lengths are fixed, attitude, tensions in units of the weight).
     """
@@ -134,15 +136,13 @@ def _balance(robot: Any) -> ca.Function:
     error = scale * (A @ tensions - ca.DM(rest_wrench(robot)))
     first = 3
     if robot.fixed_lengths is not None:
-        missing = (dynamics.cable_lengths(pose, carriers) - ca.DM(robot.fixed_lengths)) / robot.length
-        error, first = ca.vertcat(error, missing), 0
+        stretch = (dynamics.cable_lengths(pose, carriers) - ca.DM(robot.fixed_lengths)) / robot.length
+        error, first = ca.vertcat(error, stretch), 0
     jacobian = ca.horzcat(ca.jacobian(error, pose)[:, first:], ca.jacobian(error, tensions) * robot.weight)
-    function = ca.Function(
+    return ca.Function(
         "balance",
         [pose, tensions, carriers],
         [error, ca.densify(jacobian)],
         ["pose", "tensions", "carrier_pose"],
         ["error", "jacobian"],
     )
-    compiled(function)
-    return function

@@ -1,9 +1,9 @@
-"""For robots whose carriers can be placed: somewhere in their reach boxes a condition holds.
+"""Exists placement: somewhere in the reach boxes of the mobile carriers a condition holds.
 
-Half of the placements tried are points of a scrambled Sobol sequence in the product of the boxes. From the best of
-them, by what the condition says it lacks there, the others are ever smaller steps, each taken if less is lacking after
-it. Both are the same for every place, so that the answer for a place depends on nothing else. It is one-sided: yes is
-proved by a placement, no is "not found".
+Half of the placements tried are points of a scrambled Sobol sequence in the product of the boxes. The others are ever
+smaller steps from the best of them, each kept if the shortfall of the condition is smaller after it. Points and steps
+are the same for every place, so that the result for a place depends on nothing else. It is one-sided: a placement
+proves that the condition holds; that none was found proves nothing.
 """
 
 from __future__ import annotations
@@ -24,24 +24,26 @@ from ..places import Places
 __all__ = ["ExistsPlacement"]
 
 ROUNDS = 6  # from a box to a sphere and back
-UNFIT = 1e12  # more than any condition lacks where the carriers fit
+MISPLACED = 1e12  # larger than the shortfall of any condition where the carriers fit
 LARGEST_STEP, SMALLEST_STEP = 0.5, 0.02  # of a box, or of all turns
 
 
 class ExistsPlacement(Condition):
-    """A condition holds for the carriers as they are or for another placement of the mobile ones in their reach.
+    """A condition holds for the carriers as they are, or for another placement of the mobile ones in their reach boxes.
 
     With the drive fixed-length the carriers are placed at their cables' lengths from the attachments. With the drive
-    variable-length mobile carriers stay where they are.
+    variable-length mobile carriers keep their positions.
     """
 
     kind: Literal["exists-placement"] = "exists-placement"
-    condition: AnyCondition
-    tries: Annotated[int, Field(ge=1, le=1_000_000)] = Field(default=32, description="placements that are tried")
-    turn: NonNegative = Field(
-        default=0.0, description="roll, pitch and yaw are tried too, up to this from the attitude of the place [rad]"
+    condition: AnyCondition = Field(description="condition that must hold for a placement")
+    tries: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
+        default=32, description="number of placements that are tried"
     )
-    seed: Annotated[int, Field(ge=0)] = 0
+    turn: NonNegative = Field(
+        default=0.0, description="maximum change of roll, pitch and yaw, which are tried too [rad]; default: none"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of the placements")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         mobile = [i for i, carrier in enumerate(robot.carriers) if isinstance(carrier, MobileCarrier)]
@@ -49,25 +51,33 @@ class ExistsPlacement(Condition):
             mobile = []
         if not mobile and not self.turn:
             raise InputError(
-                f"exists-placement: robot {robot.name!r} has no carrier to place; accepted: mobile carriers and a "
-                "drive other than variable-length, or turn > 0"
+                "exists-placement must have turn > 0, or a robot with mobile carriers and a drive other than "
+                f"variable-length, got {robot.name!r}"
             )
         if robot.drive == "fixed-length" and len(set(robot.carrier_of_cable)) < robot.m:
             raise InputError(
-                f"exists-placement: carriers of {robot.name!r} hold several cables of fixed length; "
-                "accepted: one cable each"
+                "exists-placement must have a robot with one cable of fixed length a carrier, got "
+                f"{robot.name!r} with several"
             )
         held = np.zeros(len(places), dtype=bool)
         if robot.drive != "fixed-length":
             held = self.condition.holds(robot, places)
         searched = np.flatnonzero(~held)
         if searched.size:
-            held[searched] = self._found(robot, mobile, places.only(searched))
+            held[searched] = self._search(robot, mobile, places.only(searched))
         return held
 
-    def _found(self, robot: Robot, mobile: list[int], places: Places) -> np.ndarray:
-        """Whether a placement is found, (n,) of bool."""
-        points, steps = _search(3 * len(mobile) + 3, self.tries, self.seed)
+    def problems_per_place(self, robot: Robot) -> int:
+        """Return the number of tries, and one, times that of the condition."""
+        return (self.tries + 1) * self.condition.problems_per_place(robot)
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return the reason of the condition."""
+        return self.condition.why_nowhere(robot)
+
+    def _search(self, robot: Robot, mobile: list[int], places: Places) -> np.ndarray:
+        """Return for which places a placement is found, (n,) of bool."""
+        points, steps = _placements(3 * len(mobile) + 3, self.tries, self.seed)
         least = np.full(len(places), np.inf)
         best = np.zeros((len(places), points.shape[1]))
         for try_, move in enumerate([*points, *steps]):
@@ -76,22 +86,22 @@ class ExistsPlacement(Condition):
                 break
             shares = np.clip(move if try_ < len(points) else best[left] + move, 0.0, 1.0)
             shares = np.broadcast_to(shares, best[left].shape)
-            lacks = self._lacks(robot, mobile, places.only(left), shares)
-            better = lacks < least[left]
-            least[left[better]], best[left[better]] = lacks[better], shares[better]
+            shortfall = self._shortfall(robot, mobile, places.only(left), shares)
+            better = shortfall < least[left]
+            least[left[better]], best[left[better]] = shortfall[better], shares[better]
         return least == 0
 
-    def _lacks(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> np.ndarray:
-        """What the condition lacks there, (n,); more than that where the carriers do not fit."""
+    def _shortfall(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> np.ndarray:
+        """Return the shortfall of the condition, (n,); more than that where the carriers do not fit."""
         placed, beyond = self._place(robot, mobile, places, shares)
-        lacks = UNFIT * (1.0 + beyond)
+        shortfall = MISPLACED * (1.0 + beyond)
         fits = np.flatnonzero(beyond == 0)
         if fits.size:
-            lacks[fits] = np.minimum(self.condition.lacks(robot, placed.only(fits)), UNFIT)
-        return lacks
+            shortfall[fits] = np.minimum(self.condition.shortfall(robot, placed.only(fits)), MISPLACED)
+        return shortfall
 
     def _place(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> tuple[Places, np.ndarray]:
-        """Places with the carriers at `shares` (n, d) of their boxes, and how far from fitting there, (n,) [m]."""
+        """Return places with the carriers at `shares` (n, d) of their boxes, and by how much they misfit, (n,) [m]."""
         pose, carriers = places.pose.copy(), places.carriers.copy()
         if self.turn:
             pose[:, 3:] += self.turn * (2.0 * shares[:, -3:] - 1.0) * robot.dof_mask[3:]
@@ -112,7 +122,7 @@ class ExistsPlacement(Condition):
                 low = np.array(boxes[i].min) - carriers[:, i, :3] + away
                 high = np.array(boxes[i].max) - carriers[:, i, :3] + away
                 at = away
-                # To the sphere and back into the box: the two meet in a patch, if they do.
+                # Alternate projections on sphere and box converge to a common point if there is one.
                 for _ in range(ROUNDS):
                     at = np.clip(_onto_sphere(at, length), low, high)
                 at = _onto_sphere(at, length)
@@ -130,11 +140,11 @@ def _more_than_rounding(distance: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=4)
-def _search(dimensions: int, tries: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points of [0, 1] that fill the cube evenly, and steps from the best of them, (k, dimensions) each.
+def _placements(dimensions: int, tries: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return points that fill the unit cube evenly, and steps from the best of them, (k, dimensions) each.
 
-    Every other point is at a corner of the boxes: where a condition only just holds, carriers are at the ends of their
-    reach. The last three numbers, which turn the platform, stay inside.
+    Every other point is at a corner of the boxes: where a condition barely holds, carriers are at the ends of their
+    reach. The last three numbers, the angles of the platform, stay inside.
     """
     from scipy.stats import qmc
 

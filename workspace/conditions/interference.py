@@ -1,7 +1,7 @@
 """Interference: cables stay clear of each other, of the platform's body and of obstacles.
 
-Cables are the straight segments from anchor to attachment. Distances of segments: Ericson, Real-Time Collision
-Detection, 5.1.9; whether a segment enters a box: its 5.3.3.
+Cables are the straight segments from anchor to attachment. Sources: Ericson, Real-Time Collision Detection, 5.1.9
+(distance of segments) and 5.3.3 (segments that enter a box).
 """
 
 from __future__ import annotations
@@ -28,28 +28,31 @@ Obstacle = Annotated[Sphere | Capsule | Block, Field(discriminator="kind")]
 
 
 class Interference(Condition):
-    """Cables are free: of each other by a distance, of the platform's box, of obstacles by a distance.
+    """Cables keep a distance from each other and from obstacles, and do not enter the platform's body.
 
-    Cables that share an anchor or an attachment at home are not held apart from each other.
+    Pairs of cables that share an anchor or an attachment at home are not checked.
     """
 
     kind: Literal["interference"] = "interference"
-    between_cables: Positive | None = Field(default=None, description="least distance of two cables [m]; none: any")
-    platform: Box | None = Field(
-        default=None, description="the platform's body in its own frame, which no cable may enter [m]; none: no body"
+    between_cables: Positive | None = Field(
+        default=None, description="minimum distance between two cables [m]; default: not checked"
     )
-    obstacles: tuple[Obstacle, ...] = Field(default=(), description="in {G}, what cables keep away from")
-    clearance: NonNegative = Field(default=0.0, description="least distance of cables and attachments from these [m]")
+    platform: Box | None = Field(
+        default=None,
+        description="the platform's body in its own frame, which no cable may enter [m]; default: not checked",
+    )
+    obstacles: tuple[Obstacle, ...] = Field(default=(), description="spheres, capsules and boxes in {G}")
+    clearance: NonNegative = Field(default=0.0, description="minimum distance between cables and obstacles [m]")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        with np.errstate(over="ignore", invalid="ignore"):  # of places beyond all measure
+        with np.errstate(over="ignore", invalid="ignore"):  # of places that are far too far away
             return self._free(robot, places)
 
     def _free(self, robot: Robot, places: Places) -> np.ndarray:
         starts, ends = anchors(robot, places.carriers), attachments(robot, places.pose)
         free = np.ones(len(places), dtype=bool)
         if self.between_cables is not None:
-            for i, j in _apart(robot):
+            for i, j in _separate(robot):
                 distance = segment_distance(starts[:, i], ends[:, i], starts[:, j], ends[:, j])
                 free &= distance >= self.between_cables
         if self.platform is not None:
@@ -59,19 +62,19 @@ class Interference(Condition):
         for obstacle in self.obstacles:
             for cable in range(robot.m):
                 distance = _outside(obstacle, starts[:, cable], ends[:, cable])
-                # Of a box the distance is zero all through its inside, which no clearance makes free.
+                # Inside a box the distance is zero, which is interference without any clearance too.
                 free &= (distance > 0.0) & (distance >= self.clearance)
         return free
 
 
 def segment_distance(p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.ndarray) -> np.ndarray:
-    """Distance of the segments p to p_end and q to q_end, (n, 3) each, (n,) [m]."""
+    """Return the distance of the segments p to p_end and q to q_end, (n, 3) each, (n,) [m]."""
     along, across, between = p_end - p, q_end - q, p - q
     a, e, f = _dot(along, along), _dot(across, across), _dot(across, between)
     b, c = _dot(along, across), _dot(along, between)
     tiny = np.finfo(float).tiny
     beside = a * e - b * b
-    # On parallel lines every s will do, and 0 is one.
+    # On parallel lines every s serves, so 0 does.
     s = np.where(beside > 1e-14 * a * e, np.clip((b * f - c * e) / np.maximum(beside, tiny), 0.0, 1.0), 0.0)
     t = np.clip((b * s + f) / np.maximum(e, tiny), 0.0, 1.0)
     s = np.clip((b * t - c) / np.maximum(a, tiny), 0.0, 1.0)
@@ -79,8 +82,8 @@ def segment_distance(p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.
     return np.sqrt(_dot(gap, gap))
 
 
-def _apart(robot: Robot) -> list[tuple[int, int]]:
-    """Pairs of cables without a common end."""
+def _separate(robot: Robot) -> list[tuple[int, int]]:
+    """Return the pairs of cables without a common end."""
     ends = (robot.home_anchors, robot.home_attachments)
     return [
         (i, j)
@@ -90,7 +93,7 @@ def _apart(robot: Robot) -> list[tuple[int, int]]:
 
 
 def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
-    """Distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; zero or less where they meet."""
+    """Return the distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; at most 0 where they meet."""
     if isinstance(obstacle, Block):
         return _from_box(np.array(obstacle.min), np.array(obstacle.max), p, p_end)
     if isinstance(obstacle, Sphere):
@@ -102,7 +105,7 @@ def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray
 
 
 def _from_box(low: np.ndarray, high: np.ndarray, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
-    """Distance of segments from a box, zero inside: convex along the segment, so its slope's sign is bisected."""
+    """Return the distance of segments from a box, zero inside; it is convex on a segment: bisection minimises it."""
     along = p_end - p
     first, last = np.zeros(len(p)), np.ones(len(p))
     for _ in range(_BISECTIONS):
@@ -115,9 +118,9 @@ def _from_box(low: np.ndarray, high: np.ndarray, p: np.ndarray, p_end: np.ndarra
 
 
 def _enters(low: np.ndarray, high: np.ndarray, attachment: np.ndarray, anchor: np.ndarray) -> np.ndarray:
-    """Whether the segments from an attachment (3,) to anchors (n, 3), in the platform frame, enter its box.
+    """Return whether the segments from an attachment (3,) to anchors (n, 3), in the platform frame, enter its box.
 
-    To touch the surface is not to enter: attachments lie on it.
+    Touching the surface is allowed: attachments lie on it.
     """
     slack = 1e-9 * max(float(np.abs(high - low).max()), 1e-9)
     low, high = low + slack, high - slack

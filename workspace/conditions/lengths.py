@@ -18,18 +18,20 @@ __all__ = ["Lengths"]
 
 
 class Lengths(Condition):
-    """Each cable's length lies between a least and a most."""
+    """Each cable's length lies between a minimum and a maximum."""
 
     kind: Literal["lengths"] = "lengths"
-    min: NonNegative | tuple[NonNegative, ...] = Field(default=0.0, description="of all cables or of each [m]")
-    max: Positive | tuple[Positive, ...] | None = Field(default=None, description="of all cables or of each [m]")
+    min: NonNegative | tuple[NonNegative, ...] = Field(default=0.0, description="minimum of all cables or of each [m]")
+    max: Positive | tuple[Positive, ...] | None = Field(
+        default=None, description="maximum of all cables or of each [m]; default: unlimited"
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.max is None:
             return self
         least, most = np.atleast_1d(self.min), np.atleast_1d(self.max)
-        # Of numbers for each cable that are not equally many, one is not as many as the robot has cables.
+        # If min and max have different numbers of cables, one of them does not fit the robot: `_holds` reports it.
         if (1 in (least.size, most.size) or least.size == most.size) and np.greater(least, most).any():
             raise ValueError(f"min must not exceed max, but they are {self.min} m and {self.max} m")
         return self
@@ -37,7 +39,7 @@ class Lengths(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         for name, value in (("min", self.min), ("max", self.max)):
             if isinstance(value, tuple) and len(value) != robot.m:
-                raise InputError(f"lengths.{name}: has {len(value)} numbers; accepted: one, or {robot.m}, one a cable")
+                raise InputError(f"lengths.{name} must have one number or {robot.m}, one a cable, got {len(value)}")
         lengths = dynamics_of(robot).cable_lengths(places.pose, places.carriers)
         most = np.inf if self.max is None else self.max
         return np.all((lengths >= self.min) & (lengths <= most), axis=1)

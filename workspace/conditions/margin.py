@@ -1,4 +1,4 @@
-"""Capacity margin: how much of any further wrench the platform at rest can take."""
+"""Capacity margin: how much further wrench the cables can balance in any direction, at rest."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pydantic import Field
 from ...models import Robot
 from ...models.robot import Finite
 from ...solvers.available_wrench import facets
-from ..balance import matrices, rest_wrench, rows_of
 from ..condition import Condition
+from ..feasibility import rest_wrench, scaled, too_few_cables, wrench_matrices, wrench_rows
 from ..places import Places
 
 __all__ = ["Margin"]
@@ -21,27 +21,31 @@ class Margin(Condition):
     """The capacity margin at rest is at least a value [N], moments divided by `Robot.length`."""
 
     kind: Literal["margin"] = "margin"
-    above: Finite = Field(default=0.0, description="[N]")
+    above: Finite = Field(default=0.0, description="minimum of the margin [N]")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return self.margins(robot, places) >= self.above
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """How much the margin is below the value, (n,) [N]."""
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return how much the margin is below the value, (n,) [N]."""
         return np.maximum(self.above - self.margins(robot, places), 0.0)
 
-    def margins(self, robot: Robot, places: Places) -> np.ndarray:
-        """Signed distances of the wrench of rest from the boundary of the available wrench set, (n,) [N].
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return a sentence if the robot has fewer cables than degrees of freedom."""
+        return too_few_cables(robot)
 
-        Inside, positive, they are those of `solvers.capacity_margin`, also with a set that is flat among all wrenches.
-        Outside, negative, they are bounds: the distance is at least as large, and as large where a facet is nearest.
+    def margins(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return signed distances of the wrench at rest from the boundary of the available wrench set, (n,) [N].
+
+        Inside, they are positive and those of `solvers.capacity_margin`, also for a set without volume. Outside, they
+        are negative and bounds: the distance is at least as large, and equal where a facet is nearest.
         """
-        rows = rows_of(robot)
-        w = rest_wrench(robot)[rows] * robot.wrench_scale[rows]
-        found = np.empty(len(places))
-        for part, A in matrices(robot, places, rows):
-            found[part] = _margins(A, w, robot.t_min, robot.t_max)
-        return found
+        rows = wrench_rows(robot)
+        w = scaled(robot, rest_wrench(robot), rows)
+        margins = np.empty(len(places))
+        for part, A in wrench_matrices(robot, places, rows):
+            margins[part] = _margins(A, w, robot.t_min, robot.t_max)
+        return margins
 
 
 def _margins(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
-from ..balance import can_give, lacking, rest_wrench
 from ..condition import Condition
+from ..feasibility import feasible, rest_wrench, shortfall, too_few_cables
 from ..places import Places
 
 __all__ = ["StaticEquilibrium"]
@@ -20,8 +20,12 @@ class StaticEquilibrium(Condition):
     kind: Literal["static-equilibrium"] = "static-equilibrium"
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        return can_give(robot, places, rest_wrench(robot)[None])
+        return feasible(robot, places, rest_wrench(robot)[None])
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """How far the weight is from what the cables can give, moments divided by `Robot.length`, (n,) [N]."""
-        return lacking(robot, places, rest_wrench(robot)[None])
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return the distance from the required wrench to the available ones, moments over length, (n,) [N]."""
+        return shortfall(robot, places, rest_wrench(robot)[None])
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return a sentence if the robot has fewer cables than degrees of freedom."""
+        return too_few_cables(robot)

@@ -1,7 +1,7 @@
-"""Wrench closure: cables whose tensions have no upper limit can give any wrench whatever.
+"""Wrench closure: cables whose tensions have no upper limit can give every wrench.
 
-That is so if and only if the columns of A span all wrench rows and some tensions, all positive, balance each other:
-A t = 0, t > 0. The tensions can be scaled, so t >= 1 asks the same.
+That holds if and only if the columns of A span all wrench rows and some positive tensions balance each other: A t = 0,
+t > 0. The tensions can be scaled, so t >= 1 is the same condition.
 """
 
 from __future__ import annotations
@@ -11,27 +11,35 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
-from ...solvers import solve_batch
 from ...solvers.available_wrench import spans
-from ..balance import matrices, rows_of
 from ..condition import Condition
+from ..feasibility import solve_many, wrench_matrices, wrench_rows
 from ..places import Places
 
 __all__ = ["WrenchClosure"]
 
 
 class WrenchClosure(Condition):
-    """Any wrench can be given by pulling, if the cables are strong enough; the tension limits do not count."""
+    """The cables can give every wrench by pulling, if they are strong enough; the tension limits are ignored."""
 
     kind: Literal["wrench-closure"] = "wrench-closure"
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        rows = rows_of(robot)
+        rows = wrench_rows(robot)
         held = np.zeros(len(places), dtype=bool)
         if robot.m <= rows.size:
             return held
-        for part, A in matrices(robot, places, rows):
-            closed = solve_batch(A, np.zeros(rows.size), 1.0, np.inf, threads=1).feasible
+        for part, A in wrench_matrices(robot, places, rows):
+            closed = solve_many(A, np.zeros(rows.size), 1.0, np.inf).feasible
             closed[closed] = spans(A[closed])
             held[part] = closed
         return held
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return a sentence if the robot has no more cables than degrees of freedom."""
+        count = wrench_rows(robot).size
+        if robot.m > count:
+            return None
+        return (
+            f"wrench closure of {count} degrees of freedom takes at least {count + 1} cables; the robot has {robot.m}"
+        )

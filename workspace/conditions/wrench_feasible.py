@@ -1,7 +1,7 @@
-"""Wrench feasible: the platform holds still against every wrench of a set that acts on it beside its weight.
+"""Wrench feasible: the cables hold the platform at rest against every wrench of a set, in addition to its weight.
 
-The wrenches that the cables can give are a convex set. So every wrench of a polytope can be balanced if and only if
-each of its vertices can.
+The wrenches that the cables can give are a convex set. So they can balance every wrench of a polytope if and only if
+they can balance each of its vertices.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from pydantic import Field, model_validator
 
 from ...models import Robot
 from ...models.robot import Finite
-from ..balance import can_give, lacking, rest_wrench
 from ..condition import Condition
+from ..feasibility import feasible, rest_wrench, shortfall, too_few_cables
 from ..places import Places
 
 __all__ = ["WrenchFeasible"]
@@ -28,7 +28,8 @@ class WrenchFeasible(Condition):
 
     kind: Literal["wrench-feasible"] = "wrench-feasible"
     box: tuple[Wrench, Wrench] | None = Field(
-        default=None, description="least and most of (fx, fy, fz, mx, my, mz) on the platform, about the CoM [N, N m]"
+        default=None,
+        description="minimum and maximum of (fx, fy, fz, mx, my, mz) on the platform, about the CoM [N, N m]",
     )
     vertices: tuple[Wrench, ...] | None = Field(
         default=None, min_length=1, description="corners of a polytope of such wrenches [N, N m]"
@@ -37,28 +38,38 @@ class WrenchFeasible(Condition):
     @model_validator(mode="after")
     def _one_set(self) -> Self:
         if (self.box is None) == (self.vertices is None):
-            raise ValueError("accepted: box or vertices, one of them")
+            raise ValueError("box or vertices must be given, and not both")
         if self.box is not None:
             for name, low, high in zip(("fx", "fy", "fz", "mx", "my", "mz"), *self.box, strict=True):
                 if low > high:
-                    raise ValueError(f"box: the least must not exceed the most, but of {name} they are {low}, {high}")
+                    raise ValueError(
+                        f"box must have minima that do not exceed its maxima, but of {name} they are {low}, {high}"
+                    )
         return self
 
     def corners(self) -> np.ndarray:
-        """Wrenches on the platform that decide, (k, 6) [N, N m]."""
+        """Return the vertices of the set, (k, 6) [N, N m]."""
         if self.vertices is not None:
             return np.array(self.vertices)
         assert self.box is not None
         return np.array(list(product(*[sorted({low, high}) for low, high in zip(*self.box, strict=True)])))
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        return can_give(robot, places, self._wrenches(robot))
+        return feasible(robot, places, self._wrenches(robot))
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """How far the farthest is from what the cables can give, moments divided by `Robot.length`, (n,) [N]."""
-        return lacking(robot, places, self._wrenches(robot))
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return the largest distance of a required wrench from the available ones, moments over length, (n,) [N]."""
+        return shortfall(robot, places, self._wrenches(robot))
+
+    def problems_per_place(self, robot: Robot) -> int:
+        """Return the number of vertices."""
+        return len(self._wrenches(robot))
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return a sentence if the robot has fewer cables than degrees of freedom."""
+        return too_few_cables(robot)
 
     def _wrenches(self, robot: Robot) -> np.ndarray:
-        # What a coordinate that cannot move is pushed by, its guide takes.
+        # A guide takes the wrench along a coordinate that cannot move.
         corners = np.unique(self.corners() * robot.dof_mask, axis=0)
         return rest_wrench(robot) - corners

@@ -1,4 +1,4 @@
-"""Wrench with a tolerance, the second of paper C's conditions: the weight is balanced but for a stated rest."""
+"""Wrench with a tolerance, the second of paper C's conditions: the weight is balanced up to a tolerance."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ from pydantic import Field
 
 from ...models import Robot
 from ...models.robot import NonNegative
-from ...solvers import solve_batch
-from ..balance import matrices, rest_wrench, rows_of
 from ..condition import Condition
+from ..feasibility import rest_wrench, scaled, solve_many, wrench_matrices, wrench_rows
 from ..places import Places
 
 __all__ = ["WrenchWithTolerance"]
 
-_RHO = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
+_RHO = 1e10  # weight of the wrench error relative to the tensions: so large that these do not change it
 
 
 class WrenchWithTolerance(Condition):
-    """Tensions inside the limits balance the weight within a tolerance of |(force, moment / length)| [N].
+    """Tensions inside the limits balance the weight up to a tolerance of |(force, moment / length)| [N].
 
     `length` is `Robot.length`, the largest distance of an attachment from the CoM.
     """
@@ -31,15 +30,15 @@ class WrenchWithTolerance(Condition):
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
         return self.error(robot, places) <= self.tolerance
 
-    def lacks(self, robot: Robot, places: Places) -> np.ndarray:
-        """How much more than the tolerance the error is, (n,) [N]."""
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return how much the error exceeds the tolerance, (n,) [N]."""
         return np.maximum(self.error(robot, places) - self.tolerance, 0.0)
 
     def error(self, robot: Robot, places: Places) -> np.ndarray:
-        """Smallest wrench error that tensions inside the limits leave, (n,) [N]; infinite where a cable has none."""
-        rows = rows_of(robot)
-        w = rest_wrench(robot)[rows] * robot.wrench_scale[rows]
+        """Return the smallest wrench error that tensions inside the limits leave, (n,) [N]; infinite without any."""
+        rows = wrench_rows(robot)
+        w = scaled(robot, rest_wrench(robot), rows)
         error = np.empty(len(places))
-        for part, A in matrices(robot, places, rows):
-            error[part] = solve_batch(A, w, robot.t_min, robot.t_max, rho=_RHO, threads=1).residual
+        for part, A in wrench_matrices(robot, places, rows):
+            error[part] = solve_many(A, w, robot.t_min, robot.t_max, rho=_RHO).residual
         return np.nan_to_num(error, nan=np.inf)

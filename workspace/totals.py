@@ -1,4 +1,4 @@
-"""`Outcome`: the tallies of a run put together, and the dataset that tells it."""
+"""`Totals`: the results of a run's jobs added up, and the dataset of them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .counts import Counts, cells_of_counts, width_of
 from .domain import Domain
+from .jobs import JobResult, cells_of_counts, width_of
 from .refinement import Refinement
 from .volume import LEVEL, share_interval
 
@@ -17,41 +17,41 @@ if TYPE_CHECKING:
 AXES, ANGLES = ["x", "y", "z"], ["roll", "pitch", "yaw"]
 
 
-class Outcome:
-    """Takes tallies in the order of their samples, so that what it keeps does not depend on who was faster.
+class Totals:
+    """Add up job results in the order of their samples, so that the kept samples do not depend on timing.
 
     Attributes
     ----------
     tried, accepted
-        How many samples so far.
+        Numbers of samples so far.
     """
 
     def __init__(self, domain: Domain, points_max: int):
         self.tried = self.accepted = 0
-        self._domain, self._room = domain, points_max
+        self._domain, self._left = domain, points_max
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
         self._counts = np.zeros((2, *cells_of_counts(domain)), dtype=np.int64)
         self._samples: list[np.ndarray] = []
         self._flags: list[np.ndarray] = []
 
     @property
-    def has_room(self) -> bool:
-        """Whether more samples are kept."""
-        return self._room > 0
+    def keeps_more(self) -> bool:
+        """Whether more samples can be kept."""
+        return self._left > 0
 
-    def add(self, count: Counts) -> None:
-        """Take the count of the next samples."""
-        self.tried += sum(count.sizes)
-        self.accepted += int(count.counts[1].sum())
-        self._low, self._high = np.minimum(self._low, count.low), np.maximum(self._high, count.high)
-        self._counts += count.counts
-        if self._room > 0 and len(count.samples):
-            self._samples.append(count.samples[: self._room])
-            self._flags.append(count.accepted[: self._room])
-            self._room -= len(self._samples[-1])
+    def add(self, result: JobResult) -> None:
+        """Add the result of the next job."""
+        self.tried += sum(result.sizes)
+        self.accepted += int(result.counts[1].sum())
+        self._low, self._high = np.minimum(self._low, result.low), np.maximum(self._high, result.high)
+        self._counts += result.counts
+        if self._left > 0 and len(result.samples):
+            self._samples.append(result.samples[: self._left])
+            self._flags.append(result.accepted[: self._left])
+            self._left -= len(self._samples[-1])
 
     def dataset(self, keep: str, method: str, refinement: Refinement | None) -> xr.Dataset:
-        """All of it; what it has is told by `sample`."""
+        """Return all of it as a dataset, which `sample` documents."""
         import xarray as xr
 
         domain = self._domain
@@ -61,12 +61,11 @@ class Outcome:
             for lowest, highest, count in zip(low, high, self._counts.shape[1:], strict=True)
         ]
         metres = {"units": "m"}
-        found = self.accepted > 0
-        bounds = np.stack([self._low, self._high]) if found else np.full((2, 3), np.nan)
+        bounds = np.stack([self._low, self._high]) if self.accepted else np.full((2, 3), np.nan)
         variables: dict[str, Any] = {
             "bounds": (("end", "axis"), bounds, metres),
             "tried": (("x", "y", "z"), self._counts[0], {"units": "1", "long_name": "samples tried in the cell"}),
-            "reached": (("x", "y", "z"), self._counts[1], {"units": "1", "long_name": "of them accepted"}),
+            "reached": (("x", "y", "z"), self._counts[1], {"units": "1", "long_name": "samples accepted in the cell"}),
             **_measures(self._counts, domain, self.tried, self.accepted, method, refinement),
         }
         coordinates: dict[str, Any] = {
@@ -85,9 +84,9 @@ class Outcome:
             centres = (corners.pose[:, :3] + upper.pose[:, :3]) / 2
             edges = np.zeros(6 + 3 * len(domain.robot.carriers))
             edges[domain.varying] = domain.extent * refinement.edges
-            told = {"units": "m", "long_name": "centres of the smallest cells, which the boundary passes through"}
-            variables["boundary"] = (("cell", "axis"), centres, told)
-            variables["cell_edges"] = (("axis",), edges[:3], {"units": "m", "long_name": "of the smallest cells"})
+            about = {"units": "m", "long_name": "centres of the smallest cells, which the boundary passes through"}
+            variables["boundary"] = (("cell", "axis"), centres, about)
+            variables["cell_edges"] = (("axis",), edges[:3], {"units": "m", "long_name": "edges of the smallest cells"})
         return xr.Dataset(variables, coordinates)
 
     def _kept(self, keep: str) -> dict[str, Any]:
@@ -108,23 +107,24 @@ class Outcome:
 def _measures(
     counts: np.ndarray, domain: Domain, tried: int, accepted: int, method: str, refinement: Refinement | None
 ) -> dict[str, Any]:
-    """The volume and its ends."""
+    """Return the volume and its interval."""
     whole = domain.measure
     if refinement is not None:
         ends = refinement.inside, refinement.inside + refinement.mixed
         value = refinement.estimate
-        told = "lowest and highest, if the first cells miss nothing"
-    elif domain.hangs:
+        about = "lowest and highest, if the first cells miss nothing"
+    elif domain.position_from_lengths:
         value = np.count_nonzero(counts[1]) / counts[1].size
-        ends, told = (np.nan, np.nan), "none: positions are not uniform; the volume is that of the cells reached"
+        ends = np.nan, np.nan
+        about = "no interval: positions are not uniform; the volume is that of the cells reached"
     elif method == "grid":
         value, ends = accepted / tried, (np.nan, np.nan)
-        told = "none: a grid has no chance in it; it can be off by half a layer of cells along the boundary"
+        about = "no interval: a grid is not random; it can be off by half a layer of cells along the boundary"
     else:
         value, ends = accepted / tried, share_interval(accepted, tried)
-        told = f"interval of Clopper and Pearson at {LEVEL:.0%}, of independent samples"
+        about = f"interval of Clopper and Pearson at {LEVEL:.0%}, for independent samples"
     unit = {"units": domain.measure_unit}
     return {
         "volume": ((), whole * value, unit),
-        "volume_interval": (("end",), [whole * end for end in ends], {**unit, "long_name": told}),
+        "volume_interval": (("end",), [whole * end for end in ends], {**unit, "long_name": about}),
     }

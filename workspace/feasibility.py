@@ -1,0 +1,125 @@
+"""Decide at which places tensions inside their limits give the required wrenches, for many places at once.
+
+The wrench rows are those of the coordinates that can move, moments divided by `Robot.length`, so that all are in
+newtons. A few thousand places are processed at a time: their matrices stay in the processor's cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..models import Robot
+from ..models.batch import compiled
+from ..models.dynamics import dynamics_of
+from ..solvers import BatchSolution, solve_batch
+from .places import Places
+
+__all__ = [
+    "feasible",
+    "load_kernels",
+    "rest_wrench",
+    "scaled",
+    "shortfall",
+    "solve_many",
+    "too_few_cables",
+    "wrench_matrices",
+    "wrench_rows",
+]
+
+PLACES_AT_ONCE = 8192
+
+
+def load_kernels(robot: Robot) -> None:
+    """Load the compiled code for many places of a robot now, or compile it; a script calls it before it takes times."""
+    compiled(dynamics_of(robot).functions["wrench_matrix"])
+    feasible(robot, Places.at_home(robot, robot.home), rest_wrench(robot)[None])
+
+
+def rest_wrench(robot: Robot) -> np.ndarray:
+    """Return the wrench that holds the platform at rest, anywhere: against its weight, about the CoM, (6,) [N, N m]."""
+    return dynamics_of(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
+
+
+def wrench_rows(robot: Robot, forces_only: bool = False) -> np.ndarray:
+    """Return the indices of the wrench rows of the coordinates that can move, or of those that are forces."""
+    rows = np.flatnonzero(robot.dof_mask)
+    return rows[rows < 3] if forces_only else rows
+
+
+def scaled(robot: Robot, wrenches: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return some rows of wrenches (..., 6) [N, N m] with moments divided by the robot's length, (..., rows) [N]."""
+    return wrenches[..., rows] * robot.wrench_scale[rows]
+
+
+def wrench_matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Yield slices of a few thousand places, and their wrench matrices (k, rows, m) [N per N]."""
+    dynamics = dynamics_of(robot)
+    scale = robot.wrench_scale[rows]
+    for start in range(0, len(places), PLACES_AT_ONCE):
+        part = slice(start, start + PLACES_AT_ONCE)
+        A = dynamics.wrench_matrix(places.pose[part], places.carriers[part])
+        if rows.size < 6:
+            A = A[:, rows]
+        if (scale != 1.0).any():
+            A *= scale[:, None]
+        yield part, A
+
+
+def feasible(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+    """Return where tensions inside their limits give every one of some wrenches, (n,) of bool.
+
+    Parameters
+    ----------
+    wrenches
+        (k, 6) for all places or (k, n, 6), about the CoM in {G} [N, N m].
+    rows
+        Wrench rows to give; default: those of the coordinates that can move.
+    """
+    rows = wrench_rows(robot) if rows is None else rows
+    required = scaled(robot, wrenches, rows)
+    shared = required.ndim == 2
+    held = np.zeros(len(places), dtype=bool)
+    for part, A in wrench_matrices(robot, places, rows):
+        left = np.arange(len(A))
+        for w in required if shared else required[:, part]:
+            some = A if left.size == len(A) else A[left]
+            left = left[solve_many(some, w if shared else w[left], robot.t_min, robot.t_max).feasible]
+            if not left.size:
+                break
+        held[part.start + left] = True
+    return held
+
+
+def shortfall(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+    """Return a lower bound of the distance of wrenches (k, 6) from the available wrench set, the largest, (n,) [N].
+
+    It is the shortfall of the batch solver's certificates: zero exactly where `feasible` is true.
+    """
+    rows = wrench_rows(robot) if rows is None else rows
+    largest = np.zeros(len(places))
+    for part, A in wrench_matrices(robot, places, rows):
+        for w in scaled(robot, wrenches, rows):
+            solved = solve_many(A, w, robot.t_min, robot.t_max)
+            short = np.where(solved.feasible, 0.0, np.nan_to_num(solved.shortfall, nan=np.inf))
+            largest[part] = np.maximum(largest[part], short)
+    return largest
+
+
+def solve_many(
+    A: np.ndarray, w: np.ndarray, t_min: np.ndarray | float, t_max: np.ndarray | float, rho: float | None = None
+) -> BatchSolution:
+    """Solve a batch of tension problems with one thread, by compiled code if the whole run is worth it."""
+    return solve_batch(A, w, t_min, t_max, rho=rho, threads=1)
+
+
+def too_few_cables(robot: Robot) -> str | None:
+    """Return a sentence if the robot has fewer cables than degrees of freedom, else None."""
+    count = wrench_rows(robot).size
+    if robot.m >= count:
+        return None
+    return (
+        f"{robot.m} cables cannot balance {count} components of force and moment, except at single poses; "
+        "force-balance checks the forces alone, equilibrium-posture lets the platform turn"
+    )
