@@ -1,4 +1,4 @@
-"""`towline view`: a robot, a plan or a workspace in the browser, or as a page that needs no server."""
+"""`towline view`: show a robot, a plan or a workspace in the browser, or write a page that needs no server."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ def view(
         ),
     ],
     html: Annotated[
-        Path | None, typer.Option("--html", help="HTML file to write instead: it plays anywhere, without a server.")
+        Path | None, typer.Option("--html", help="HTML file to write instead, which plays without a server.")
     ] = None,
     robot: Annotated[
-        str | None, typer.Option("--robot", help="Of a workspace whose robot is not of the library: its file.")
+        str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")
     ] = None,
-    host: Annotated[str, typer.Option(help="Who can look: 127.0.0.1 this machine only.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Where; if it is taken, one that follows; 0: any.")] = 8080,
+    host: Annotated[str, typer.Option(help="Address to listen on; 127.0.0.1: this machine only.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; if it is in use, one of the next; 0: any.")] = 8080,
     as_json: JsonOption = False,
 ) -> None:
-    """Look at a robot and move it, play a plan, or turn a workspace, in the browser (extra viewer)."""
+    """Show a robot with sliders, a plan that plays, or a workspace, in the browser (extra viewer)."""
     import threading
 
     from ..viewer import read, save_page, serve
@@ -41,21 +41,21 @@ def view(
     if html is not None:
         check_writable(html)
     subject = read(target, robot)
-    told = {"kind": subject.kind, "robot": subject.robot.name}
+    summary = {"kind": subject.kind, "robot": subject.robot.name}
     if html is not None:
         written = save_page(subject, html)
         if as_json:
-            print_json({**told, "file": str(written)})
+            print_json({**summary, "file": str(written)})
         else:
             typer.echo(str(written))
         return
     with serve(subject, host, port) as url:
         if as_json:
-            print_json({**told, "url": url})
+            print_json({**summary, "url": url})
         else:
             typer.echo(f"{subject.title}\n{url}   (Ctrl-C ends it)")
         if host not in LOOPBACK:
-            typer.echo("towline: whoever reaches this address can look and move the sliders", err=True)
+            typer.echo("towline: everyone who can reach this address can watch and move the sliders", err=True)
         unlisten()
         try:
             threading.Event().wait()

@@ -18,7 +18,6 @@ from ..models import Robot
 from ..models.parsing import one_line
 from ..models.robot import Part
 from .places import Places
-from .workload import compiled_code, is_decided, worth_compiled_code
 
 __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
 
@@ -49,12 +48,6 @@ class Condition(Part, ABC):
             If an argument has a wrong type or shape, or the condition does not apply to the robot.
         """
         required("places", places, Places).check(required("robot", robot, Robot))
-        if is_decided():
-            return self._holds_where_finite(robot, places)
-        with compiled_code(worth_compiled_code(len(places) * self.problems_per_place(robot))):
-            return self._holds_where_finite(robot, places)
-
-    def _holds_where_finite(self, robot: Robot, places: Places) -> np.ndarray:
         finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
         if finite.all():
             return self._holds(robot, places)
@@ -73,10 +66,6 @@ class Condition(Part, ABC):
         is 1 where the condition does not hold. Numbers of the places must be finite.
         """
         return np.where(self.holds(robot, places), 0.0, 1.0)
-
-    def problems_per_place(self, robot: Robot) -> int:
-        """Return how many tension problems one place takes at most; compiled code is used for many of them."""
-        return 1
 
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return why the condition holds nowhere, or at isolated poses only, whatever the region; None if it may."""
@@ -125,10 +114,6 @@ class AllOf(Condition):
         """Return the sum of the shortfalls x, each as a share of 1: x / (1 + x)."""
         return np.sum([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
 
-    def problems_per_place(self, robot: Robot) -> int:
-        """Return the sum over the conditions."""
-        return sum(one.problems_per_place(robot) for one in self.conditions)
-
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return the reason of the first condition that has one."""
         return next((reason for one in self.conditions if (reason := one.why_nowhere(robot))), None)
@@ -146,10 +131,6 @@ class AnyOf(Condition):
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the smallest of the shortfalls x, as a share of 1: x / (1 + x)."""
         return np.min([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
-
-    def problems_per_place(self, robot: Robot) -> int:
-        """Return the sum over the conditions."""
-        return sum(one.problems_per_place(robot) for one in self.conditions)
 
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return the first reason, if every condition has one."""

@@ -13,7 +13,8 @@ import numpy as np
 from ..models import Robot
 from ..models.batch import compiled
 from ..models.dynamics import dynamics_of
-from ..solvers import BatchSolution, solve_batch
+from ..solvers import compiled as solver_kernels
+from ..solvers import solve_batch
 from .places import Places
 
 __all__ = [
@@ -22,7 +23,6 @@ __all__ = [
     "rest_wrench",
     "scaled",
     "shortfall",
-    "solve_many",
     "too_few_cables",
     "wrench_matrices",
     "wrench_rows",
@@ -32,9 +32,12 @@ PLACES_AT_ONCE = 8192
 
 
 def load_kernels(robot: Robot) -> None:
-    """Load the compiled code for many places of a robot now, or compile it; a script calls it before it takes times."""
+    """Load the compiled code for millions of places of a robot, or compile it if this machine has not done so yet.
+
+    It is never needed: without it, code that takes about ten times as long per place runs until compiling pays.
+    """
     compiled(dynamics_of(robot).functions["wrench_matrix"])
-    feasible(robot, Places.at_home(robot, robot.home), rest_wrench(robot)[None])
+    solver_kernels.load()
 
 
 def rest_wrench(robot: Robot) -> np.ndarray:
@@ -85,7 +88,7 @@ def feasible(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarra
         left = np.arange(len(A))
         for w in required if shared else required[:, part]:
             some = A if left.size == len(A) else A[left]
-            left = left[solve_many(some, w if shared else w[left], robot.t_min, robot.t_max).feasible]
+            left = left[solve_batch(some, w if shared else w[left], robot.t_min, robot.t_max, threads=1).feasible]
             if not left.size:
                 break
         held[part.start + left] = True
@@ -101,17 +104,10 @@ def shortfall(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarr
     largest = np.zeros(len(places))
     for part, A in wrench_matrices(robot, places, rows):
         for w in scaled(robot, wrenches, rows):
-            solved = solve_many(A, w, robot.t_min, robot.t_max)
+            solved = solve_batch(A, w, robot.t_min, robot.t_max, threads=1)
             short = np.where(solved.feasible, 0.0, np.nan_to_num(solved.shortfall, nan=np.inf))
             largest[part] = np.maximum(largest[part], short)
     return largest
-
-
-def solve_many(
-    A: np.ndarray, w: np.ndarray, t_min: np.ndarray | float, t_max: np.ndarray | float, rho: float | None = None
-) -> BatchSolution:
-    """Solve a batch of tension problems with one thread, by compiled code if the whole run is worth it."""
-    return solve_batch(A, w, t_min, t_max, rho=rho, threads=1)
 
 
 def too_few_cables(robot: Robot) -> str | None:

@@ -18,9 +18,9 @@ from .condition import Condition
 from .domain import THINNEST, Domain
 from .feasibility import load_kernels
 from .sampling import Sampler
-from .workload import compiled_code, worth_compiled_code
 
 RESOLUTION = 32  # cells of the counts along each axis
+WORTH_KERNELS = 500_000  # samples of a run: the first kernels on a machine take a minute, saving 20 us a sample
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,6 @@ class RunSettings:
     sampler: Sampler | None
     keep: str
     samples: int
-
-    @property
-    def worth_compiled_code(self) -> bool:
-        """Whether the whole run is large enough for compiled code."""
-        return worth_compiled_code(self.samples * self.condition.problems_per_place(self.robot))
 
     def packed(self) -> bytes:
         """Return the settings as bytes, to be sent to other processes."""
@@ -124,7 +119,7 @@ def evaluate(packed: bytes, job: Job) -> JobResult:
     counts = np.zeros((2, int(np.prod(cells))), dtype=np.uint32)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     sizes, flags, samples, accepted = [], [], [], []
-    with processors.at_most(1), compiled_code(settings.worth_compiled_code):
+    with processors.at_most(1):
         for offset, known in enumerate(job.known):
             units = job.units[offset] if job.units else _sampler(settings).units(job.first + offset)
             places, exists = domain.places(units)
@@ -183,8 +178,8 @@ def _sampler(settings: RunSettings) -> Sampler:
 
 @lru_cache(maxsize=2)
 def _settings(packed: bytes) -> RunSettings:
-    """Unpack once for all jobs of a run, and load the compiled code if the whole run is worth it."""
+    """Unpack once for all jobs of a run, and load the kernels for a large run; the bits do not depend on it."""
     settings: RunSettings = pickle.loads(packed)
-    if settings.worth_compiled_code:
+    if settings.samples >= WORTH_KERNELS:
         load_kernels(settings.robot)
     return settings

@@ -34,10 +34,6 @@ class Dynamic(Condition):
         wrenches = dynamics_of(robot).required_wrench(places.pose, np.zeros(6), accelerations[:, None])
         return feasible(robot, places, wrenches)
 
-    def problems_per_place(self, robot: Robot) -> int:
-        """Return the number of accelerations."""
-        return len(self.accelerations)
-
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return a sentence if the robot has fewer cables than degrees of freedom."""
         return too_few_cables(robot)

@@ -67,10 +67,6 @@ class ExistsPlacement(Condition):
             held[searched] = self._search(robot, mobile, places.only(searched))
         return held
 
-    def problems_per_place(self, robot: Robot) -> int:
-        """Return the number of tries, and one, times that of the condition."""
-        return (self.tries + 1) * self.condition.problems_per_place(robot)
-
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return the reason of the condition."""
         return self.condition.why_nowhere(robot)

@@ -11,9 +11,10 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
+from ...solvers import solve_batch
 from ...solvers.available_wrench import spans
 from ..condition import Condition
-from ..feasibility import solve_many, wrench_matrices, wrench_rows
+from ..feasibility import wrench_matrices, wrench_rows
 from ..places import Places
 
 __all__ = ["WrenchClosure"]
@@ -30,7 +31,7 @@ class WrenchClosure(Condition):
         if robot.m <= rows.size:
             return held
         for part, A in wrench_matrices(robot, places, rows):
-            closed = solve_many(A, np.zeros(rows.size), 1.0, np.inf).feasible
+            closed = solve_batch(A, np.zeros(rows.size), 1.0, np.inf, threads=1).feasible
             closed[closed] = spans(A[closed])
             held[part] = closed
         return held

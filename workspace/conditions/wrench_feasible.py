@@ -61,10 +61,6 @@ class WrenchFeasible(Condition):
         """Return the largest distance of a required wrench from the available ones, moments over length, (n,) [N]."""
         return shortfall(robot, places, self._wrenches(robot))
 
-    def problems_per_place(self, robot: Robot) -> int:
-        """Return the number of vertices."""
-        return len(self._wrenches(robot))
-
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return a sentence if the robot has fewer cables than degrees of freedom."""
         return too_few_cables(robot)

@@ -9,8 +9,9 @@ from pydantic import Field
 
 from ...models import Robot
 from ...models.robot import NonNegative
+from ...solvers import solve_batch
 from ..condition import Condition
-from ..feasibility import rest_wrench, scaled, solve_many, wrench_matrices, wrench_rows
+from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
 from ..places import Places
 
 __all__ = ["WrenchWithTolerance"]
@@ -40,5 +41,5 @@ class WrenchWithTolerance(Condition):
         w = scaled(robot, rest_wrench(robot), rows)
         error = np.empty(len(places))
         for part, A in wrench_matrices(robot, places, rows):
-            error[part] = solve_many(A, w, robot.t_min, robot.t_max, rho=_RHO).residual
+            error[part] = solve_batch(A, w, robot.t_min, robot.t_max, rho=_RHO, threads=1).residual
         return np.nan_to_num(error, nan=np.inf)
