@@ -145,8 +145,8 @@ def test_a_plan_is_shown_as_it_was_saved(folder):
     assert (frames[0], frames[-1]) == (0, len(replay.times) - 1)
     assert np.diff(replay.times[frames]).max() == pytest.approx(0.2, abs=0.051)
     for points in (replay.path, seen.points.anchors):
-        assert (points > replay.room.low - 0.2).all()
-        assert (points < replay.room.high + 0.2).all()
+        assert (points > replay.extent.low - 0.2).all()
+        assert (points < replay.extent.high + 0.2).all()
 
 
 def test_where_a_plan_has_no_tensions_its_audit_and_the_certificate_agree(folder):
@@ -292,9 +292,9 @@ def test_the_command_writes_a_page_and_nothing_else(folder, tmp_path):
 
 
 def test_viser_is_imported_in_one_place_and_when_it_is_used():
-    room = Path(__file__).parent.parent / "viewer"
+    extent = Path(__file__).parent.parent / "viewer"
     importing = []
-    for file in room.glob("*.py"):
+    for file in extent.glob("*.py"):
         tree = ast.parse(file.read_text())
         typing_only = {
             id(node)

@@ -31,7 +31,7 @@ class Points(NamedTuple):
     com: np.ndarray
 
 
-class Room(NamedTuple):
+class Extent(NamedTuple):
     """A box along the axes of {G}, from corner to corner (3,) [m]."""
 
     low: np.ndarray
@@ -43,10 +43,10 @@ class Room(NamedTuple):
         return float(np.linalg.norm(self.high - self.low))
 
     @staticmethod
-    def of(*points: np.ndarray) -> Room:
+    def of(*points: np.ndarray) -> Extent:
         """Return the smallest box around points (..., 3) [m]."""
         every = np.concatenate([some.reshape(-1, 3) for some in points])
-        return Room(every.min(axis=0), every.max(axis=0))
+        return Extent(every.min(axis=0), every.max(axis=0))
 
 
 class Geometry:
@@ -54,14 +54,14 @@ class Geometry:
 
     Attributes
     ----------
-    room
+    extent
         The smallest box around home, anchors and reach boxes.
     """
 
     def __init__(self, robot: Robot):
         self.robot = robot
         low, high = surrounding_box(robot, reach_boxes(robot))
-        self.room = Room.of(low, high, robot.home_anchors, robot.home_attachments, robot.carrier_home[:, :3])
+        self.extent = Extent.of(low, high, robot.home_anchors, robot.home_attachments, robot.carrier_home[:, :3])
 
     def __call__(self, pose: np.ndarray, carrier_pose: np.ndarray) -> Points:
         """Return the points at poses (..., 6) of the platform and (..., c, 6) of the carriers in {G} [m, rad].

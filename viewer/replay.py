@@ -15,7 +15,7 @@ from ..ocp import Task
 from ..ocp.reports.scene import outline
 from ..ocp.tasks.scenario import Scenario, lay_out
 from ..solvers import Certificate, certify
-from .geometry import Geometry, Room
+from .geometry import Extent, Geometry
 from .instant import Instant, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
@@ -66,9 +66,9 @@ class Replay:
         self._points = self.geometry(self._pose, self._carriers)
 
     @property
-    def room(self) -> Room:
+    def extent(self) -> Extent:
         """Return the smallest box around the motion."""
-        return Room.of(self._points.anchors, self._points.attachments, self._carriers[..., :3])
+        return Extent.of(self._points.anchors, self._points.attachments, self._carriers[..., :3])
 
     @property
     def duration(self) -> float:

@@ -11,7 +11,7 @@ from ..models.robot import COORDINATES, MobileCarrier, QuadrotorCarrier
 from .geometry import Geometry
 
 TURN = 1.0  # [rad] to each side of home
-BEYOND = 0.25  # of the robot's room, to each side: also where it cannot be is worth seeing
+BEYOND = 0.25  # of the robot's extent, to each side: also where it cannot be is worth seeing
 TILT = 0.6  # [rad] of carriers that have no limit of their own
 
 
@@ -52,11 +52,11 @@ def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
     found = []
     for coordinate, name in enumerate(COORDINATES):
         if name in robot.platform.dof:
-            at, room = home[coordinate], geometry.room
+            at, extent = home[coordinate], geometry.extent
             low, high = at - TURN, at + TURN
             if coordinate < 3:
-                beyond = BEYOND * (room.high - room.low)[coordinate]
-                low, high = room.low[coordinate] - beyond, room.high[coordinate] + beyond
+                beyond = BEYOND * (extent.high - extent.low)[coordinate]
+                low, high = extent.low[coordinate] - beyond, extent.high[coordinate] + beyond
             found.append(_slider(None, coordinate, low, high, at))
     for index, carrier in enumerate(robot.carriers):
         if isinstance(carrier, MobileCarrier):
@@ -65,7 +65,7 @@ def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
                 found += [_slider(index, k, low, high, carrier.home[k]) for k, (low, high) in enumerate(ends)]
         elif carrier.kind != "ground":
             tilt = carrier.tilt_max if isinstance(carrier, QuadrotorCarrier) else TILT
-            spans = [geometry.room.size / 2] * 3 + [tilt, tilt, TURN]
+            spans = [geometry.extent.size / 2] * 3 + [tilt, tilt, TURN]
             found += [_slider(index, k, at - spans[k], at + spans[k], at) for k, at in enumerate(carrier.home)]
     return [slider for slider in found if slider.high > slider.low]
 

@@ -50,8 +50,8 @@ class Stage:
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
         self._scene = server.scene
         self._robot = subject.robot
-        self._room = room = subject.replay.room if subject.replay else geometry.room
-        self._size, self._centre = room.size, (room.low + room.high) / 2
+        self._extent = extent = subject.replay.extent if subject.replay else geometry.extent
+        self._size, self._centre = extent.size, (extent.low + extent.high) / 2
         self._look(server)
         self._draw_surroundings(subject)
         self._make_actors(captioned)
@@ -125,7 +125,7 @@ class Stage:
         scene.configure_default_lights(cast_shadow=False)
         width = 2 * cell * np.ceil(self._size / cell)
         # A little below, where no platform lies in it.
-        floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._room.low[2] - 0.03 * self._size])
+        floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._extent.low[2] - 0.03 * self._size])
         scene.add_grid(
             "/grid",
             width=width,
@@ -209,7 +209,7 @@ class Stage:
             visible=False,
         )
         self._short = scene.add_label("/shortfall", "", anchor="bottom-center", visible=False)
-        above = np.array([*self._centre[:2], self._room.high[2] + 0.12 * size])
+        above = np.array([*self._centre[:2], self._extent.high[2] + 0.12 * size])
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
     def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
