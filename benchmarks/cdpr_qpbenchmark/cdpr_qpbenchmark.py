@@ -23,7 +23,7 @@ RUNTIME = 0.01
 if find_spec("towline") is not None:
     from towline.benchmarks.qp_solver import register
 
-    register()  # before the class is built, which asks qpsolvers what there is
+    register()  # before the class is built, which reads the list of qpsolvers
 
 
 class CdprQpbenchmark(qpbenchmark.ParquetTestSet):
@@ -61,7 +61,7 @@ class CdprQpbenchmark(qpbenchmark.ParquetTestSet):
         super().define_tolerances(runtime=runtime)
 
     def define_solver_settings(self) -> None:
-        """Tell towline, if it takes part, the same tolerances as the other solvers."""
+        """Give towline, if it takes part, the same tolerances as the other solvers."""
         super().define_solver_settings()
         if "towline" in self.solvers:
             for accuracy in ("low_accuracy", "mid_accuracy", "high_accuracy"):

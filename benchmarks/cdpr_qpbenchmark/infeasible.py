@@ -1,9 +1,9 @@
-"""Who notices that a QP has no solution: qpbenchmark scores solvable ones only, so this set is apart.
+"""Count which solvers detect that a QP has no solution; qpbenchmark itself scores solvable QPs only.
 
     python infeasible.py [--settings high_accuracy]
 
 Runs every solver of the test set on `data/cdpr_infeasible.parquet` and writes `results/cdpr_infeasible.md`. A solver is
-right if it returns without a solution. Why it does is not asked: an iteration limit counts as well as a proof.
+right if it returns without a solution, for whatever reason: an iteration limit counts as well as a proof.
 """
 
 import argparse
@@ -26,7 +26,7 @@ class CdprInfeasible(CdprQpbenchmark):
 
 
 def measure(test_set: qpbenchmark.TestSet, settings: str) -> list[tuple[str, int, int, float, float]]:
-    """Solver, how many it got right, of how many, median and longest time [us]."""
+    """Return for each solver: how many it got right, of how many, median and longest time [us]."""
     problems = list(test_set)
     rows = []
     for solver in sorted(test_set.solvers):
