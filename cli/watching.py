@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -22,11 +23,11 @@ class Watch:
         Counts the runs of the solver: another one begins where the iteration falls back.
     """
 
-    def __init__(self, shown: Progress, what: str):
+    def __init__(self, shown: Progress | None, what: str):
         self.rows: list[tuple[int, float, float]] = []
         self.attempt = 1
         self._shown = shown
-        self._line: TaskID = shown.add_task(what, told="preparing", total=None)
+        self._line: TaskID | None = None if shown is None else shown.add_task(what, told="preparing", total=None)
 
     def __call__(self, iteration: int, objective: float, infeasibility: float) -> None:
         """Show one iteration."""
@@ -35,11 +36,15 @@ class Watch:
         self.rows.append((iteration, objective, infeasibility))
         told = f"attempt {self.attempt}  iteration {iteration:<3}  "
         told += f"objective {objective:<9.4g}  infeasibility {infeasibility:.1e}"
-        self._shown.update(self._line, told=told)
+        self._update(told=told)
 
     def now(self, what: str) -> None:
         """Say what is done next, without iterations."""
-        self._shown.update(self._line, description=what, told="")
+        self._update(description=what, told="")
+
+    def _update(self, **shown: str) -> None:
+        if self._shown is not None and self._line is not None:
+            self._shown.update(self._line, **shown)
 
 
 @contextmanager
@@ -55,6 +60,10 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
     console
         Where to; None: standard error.
     """
+    # Rich takes longer to load than a short plan to compute.
+    if quiet or (console is None and not sys.stderr.isatty()):
+        yield Watch(None, what)
+        return
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -64,5 +73,5 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
         TextColumn("{task.description}\n{task.fields[told]}", markup=False),  # together too wide for 80 columns
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
+    with Progress(*columns, console=to, transient=True, disable=not to.is_terminal) as shown:
         yield Watch(shown, what)

@@ -14,7 +14,6 @@ from itertools import product
 
 import casadi as ca
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from ..tasks.named_limits import NamedLimits, named_limits
 from ..tasks.path import Motion
@@ -79,6 +78,8 @@ def clear_formation(scenario: Scenario) -> Formation | None:
     shape = np.stack([np.interp(finer, shares, column) for column in shape.T], axis=1)
     for attempt in range(1, 1 + REFINEMENTS):
         shape = _best(scenario, references, beyond, _tried(shape, span, attempt), span)
+    from scipy.ndimage import gaussian_filter1d  # loads for longer than a plan takes that does not need it
+
     return Formation(scenario, finer, gaussian_filter1d(shape, PLACES / 60, axis=0, mode="nearest"))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...models.robot import QuadrotorCarrier
 from ..tasks.scenario import POSITION, Deviation, Scenario
@@ -64,6 +63,8 @@ def _in_formation(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], node
 
 def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
     """Cubic splines through q (n, count) at `nodes`: at rest at the ends where the task says so."""
+    from scipy.interpolate import CubicSpline  # loads for longer than a plan takes that does not need it
+
     ends = scenario.task.tube.ends, getattr(scenario.task.base, "ends", "free")
     v, a = np.zeros_like(q), np.zeros_like(q)
     for column, (owner, _) in enumerate(scenario.owners()):
