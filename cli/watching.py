@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,7 +42,7 @@ class Watch:
         """Say what is done next, without iterations."""
         self._update(description=what, told="")
 
-    def _update(self, **shown: str) -> None:
+    def _update(self, **shown: Any) -> None:
         if self._shown is not None and self._line is not None:
             self._shown.update(self._line, **shown)
 
