@@ -4,7 +4,7 @@ from .planner import Planner, plan
 from .result import Plan
 from .status import MotionStatus
 from .tasks.task import Task, read_task
-from .timing.timing import Timing, TimingStatus, time_along
+from .timing.timing import Timing, time_along
 
 __all__ = [
     "MotionStatus",
@@ -12,7 +12,6 @@ __all__ = [
     "Planner",
     "Task",
     "Timing",
-    "TimingStatus",
     "plan",
     "read_task",
     "time_along",

@@ -15,7 +15,10 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from ..errors import InputError
+from ..inputs import shown
 from ..models import Robot
+from ..models.files import as_robot
 from .audits.audit import certified_at_rest, other_tensions_may_pass
 from .cost import cost
 from .durations import Durations, durations
@@ -45,7 +48,7 @@ LONGEST = 100.0  # times the duration that was asked: a longer one is no help
 
 
 def plan(
-    robot: Robot,
+    robot: Robot | str | os.PathLike[str],
     task: Task | dict[str, Any] | str | os.PathLike[str],
     progress: Progress | None = None,
     start: Plan | Timing | AnyPath | dict[str, Any] | None = None,
@@ -62,7 +65,7 @@ def plan(
     Parameters
     ----------
     robot
-        From `towline.models.load`.
+        A `Robot`, the name of one in the library, or the path of a robot file.
     task
         A `Task`, a mapping with its keys, or the path of a YAML file.
     progress
@@ -103,14 +106,17 @@ class Planner:
         As `plan` does.
     """
 
-    def __init__(self, robot: Robot, task: Task | dict[str, Any] | str | os.PathLike[str]):
-        self.scenario = lay_out(robot, read_task(task))
+    def __init__(self, robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str]):
+        self.scenario = lay_out(as_robot(robot), read_task(task))
         self._solvers: dict[Mesh, Solver] = {}
 
     def plan(
         self, progress: Progress | None = None, start: Plan | Timing | AnyPath | dict[str, Any] | None = None
     ) -> Plan:
         """Plan; from `start`, else from the last solution, else from a guess."""
+        if progress is not None and not callable(progress):
+            accepted = "a function of (iteration, objective, infeasibility)"
+            raise InputError(f"progress must be {accepted}, got {shown(progress)}")
         search = Search(self.scenario, self._solvers, progress)
         guess = None if start is None else deviation_from(self.scenario, start)
         return replace(_climb(search, guess), stages=tuple(search.stages))

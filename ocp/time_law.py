@@ -12,7 +12,9 @@ import numpy as np
 from ..errors import InputError, SolverError
 from .tasks.path import AnyPath, LinePath, RestPath, WaypointPath
 from .tasks.scenario import Scenario
-from .timing.timing import Timing, time_along
+from .tasks.task import Tube
+from .tasks.task_limits import TaskLimits
+from .timing.timing import KNOWN_LIMITS, Timing, time_along
 
 __all__ = ["BOUND", "fastest"]
 
@@ -35,19 +37,10 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
     path = _curve(task.path)
     if path is None:
         return None, f"not asked: a path of kind {task.path.kind} with times or speeds of its own at its ends"
-    hard = {name: getattr(task.limits, name) for name in ("platform_speed", "cable_speed")}
-    hard = {name: None if name in task.limits.soft else value for name, value in hard.items()}
-    names = [carrier.name for carrier in scenario.robot.carriers]
+    hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
+    alone = {"path": path, "limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}
     try:
-        timing = time_along(
-            scenario.robot,
-            path,
-            margin=scenario.hard_margin,
-            carriers={names[index]: its for index, its in scenario.carrier_paths.items()},
-            speed_max=hard["platform_speed"],
-            cable_speed_max=hard["cable_speed"],
-            wind=scenario.wind,
-        )
+        timing = time_along(scenario.robot, task.model_copy(update=alone))
     except (InputError, SolverError) as error:
         return None, f"not asked: {str(error).removeprefix('time_along: ')}"
     if timing.feasible:

@@ -553,6 +553,17 @@ def test_tasks_that_do_not_fit_the_robot():
         plan(load("ipanema-1"), {"path": CIRCLE, "base": {"kind": "given", "paths": {"frame": CIRCLE}}})
 
 
+def test_robots_are_loaded_by_name_and_wrong_types_are_one_line():
+    task = {"path": {"kind": "line", "start": [0, 0, -1], "end": [0, 0, -1.1]}, "duration": 1}
+    assert plan("wang-flying", task).feasible
+    for arguments in ((7, task), ("no-such-robot", task), ("wang-flying", 7), ("wang-flying", task, 7)):
+        with pytest.raises(InputError) as error:
+            plan(*arguments)
+        assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="start"):
+        plan("wang-flying", task, start=7)
+
+
 def test_task_files(tmp_path):
     task = Task.model_validate({"path": CIRCLE, "base": FREE})
     file = tmp_path / "circle.yaml"

@@ -179,7 +179,7 @@ class TestTiming:
             plan(robot, {"path": LINE, "duration": {"min": 0.1, "max": 4}, "margin": 20, "objective": {"time": time}})
             for time in (1e-3, 1.0)
         )
-        timing = time_along(robot, LINE, margin=20)
+        timing = time_along(robot, {"path": LINE, "margin": 20})
         assert fast.scenario.duration == pytest.approx(timing.duration)
         assert easy.scenario.duration > fast.scenario.duration
         assert "timing" in names(easy)
@@ -217,7 +217,7 @@ class TestTiming:
     def test_a_timing_is_a_start(self):
         """In the program's coordinates it is the very motion."""
         robot = load("cogiro")
-        timing = time_along(robot, LINE, margin=20, speed_max=1.0)
+        timing = time_along(robot, {"path": LINE, "margin": 20, "limits": {"platform_speed": 1.0}})
         task = {"path": LINE, "duration": {"min": 0.1, "max": 9}, "tube": TUBE, "steps": 60}
         given = scenario(robot, **task)
         start = deviation_from(given, timing)

@@ -269,7 +269,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         relative=relative,
         platform_free=platform_free,
         carrier_free=_free_carriers(robot, task.base, where),
-        limits=_limits(robot, task.base),
+        limits=_limits(robot, task),
         carrier_paths=_carrier_paths(robot, task.base, where),
         duration=task.seconds,
     )
@@ -405,13 +405,15 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
     return free
 
 
-def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, CarrierLimits]:
-    """Return limits of carriers by index: always the robot's own, and the task's for a free base."""
+def _limits(robot: Robot, task: Task) -> dict[int, CarrierLimits]:
+    """Return limits of carriers by index: those of the robot's file, and those of the task."""
     limits = {}
-    free = base if isinstance(base, FreeBase) else None
+    free, speed, acceleration = None, task.limits.carrier_speed, task.limits.carrier_acceleration
+    if isinstance(task.base, FreeBase):
+        free = task.base
+        speed, acceleration = _tighter(speed, free.speed_max), _tighter(acceleration, free.acceleration_max)
+    limited = free is not None or speed is not None or acceleration is not None
     for index, carrier in enumerate(robot.carriers):
-        acceleration = free.acceleration_max if free else None
-        speed = free.speed_max if free else None
         if isinstance(carrier, MobileCarrier):
             limits[index] = CarrierLimits(
                 acceleration=_tighter(acceleration, carrier.acceleration_max),
@@ -432,21 +434,21 @@ def _limits(robot: Robot, base: HoldBase | GivenBase | FreeBase) -> dict[int, Ca
                 turn_acceleration=free.turn_acceleration_max if free else None,
                 attitude=None,
             )
-        elif free and carrier.kind == "prescribed":
+        elif limited and carrier.kind == "prescribed":
             limits[index] = CarrierLimits(
                 acceleration=acceleration,
                 speed=speed,
                 low=np.full(3, -np.inf),
                 high=np.full(3, np.inf),
-                tilt=free.tilt_max or None,
-                turn_acceleration=free.turn_acceleration_max,
+                tilt=free.tilt_max or None if free else None,
+                turn_acceleration=free.turn_acceleration_max if free else None,
                 attitude=None,
             )
     return limits
 
 
-def _tighter(first: float | None, second: float) -> float:
-    return second if first is None else min(first, second)
+def _tighter(*bounds: float | None) -> float | None:
+    return min((bound for bound in bounds if bound is not None), default=None)
 
 
 def _pose_in(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:

@@ -90,6 +90,12 @@ class TaskLimits(Part):
     platform_box: Box | None = Field(
         default=None, description="box in {G} in which the platform frame's origin stays [m]"
     )
+    carrier_speed: Positive | None = Field(
+        default=None, description="speed of every carrier that moves, beside the robot file's [m/s]"
+    )
+    carrier_acceleration: Positive | None = Field(
+        default=None, description="acceleration of every carrier that moves, beside the robot file's [m/s^2]"
+    )
     cable_clearance: Positive | None = Field(
         default=None, description="least distance of cables that share neither anchor nor attachment [m]"
     )
@@ -103,7 +109,8 @@ class TaskLimits(Part):
 
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
-        given = [name for name in type(self).model_fields if name not in ("soft", "keep_out") and getattr(self, name)]
+        apart = ("soft", "keep_out", *OF_CARRIERS)
+        given = [name for name in type(self).model_fields if name not in apart and getattr(self, name)]
         frames = {place.frame for place in self.keep_out}
         given += ["keep_out"] * ("world" in frames) + list(OF_BODY) * ("platform" in frames)
         for name in self.soft:

@@ -9,30 +9,33 @@ exact tension solver; what it misses between the grid points a finer grid and a 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from ...distribution import wrench_problem
 from ...errors import InputError, SolverError
+from ...inputs import whole_number
 from ...models import Robot
-from ...models.parsing import to_yaml, validate
-from ...models.robot import MobileCarrier, Name, NonNegative, Part, Positive, Vector3
+from ...models.files import as_robot
+from ...models.parsing import to_yaml
+from ...models.robot import MobileCarrier
 from ...solvers import Certificate, TensionProblem, certify, solve_batch
 from ...writing import whole_file
-from ..tasks.path import AnyPath, Curve, LinePath, Motion, SamplePath, TimedPath, WaypointPath
+from ..status import MotionStatus
+from ..tasks.path import AnyPath, CirclePath, Curve, LinePath, Motion, RestPath, SamplePath, TimedPath, WaypointPath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
-from ..tasks.task import GivenBase, HoldBase, Task
+from ..tasks.task import FreeBase, GivenBase, HoldBase, Task, read_task
+from ..tasks.task_limits import TaskLimits
+from ..tasks.wind_set import WindBox
 from .bottlenecks import Bottleneck, bottlenecks
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import phase_plane, proofs
 
+KNOWN_LIMITS = ("platform_speed", "cable_speed", "carrier_speed", "carrier_acceleration")
 TOLERANCE = 1e-6  # [N], as the audit of plans has it
 LIMIT_TOLERANCE = 1e-6  # relative, of the other limits, likewise
 ATTEMPTS = 8
@@ -42,21 +45,6 @@ RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 COARSE = 1e-4  # of the weight or of a limit: what misses more needs a finer grid, what misses less some distance
 
 
-class TimingStatus(StrEnum):
-    """What a timing is; its values are plain strings."""
-
-    FEASIBLE = "feasible"
-    """The audit saw no violation anywhere."""
-
-    INFEASIBLE = "infeasible"
-    """At `Timing.at` no tensions inside their limits give the wrench that the path needs, proven by the certificate:
-    whatever the speed inside its limits and the acceleration, or, at the ends, for the platform to rest there."""
-
-    NOT_FOUND = "not-found"
-    """Every place of the grid allows some speed, but no law was found that joins them, or none that the audit passes;
-    `Timing.at` is where the search ended or the audit saw most."""
-
-
 @dataclass(frozen=True, eq=False)
 class Timing:
     """The fastest time law along a path, or where along the path there is none.
@@ -64,7 +52,9 @@ class Timing:
     Attributes
     ----------
     status
-        See `TimingStatus`.
+        See `MotionStatus`. Infeasible: at `at` no tensions inside their limits give the wrench that the path needs,
+        whatever the speed and acceleration; at the ends, for the platform to rest there. Not found: every place of the
+        grid allows some speed, but no law joins them, or none that passes the audit.
     parametrised
         The robot and the geometry that was timed.
     limits
@@ -90,7 +80,7 @@ class Timing:
         All grid points s at which there is such a proof.
     """
 
-    status: TimingStatus
+    status: MotionStatus
     parametrised: ParametrisedPath = field(repr=False)
     limits: PathLimits = field(repr=False)
     margin: float
@@ -106,7 +96,7 @@ class Timing:
     @property
     def feasible(self) -> bool:
         """Whether there is a law and its audit saw no violation."""
-        return self.status is TimingStatus.FEASIBLE
+        return self.status is MotionStatus.FEASIBLE
 
     @property
     def duration(self) -> float | None:
@@ -217,123 +207,93 @@ class Timing:
 
 
 def time_along(
-    robot: Robot,
-    path: AnyPath | dict[str, Any],
+    robot: Robot | str | os.PathLike[str],
+    task: Task | dict[str, Any] | str | os.PathLike[str],
     *,
-    margin: float = 0.0,
-    carriers: Mapping[str, AnyPath | dict[str, Any]] | None = None,
     grid: int = 200,
-    until: float | None = None,
-    speed_max: float | None = None,
-    cable_speed_max: float | Sequence[float] | np.ndarray | None = None,
-    carrier_speed_max: float | None = None,
-    carrier_acceleration_max: float | None = None,
-    wind: tuple[float, float, float] | None = None,
 ) -> Timing:
-    """Find the fastest motion along a given path, from rest to lasting rest, with every tension inside its limits.
+    """Find the fastest motion along a task's path, from rest to lasting rest, with every tension inside its limits.
 
-    Of the path only the geometry counts: lines and waypoints are taken as uniform, so that they rest nowhere; samples
-    are waypoints unless carriers move with them. The tension limits are the facets of the available wrench set, the
-    law is that of TOPP-RA (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on
-    reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there.
-    The extra `timing` installs it.
+    Only the geometry of the path counts: lines and waypoints are taken as uniform, so that they rest nowhere; samples
+    are waypoints unless carriers move with them. Circles end after the task's duration by their own rate, or after one
+    turn; any other duration is ignored. Carriers rest or follow given paths, walked with the same s as the platform's.
 
-    Where A has fewer independent columns than the platform has degrees of freedom the needed wrench must lie in their
-    span whatever the speed, as when two cables move a point mass in their plane; another path is refused.
+    Of the task's limits those named in `KNOWN_LIMITS` hold, and the robot file's of mobile carriers that move. The
+    tension limits, less the task's margin, are the facets of the available wrench set. The time law is that of TOPP-RA
+    (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE
+    T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
 
     Parameters
     ----------
     robot
-        From `towline.models.load`, with carriers of kind ground, prescribed or mobile.
-    path
-        Of the platform, in {G} or in the frame of the only carrier: a path or a mapping with its keys.
-    margin
-        Every tension stays this far inside its limits [N].
-    carriers
-        Paths in {G} by carrier, walked with the same s as the platform's; the others stay at home. The speed and
-        acceleration limits of mobile carriers hold. Motions that are functions of time are not supported: the limits
-        would depend on when the platform comes by.
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    task
+        A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
     grid
-        Intervals to start with; the audit may double them.
-    until
-        When circles end by their own time [s]; None: after one turn.
-    speed_max
-        Of the platform frame [m/s].
-    cable_speed_max
-        Of the lengths, as winches have it, one for all or (m,) [m/s].
-    carrier_speed_max, carrier_acceleration_max
-        Of each carrier that moves, beside those of the robot's file [m/s, m/s^2].
-    wind
-        None: no air; zeros: still air, with the drag of the motion.
+        Intervals to start with, from 10 to `MOST_INTERVALS`; the audit may double them.
 
     Returns
     -------
     Timing
-        Feasible only if the audit at 1 kHz sees no tension beyond its limits by more than 1e-6 N, and no other limit.
+        Feasible only if in the audit at 1 kHz no tension exceeds its limits by more than 1e-6 N, and no other limit is
+        exceeded.
 
     Raises
     ------
     InputError
-        If an argument is not valid or does not fit the robot, or nothing limits the speed; in one line.
+        If an argument is not valid, the task does not fit the robot or requires what a time law along a path cannot
+        do, or nothing limits the speed; in one line.
     SolverError
-        If toppra is not installed; the message says how to install it.
+        If toppra is not installed; the message contains the command that installs it.
     """
-    request = validate(
-        {
-            "path": path,
-            "margin": margin,
-            "carriers": {} if carriers is None else carriers,
-            "grid": grid,
-            "until": until,
-            "speed_max": speed_max,
-            "cable_speed_max": cable_speed_max.tolist() if isinstance(cable_speed_max, np.ndarray) else cable_speed_max,
-            "carrier_speed_max": carrier_speed_max,
-            "carrier_acceleration_max": carrier_acceleration_max,
-            "wind": wind,
-        },
-        _Request,
-        "time_along",
-    )
-    _check(robot, request)
-    moving = {name: _curve(its, alone=False) for name, its in request.carriers.items()}
-    still_air = None if request.wind is None else np.zeros(3)
-    parametrised = ParametrisedPath(robot, _curve(request.path, alone=not moving), moving, request.until, still_air)
-    return _search(parametrised, _limits(parametrised, request), request.margin, request.grid)
+    robot, task = as_robot(robot), read_task(task)
+    grid = whole_number("time_along: grid", grid, 10, MOST_INTERVALS)
+    _check(robot, task)
+    paths = {} if isinstance(task.base, FreeBase) else _carrier_paths(task.base)
+    moving = {name: _curve(its, alone=False) for name, its in paths.items()}
+    until = task.duration if isinstance(task.path, CirclePath) and isinstance(task.duration, float) else None
+    still_air = None if task.wind is None else np.zeros(3)
+    parametrised = ParametrisedPath(robot, _curve(task.path, alone=not moving), moving, until, still_air)
+    return _search(parametrised, _limits(parametrised, task.limits), task.margin, grid)
 
 
-class _Request(Part):
-    """The arguments of `time_along`, checked as those of a task are."""
+def _check(robot: Robot, task: Task) -> None:
+    """Refuse a task that does not fit the robot, or that requires more than a time law along its path.
 
-    path: AnyPath
-    margin: NonNegative
-    carriers: dict[Name, AnyPath]
-    grid: int = Field(ge=10, le=MOST_INTERVALS)
-    until: Positive | None
-    speed_max: Positive | None
-    cable_speed_max: Positive | tuple[Positive, ...] | None
-    carrier_speed_max: Positive | None
-    carrier_acceleration_max: Positive | None
-    wind: Vector3 | None
-
-
-def _check(robot: Robot, request: _Request) -> None:
-    """Refuse what is a number but does not fit the robot."""
-    for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
-        if low + request.margin > high - request.margin:
+    Raises
+    ------
+    InputError
+        Naming the field and what is accepted.
+    """
+    where = f"task {task.name!r}"
+    if isinstance(task.base, FreeBase):
+        raise InputError(f"{where}: base.kind must be hold or given to time a path, got 'free'")
+    if task.tube.radius or task.tube.turn:
+        raise InputError(f"{where}: tube must be left out to time a path, which is then followed exactly")
+    for name in type(task.limits).model_fields:
+        if name not in (*KNOWN_LIMITS, "soft") and getattr(task.limits, name):
             raise InputError(
-                f"time_along: margin: {request.margin:g} N leaves nothing of the limits of cable {index + 1}, {low:g} "
-                f"N to {high:g} N; accepted: at most {(high - low) / 2:g} N"
+                f"{where}: limits.{name} cannot be kept by a time law; accepted: {', '.join(KNOWN_LIMITS)}"
             )
-    if request.wind is not None and any(request.wind):
-        raise InputError(
-            "time_along: wind: in moving air the drag is no multiple of the speed's square; accepted: None, or zeros "
-            "for still air"
-        )
-    if request.wind is not None and robot.platform.aero is None:
-        raise InputError(f"time_along: wind: robot {robot.name!r} has no platform.aero; accepted: None")
-    speeds = request.cable_speed_max
-    if isinstance(speeds, tuple) and len(speeds) != robot.m:
-        raise InputError(f"time_along: cable_speed_max: has {len(speeds)} items; accepted: one number, or {robot.m}")
+    if task.limits.soft:
+        raise InputError(f"{where}: limits.soft must be left out to time a path, whose limits are all hard")
+    if isinstance(task.wind, WindBox) or (task.wind is not None and any(task.wind)):
+        raise InputError(f"{where}: wind must be [0, 0, 0], still air, or left out to time a path")
+    if task.wind is not None and robot.platform.aero is None:
+        raise InputError(f"{where}: wind must be left out, since robot {robot.name!r} has no platform.aero")
+    for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
+        if low + task.margin > high - task.margin:
+            raise InputError(
+                f"{where}: margin must be at most {(high - low) / 2:g} N, half of what the limits of cable {index + 1} "
+                f"are apart, {low:g} N and {high:g} N, got {task.margin:g} N"
+            )
+
+
+def _carrier_paths(base: HoldBase | GivenBase) -> dict[str, AnyPath]:
+    """Return the paths of the carriers by name; the others stay at home."""
+    if isinstance(base, GivenBase):
+        return base.paths
+    return {name: RestPath(kind="rest", pose=pose) for name, pose in base.poses.items()}
 
 
 def _curve(path: AnyPath, *, alone: bool) -> Curve:
@@ -347,17 +307,17 @@ def _curve(path: AnyPath, *, alone: bool) -> Curve:
     return path
 
 
-def _limits(parametrised: ParametrisedPath, request: _Request) -> PathLimits:
-    """The limits of the request and those of the mobile carriers that move."""
-    speed = {index: request.carrier_speed_max or np.inf for index in parametrised.moving}
-    acceleration = {index: request.carrier_acceleration_max or np.inf for index in parametrised.moving}
+def _limits(parametrised: ParametrisedPath, limits: TaskLimits) -> PathLimits:
+    """Return the limits of the task and those of the mobile carriers that move."""
+    speed = dict.fromkeys(parametrised.moving, limits.carrier_speed or np.inf)
+    acceleration = dict.fromkeys(parametrised.moving, limits.carrier_acceleration or np.inf)
     for index in parametrised.moving:
         carrier = parametrised.robot.carriers[index]
         if isinstance(carrier, MobileCarrier):
             speed[index] = min(speed[index], carrier.speed_max)
             acceleration[index] = min(acceleration[index], carrier.acceleration_max)
-    of_cables = np.full(parametrised.robot.m, np.inf if request.cable_speed_max is None else request.cable_speed_max)
-    return PathLimits(request.speed_max or np.inf, of_cables, speed, acceleration)
+    of_cables = np.full(parametrised.robot.m, limits.cable_speed or np.inf)
+    return PathLimits(limits.platform_speed or np.inf, of_cables, speed, acceleration)
 
 
 def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, intervals: int) -> Timing:
@@ -365,7 +325,7 @@ def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, i
     fastest, Rows = _toppra()
     weight = parametrised.robot.force_scale
     reserve, shrink, failures = RESERVE * weight, 0.0, 0
-    found = _without_law(TimingStatus.NOT_FOUND, parametrised, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
+    found = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
     for _ in range(ATTEMPTS):
         s = np.linspace(0, 1, intervals + 1)
         plane = phase_plane(parametrised, limits, s, margin + reserve, shrink)
@@ -376,25 +336,25 @@ def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, i
                 worst = max(proven, key=lambda proof: proof.certificate.shortfall)
                 told = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
                 blocked = np.array([proof.s for proof in proven])
-                return _without_law(TimingStatus.INFEASIBLE, parametrised, limits, margin, s, blocked=blocked, **told)
+                return _without_law(MotionStatus.INFEASIBLE, parametrised, limits, margin, s, blocked=blocked, **told)
         if law.unlimited:
             raise InputError(
                 "time_along: nothing limits the speed along this path; accepted: a path on which the platform's "
                 "motion takes tension, or limits of speed"
             )
         if law.x is None:
-            found = _without_law(TimingStatus.NOT_FOUND, parametrised, limits, margin, s, at=float(s[law.stuck or 0]))
+            found = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, s, at=float(s[law.stuck or 0]))
             failures += 1
             if failures > FINER_TRIES:
                 return found
             intervals = min(2 * intervals, MOST_INTERVALS)
             continue
         sd, sdd = np.sqrt(law.x), np.diff(law.x) / (2 * np.diff(s))
-        found = Timing(TimingStatus.FEASIBLE, parametrised, limits, margin, s, sd, sdd)
+        found = Timing(MotionStatus.FEASIBLE, parametrised, limits, margin, s, sd, sdd)
         missing, excess, at = _audit(found, limits)
         if missing <= TOLERANCE and excess <= LIMIT_TOLERANCE:
             return replace(found, violation=missing)
-        found = replace(found, status=TimingStatus.NOT_FOUND, violation=missing, at=at)
+        found = replace(found, status=MotionStatus.NOT_FOUND, violation=missing, at=at)
         if missing > COARSE * weight or excess > COARSE:
             intervals = min(2 * intervals, MOST_INTERVALS)
         reserve += 2 * missing if missing > TOLERANCE else 0.0
@@ -403,7 +363,7 @@ def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, i
 
 
 def _without_law(
-    status: TimingStatus, parametrised: ParametrisedPath, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
+    status: MotionStatus, parametrised: ParametrisedPath, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
 ) -> Timing:
     return Timing(status, parametrised, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
 
