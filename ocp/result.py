@@ -159,7 +159,7 @@ class Plan:
         return [style.save(drawn, Path(folder) / f"{name}.png") for name, drawn in self.figures().items()]
 
     def figures(self) -> dict[str, Figure]:
-        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook, say.
+        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.
 
         A figure without content is left out, as in `plot`.
         """

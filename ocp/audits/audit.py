@@ -98,7 +98,7 @@ def _number(value: float) -> float | None:
 
 
 def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
-    """Audit the motion of `deviation` (None: the references alone) at `AUDIT_RATE` or more.
+    """Audit the motion of `deviation`, or that of the references alone, at `AUDIT_RATE` or more.
 
     Raises
     ------

@@ -63,7 +63,7 @@ class Distribution:
         self._inverse = np.linalg.pinv(self._scaled_A, rcond=INDEPENDENT if few else 1e-9)
 
     def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
-        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m); None: near zero."""
+        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
         scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
         robot, (low, high) = scenario.robot, scenario.bounds()
         scaled_A, scaled_w = self._scaled_A, scaled(scenario, w)

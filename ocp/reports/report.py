@@ -192,9 +192,9 @@ def _tensions(plan: Plan) -> list[Fact]:
 def _motion(plan: Plan) -> list[Fact]:
     task, audit = plan.scenario.task, plan.audit
     worst = int(audit.tracking_error.argmax())
-    error = f"{_millimetres(plan.tracking_error_max)} at most"
+    error = _millimetres(plan.tracking_error_max)
     if not error.startswith("0 "):
-        error += f", at t = {audit.times[worst]:.3f} s"
+        error += f" at most, at t = {audit.times[worst]:.3f} s"
     speed, acceleration = (
         np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )

@@ -50,7 +50,7 @@ class PathBase(Part):
 
     @property
     def natural_duration(self) -> float | None:
-        """Return the duration by the path's own numbers [s]; None: the task gives it."""
+        """Return the duration by the path's own numbers [s], or None if the task gives it."""
         return None
 
     @property
@@ -65,7 +65,7 @@ class PathBase(Part):
     def by_fraction(self, s: np.ndarray, until: float | None = None) -> Motion:
         """Return pose and derivatives by s, the fraction of the path's own time, from 0 to 1.
 
-        `until` is the end of the path by its own time [s]; None: its natural duration, or 1 s.
+        `until` is the end of the path by its own time [s]; default: its natural duration, or 1 s.
         """
         whole = until or self.natural_duration or 1.0
         motion = self.at(np.asarray(s) * whole, whole)

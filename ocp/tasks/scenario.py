@@ -130,7 +130,7 @@ class Scenario:
 
     @property
     def wind(self) -> Vector3 | None:
-        """Return the wind of the planned tensions in {G} [m/s], of a box its middle; None: no air."""
+        """Return the wind of the planned tensions in {G} [m/s], of a box its middle, or None without air."""
         return self.task.wind.middle if isinstance(self.task.wind, WindBox) else self.task.wind
 
     @property
@@ -213,9 +213,9 @@ class Scenario:
 
     def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
         """Return the offset of the platform at `motion` in {G} from its path, (n, 6) [m, rad], in the path's axes."""
-        wanted = self.path.at(times, self.duration).pose
+        on_path = self.path.at(times, self.duration).pose
         pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
-        off = pose - wanted
+        off = pose - on_path
         off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
         return off
 

@@ -9,9 +9,9 @@ and speed at the nodes are no approximation. Schemes differ in two choices only:
     gauss      acceleration quadratic, jumps at the nodes; balance at the three Gauss points of each interval
     spline     acceleration a cubic B-spline, twice continuously differentiable; balance at the nodes
 
-A robot with enough cables has tensions between those points too, wherever its limits leave room; one with few has them
-only as exactly as the polynomial follows the motion that it can make. There the order counts: two balances an interval
-with a quadratic miss far less than one with a line.
+A robot with enough cables has tensions between those points too, wherever its limits permit; one with few cables has
+them only as exactly as the polynomial follows a motion that is possible. There the order counts: the error of two
+balances per interval with a quadratic is far smaller than that of one balance with a line.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ class Scheme:
     Attributes
     ----------
     degree
-        Of the acceleration.
+        Degree of the acceleration.
     inner
-        Where in an interval it has further points, shares of it.
+        Further points inside an interval, as shares of it.
     weights
-        Of the quadrature over an interval, at its points from start to end.
+        Weights of the quadrature over an interval, at its points from start to end.
     continuous
-        Whether the acceleration is: then A t = w is asked at the nodes too, else at the inner points alone.
+        Whether the acceleration is continuous: then A t = w is required at the nodes too, else only at inner points.
     smooth
         Whether jerk and snap, the next two derivatives, are unknowns at the nodes as well.
     """
@@ -111,7 +111,7 @@ class Scheme:
         a
             Accelerations at its points, start and end included.
         jerk
-            At start and end, for a smooth scheme; None: the line between the ends.
+            At start and end, for a smooth scheme; default: the line between the ends.
         """
         if self.smooth:
             start, end = a
@@ -128,8 +128,8 @@ class Scheme:
     ) -> list[np.ndarray]:
         """Return position, velocity, acceleration and jerk at `times` (k,), (k, n) each.
 
-        `values` are (q, v, a) at the points `nodes` of all intervals, (points, n) each, and `jerk` likewise or None. At
-        a node where the acceleration jumps it is that of the interval to come.
+        `values` are (q, v, a) at the points `nodes` of all intervals, (points, n) each; `jerk` is (points, n) or None.
+        At a node where the acceleration jumps it is that of the next interval.
         """
         size = self.size
         starts = nodes[::size]
@@ -142,19 +142,19 @@ class Scheme:
         change = bernstein.derivative(h, acceleration) if self.degree else [np.zeros_like(v)]
         index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 2)
         shares = (times - starts[index]) / h[index, 0]
-        found = []
+        motion = []
         for points in (position, speed, acceleration, change):
             weights = bernstein.basis(len(points) - 1, shares)
-            found.append(sum(weights[:, i : i + 1] * point[index] for i, point in enumerate(points)))
-        return found
+            motion.append(sum(weights[:, i : i + 1] * point[index] for i, point in enumerate(points)))
+        return motion
 
 
 def _snap_share(steps: int) -> np.ndarray:
     """Return the weights that the mean of a cubic spline adds to those of the trapezoid rule, (steps + 1,).
 
     Over an interval the mean is (a + a')/2 - h^2/24 (s + s') with the snaps of s_{k-1} + 4 s_k + s_{k+1} =
-    6/h^2 (a_{k-1} - 2 a_k + a_{k+1}), equal in the first two nodes and in the last two. With other weights for the cost
-    than for the motion the ends would be used to move for less.
+    6/h^2 (a_{k-1} - 2 a_k + a_{k+1}), equal in the first two nodes and in the last two. If the cost had other weights
+    than the motion, motion at the ends would cost too little.
     """
     snaps = 4 * np.eye(steps + 1) + np.eye(steps + 1, k=1) + np.eye(steps + 1, k=-1)
     snaps[0, :2] = snaps[-1, :-3:-1] = 1, -1
@@ -162,10 +162,10 @@ def _snap_share(steps: int) -> np.ndarray:
     counted[[0, -1]] /= 2
     back = 6 * np.linalg.solve(snaps.T, counted)
     back[[0, -1]] = 0.0  # the rows of the two ends have no second difference
-    found = -2 * back
-    found[:-1] += back[1:]
-    found[1:] += back[:-1]
-    return found
+    weights = -2 * back
+    weights[:-1] += back[1:]
+    weights[1:] += back[:-1]
+    return weights
 
 
 _GAUSS = 0.5 * np.sqrt(0.6)
