@@ -1,4 +1,4 @@
-"""What is remarkable about a robot before it moves: the rank of its wrench matrix and why, implausible numbers."""
+"""Diagnose a robot at its home pose: the rank of its wrench matrix and the reason, and implausible numbers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..text import quantity, quantity_row
 from .dynamics import Dynamics
 from .robot import Robot
 
@@ -15,7 +16,7 @@ LEVEL_POSES = 50
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A robot at home, in figures and sentences.
+    """The diagnosis of a robot at its home pose.
 
     Attributes
     ----------
@@ -30,7 +31,7 @@ class Diagnosis:
     reason
         Why the rank is below the platform's degrees of freedom, empty if it is not.
     warnings
-        Sentences on numbers that can be computed with but are hard to believe.
+        Sentences about numbers that are valid but implausible.
     """
 
     rank: int
@@ -83,7 +84,7 @@ def _rank(A: np.ndarray) -> int:
 
 
 def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
-    """The reason for a rank below the degrees of freedom, from the cable lines at home."""
+    """Return the reason for a rank below the degrees of freedom, from the cable lines at home."""
     directions = A[:3].T  # (m, 3)
     points = robot.home_attachments
     projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
@@ -93,7 +94,7 @@ def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
     meeting = np.linalg.lstsq(projectors.sum(axis=0), (projectors @ points[:, :, None]).sum(axis=0).ravel())[0]
     distance = np.linalg.norm((projectors @ (meeting - points)[:, :, None])[:, :, 0], axis=1)
     if distance.max() < RANK_TOLERANCE * lengths.max():
-        return f"all cable lines meet in one point, {_told(meeting)} m, so no cable has a moment about it"
+        return f"all cable lines meet in one point, {_vector(meeting)} m, so no cable has a moment about it"
     if rank == robot.m:
         return f"{robot.m} cables span at most {robot.m} of {len(robot.platform.dof)} directions"
     moving = np.flatnonzero(robot.dof_mask)
@@ -104,42 +105,45 @@ def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:
 
 
 def _motion(twist: np.ndarray, robot: Robot) -> str:
-    """Words for the twist (velocity of the CoM, angular velocity times `Robot.length`) that no cable resists."""
+    """Describe the twist (velocity of the CoM, angular velocity times `Robot.length`) that no cable resists."""
     velocity, omega = twist[:3], twist[3:] / robot.length
     if np.linalg.norm(omega) * robot.length < 1e-6:
-        return f"a translation along {_told(velocity / np.linalg.norm(velocity))}"
+        return f"a translation along {_vector(velocity / np.linalg.norm(velocity))}"
     along = omega / np.linalg.norm(omega)
     pitch = velocity @ along / np.linalg.norm(omega)
-    kind = "a rotation" if abs(pitch) < 1e-6 * robot.length else f"a screw of {pitch:.3g} m/rad"
+    kind = "a rotation" if abs(pitch) < 1e-6 * robot.length else f"a screw of {quantity(pitch, 'm/rad', 3)}"
     offset = np.cross(omega, velocity) / (omega @ omega)
-    place = "the CoM" if np.linalg.norm(offset) < 1e-6 * robot.length else f"the CoM shifted by {_told(offset)} m"
-    return f"{kind} about {_told(along)} through {place}"
+    place = "the CoM" if np.linalg.norm(offset) < 1e-6 * robot.length else f"the CoM shifted by {_vector(offset)} m"
+    return f"{kind} about {_vector(along)} through {place}"
 
 
-def _told(vector: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value + 0.0:.4g}" for value in np.round(vector, 9)) + ")"
+def _vector(vector: np.ndarray) -> str:
+    return f"({quantity_row(np.round(vector, 9))})"
 
 
 def _implausible(robot: Robot) -> list[str]:
     warnings = []
     moments = np.sort(np.linalg.eigvalsh(robot.inertia))
-    if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+    largest, others = moments[2], moments[0] + moments[1]
+    if largest > others * (1 + 1e-9):
         warnings.append(
-            f"platform.inertia: the largest principal moment {moments[2]:.4g} kg m^2 exceeds the sum of the others "
-            f"{moments[0] + moments[1]:.4g}, no rigid body has such moments"
+            f"platform.inertia: the largest principal moment, {quantity(largest, 'kg m^2')}, exceeds the sum of the "
+            f"other two, {quantity(others, 'kg m^2')}, which no rigid body has"
         )
-    gyration = float(np.sqrt(moments[2] / robot.platform.mass))
+    gyration = float(np.sqrt(largest / robot.platform.mass))
     if gyration > 2 * robot.length:
+        mass, reach = quantity(robot.platform.mass, "kg"), quantity(robot.length, "m", 2)
         warnings.append(
-            f"platform.inertia: {moments[2]:.3g} kg m^2 at {robot.platform.mass:g} kg is a gyration radius of "
-            f"{gyration:.2g} m, but no attachment is farther than {robot.length:.2g} m from the CoM"
+            f"platform.inertia: {quantity(largest, 'kg m^2', 3)} at {mass} is a gyration radius of "
+            f"{quantity(gyration, 'm', 2)}, but no attachment is farther than {reach} from the CoM"
         )
     if robot.m >= 3 and not _com_between_attachments(robot):
         warnings.append(
-            "platform.com: seen from above it lies outside the attachments, so hanging cables cannot hold it level"
+            "platform.com: it lies outside the attachments in the view from above, so suspended cables cannot hold "
+            "it level"
         )
     warnings.extend(
-        f"cables[{index}]: t_min equals t_max, {cable.t_max:g} N"
+        f"cables[{index}]: t_min equals t_max, {quantity(cable.t_max, 'N')}"
         for index, cable in enumerate(robot.cables)
         if cable.t_min == cable.t_max
     )
@@ -147,15 +151,15 @@ def _implausible(robot: Robot) -> list[str]:
 
 
 def _com_between_attachments(robot: Robot) -> bool:
-    """Whether the CoM lies in the convex hull of the attachments along gravity, with the platform at home."""
+    """Return whether the CoM lies in the convex hull of the attachments along gravity, with the platform at home."""
     down = np.array(robot.gravity)
     if not np.linalg.norm(down) > 0:
         return True
-    # The directions from the CoM to the attachments, seen along gravity, must not fit into a half plane.
+    # The directions from the CoM to the attachments, viewed along gravity, must not fit into a half plane.
     across = np.linalg.svd(down[None])[2][1:]  # (2, 3) basis of the plane
-    seen = (robot.home_attachments - robot.home_com) @ across.T
-    if (np.linalg.norm(seen, axis=1) < 1e-9 * robot.length).any():
+    across_com = (robot.home_attachments - robot.home_com) @ across.T
+    if (np.linalg.norm(across_com, axis=1) < 1e-9 * robot.length).any():
         return True
-    angles = np.sort(np.arctan2(seen[:, 1], seen[:, 0]))
+    angles = np.sort(np.arctan2(across_com[:, 1], across_com[:, 0]))
     gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
     return bool(gaps.max() <= np.pi + 1e-9)

@@ -29,7 +29,7 @@ def load(name: str | os.PathLike[str]) -> Robot:
     try:
         text = os.fspath(name)
     except TypeError:
-        raise InputError(f"robot: {name!r}; accepted: a name or a path") from None
+        raise InputError(f"robot must be a name or a path, got {shown(name)}") from None
     if text in available():
         return read_yaml(FOLDER / f"{text}.yaml", Robot)
     path = Path(text)
@@ -37,9 +37,7 @@ def load(name: str | os.PathLike[str]) -> Robot:
         return read_yaml(path, Robot)
     close = difflib.get_close_matches(text, available(), n=1)
     hint = f", did you mean {close[0]!r}?" if close else ""
-    raise InputError(
-        f"robot: {text!r} is unknown{hint}; accepted: {', '.join(available())}, or the path of a YAML file"
-    )
+    raise InputError(f"robot must be one of {', '.join(available())}, or the path of a YAML file, got {text!r}{hint}")
 
 
 def as_robot(robot: object) -> Robot:

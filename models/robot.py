@@ -1,4 +1,4 @@
-"""A robot as data: one platform, the carriers its cables hang from, and the cables. Only checks are computed.
+"""A robot as data: one platform, the carriers that hold its cables, and the cables. Nothing but checks is computed.
 
 SI units throughout: metres, kilograms, seconds, newtons, radians. {G} is the global frame (gravity says which way is
 down), the platform frame sits on the platform, a carrier frame on each carrier. Poses are (x, y, z, roll, pitch, yaw)
@@ -45,13 +45,13 @@ AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Part(BaseModel):
-    """What all parts share: they do not change, and a key that is not theirs is an error."""
+    """The base of all parts: they are frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """Check a mapping, as pydantic does, but with towline's errors.
+        """Check a mapping as pydantic does, with the errors of towline.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class Part(BaseModel):
 
 
 class Aero(Part):
-    """How the air pushes the platform (paper F, Eq. 25).
+    """The force of the air on the platform (paper F, Eq. 25).
 
     The force acts at the CoM along the axes of {G}: along x and y with the drag coefficient, along z with the lift
     coefficient; V is the air's velocity relative to the platform.
@@ -78,7 +78,7 @@ class Aero(Part):
     lift: NonNegative = Field(description="lift coefficient C_l [-]")
     area: Positive = Field(description="largest cross-section S of the platform [m^2]")
     form: Literal["signed", "printed"] = Field(
-        default="signed", description="signed: V abs(V), as drag is; printed: V^2, never negative, as paper F has it"
+        default="signed", description="signed: V abs(V), as drag acts; printed: V^2, never negative, as in paper F"
     )
 
 
@@ -112,19 +112,21 @@ class Platform(Part):
     inertia: BodyInertia | None = Field(
         default=None,
         description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
-        "only a platform that cannot turn may do without",
+        "required unless the platform cannot turn",
     )
     com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
     home: Pose | None = Field(
         default=None,
-        description="a pose in {G} to start from and to diagnose at [m, rad]; none: level, amid or below the anchors",
+        description="pose in {G} to start from and to diagnose at [m, rad]; default: level, amid or below the anchors",
     )
     dof: tuple[Coordinate, ...] = Field(
         default=COORDINATES,
         min_length=1,
         description="coordinates that can move; a point mass has x, y, z. The cables balance only the rows of these",
     )
-    aero: Aero | None = Field(default=None, description="none: no wind force is known")
+    aero: Aero | None = Field(
+        default=None, description="how the air pushes the platform; default: without it no wind can be given"
+    )
 
     @field_validator("dof")
     @classmethod
@@ -151,7 +153,7 @@ class Platform(Part):
 
 
 class Carrier(Part):
-    """What anchors ride on. Its frame carries the anchors of its cables."""
+    """A body that holds anchors. The anchors of its cables are fixed in its frame."""
 
     name: Name
     home: Pose = Field(default=AT_ORIGIN, description="pose of the carrier frame in {G} at rest [m, rad]")
@@ -184,7 +186,7 @@ class Box(Part):
 
 
 class MobileCarrier(Carrier):
-    """A robot-end that may be placed in a reach box (paper C): a point, so its orientation stays at home."""
+    """A robot end that moves inside a reach box (paper C): a point, its orientation stays as at home."""
 
     kind: Literal["mobile"]
     reach: Box = Field(description="where the carrier's origin may be, in {G} [m]")
@@ -253,15 +255,15 @@ class Pulley(Part):
 class Cable(Part):
     """One cable, from its anchor on a carrier to its attachment on the platform. It pulls and never pushes."""
 
-    carrier: Name = Field(description="name of the carrier that it hangs from")
+    carrier: Name = Field(description="name of the carrier that holds its anchor")
     anchor: Vector3 = Field(description="A_i in the carrier frame [m]")
     attachment: Vector3 = Field(description="B_i in the platform frame [m]")
     t_min: NonNegative = Field(description="smallest tension [N]; above zero keeps the cable taut")
     t_max: Positive = Field(description="largest tension [N]")
-    stiffness: Positive | None = Field(default=None, description="E A [N]; none: the cable does not stretch")
+    stiffness: Positive | None = Field(default=None, description="E A [N]; default: the cable does not stretch")
     damping: NonNegative | None = Field(default=None, description="C [N s/m]")
-    length: Positive | None = Field(default=None, description="[m]; only where the drive keeps it fixed")
-    pulley: Pulley | None = Field(default=None, description="null: the anchor is a point")
+    length: Positive | None = Field(default=None, description="[m]; required where the drive is fixed-length")
+    pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
 
     @model_validator(mode="after")
     def _limits_in_order(self) -> Self:
@@ -283,8 +285,8 @@ class Robot(Part):
     gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
     drive: Literal["both", "fixed-length", "variable-length"] = Field(
         default="both",
-        description="what moves (paper C): fixed-length: the carriers alone, each cable keeps its length; "
-        "variable-length: winches alone, mobile carriers stay; both",
+        description="what moves (paper C). fixed-length: the carriers, each cable keeps its length; "
+        "variable-length: the winches, mobile carriers stay at home; both: carriers and winches",
     )
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
@@ -329,113 +331,113 @@ class Robot(Part):
 
     @property
     def m(self) -> int:
-        """Number of cables."""
+        """Return the number of cables."""
         return len(self.cables)
 
     @property
     def anchors(self) -> np.ndarray:
-        """Anchors A_i, each in the frame of its carrier, (m, 3) [m]."""
+        """Return the anchors A_i, each in the frame of its carrier, (m, 3) [m]."""
         return np.array([cable.anchor for cable in self.cables])  # (m, 3)
 
     @property
     def attachments(self) -> np.ndarray:
-        """Attachments B_i in the platform frame, (m, 3) [m]."""
+        """Return the attachments B_i in the platform frame, (m, 3) [m]."""
         return np.array([cable.attachment for cable in self.cables])  # (m, 3)
 
     @property
     def pulley_radii(self) -> np.ndarray:
-        """Radius of each cable's pulley, (m,) [m], 0 for a point anchor."""
+        """Return the radius of each cable's pulley, (m,) [m], 0 for a point anchor."""
         return np.array([cable.pulley.radius if cable.pulley else 0.0 for cable in self.cables])  # (m,)
 
     @property
     def pulley_axes(self) -> np.ndarray:
-        """Swivel axis of each cable's pulley in the frame of its carrier, (m, 3) [-]; z for a point anchor."""
+        """Return the swivel axis of each cable's pulley in its carrier's frame, (m, 3) [-]; z for a point anchor."""
         axes = np.array([cable.pulley.axis if cable.pulley else (0.0, 0.0, 1.0) for cable in self.cables])
         return axes / np.linalg.norm(axes, axis=1, keepdims=True)  # (m, 3)
 
     @property
     def carrier_of_cable(self) -> np.ndarray:
-        """Index of the carrier that each cable hangs from, (m,)."""
+        """Return the index of the carrier of each cable, (m,)."""
         names = [carrier.name for carrier in self.carriers]
         return np.array([names.index(cable.carrier) for cable in self.cables])  # (m,)
 
     @property
     def t_min(self) -> np.ndarray:
-        """Smallest tensions, (m,) [N]."""
+        """Return the smallest tensions, (m,) [N]."""
         return np.array([cable.t_min for cable in self.cables])  # (m,)
 
     @property
     def t_max(self) -> np.ndarray:
-        """Largest tensions, (m,) [N]."""
+        """Return the largest tensions, (m,) [N]."""
         return np.array([cable.t_max for cable in self.cables])  # (m,)
 
     @property
     def fixed_lengths(self) -> np.ndarray | None:
-        """Lengths that the drive keeps, (m,) [m]; None if winches change them."""
+        """Return the lengths that the drive keeps, (m,) [m], or None if winches change them."""
         if self.drive != "fixed-length":
             return None
         return np.array([cable.length for cable in self.cables], dtype=float)
 
     @property
     def carrier_home(self) -> np.ndarray:
-        """Home poses of the carriers in {G}, (c, 6) [m, rad]."""
+        """Return the home poses of the carriers in {G}, (c, 6) [m, rad]."""
         return np.array([carrier.home for carrier in self.carriers])  # (c, 6)
 
     @property
     def home(self) -> np.ndarray:
-        """Home pose of the platform in {G}, (6,) [m, rad], from the file or else amid or below the anchors."""
+        """Return the home pose of the platform in {G}, (6,) [m, rad]: the file's, or else amid or below the anchors."""
         if self.platform.home is not None:
             return np.array(self.platform.home)  # (6,)
         return points.default_home(self.home_anchors, self.attachments)
 
     @property
     def home_anchors(self) -> np.ndarray:
-        """Anchors in {G} with the carriers at home, (m, 3) [m]."""
+        """Return the anchors in {G} with the carriers at home, (m, 3) [m]."""
         return points.anchors(self, self.carrier_home)  # (m, 3)
 
     @property
     def home_attachments(self) -> np.ndarray:
-        """Attachments in {G} with the platform at home, (m, 3) [m]."""
+        """Return the attachments in {G} with the platform at home, (m, 3) [m]."""
         return points.attachments(self, self.home)  # (m, 3)
 
     @property
     def home_com(self) -> np.ndarray:
-        """CoM in {G} with the platform at home, (3,) [m]."""
+        """Return the CoM in {G} with the platform at home, (3,) [m]."""
         return points.placed(self.home, np.array([self.platform.com]))[0]  # (3,)
 
     @property
     def inertia(self) -> np.ndarray:
-        """Inertia matrix I_b about the CoM in platform axes, (3, 3) [kg m^2], zero for a platform that cannot turn."""
+        """Return the inertia matrix I_b about the CoM in platform axes, (3, 3) [kg m^2], or 0 without an inertia."""
         return inertia_matrix(self.platform.inertia or (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))  # (3, 3)
 
     @property
     def dof_mask(self) -> np.ndarray:
-        """(6,): 1 for the wrench rows that the cables have to balance, 0 for those of coordinates that cannot move."""
+        """Return 1 for the wrench rows that the cables have to balance, 0 for coordinates that cannot move, (6,)."""
         return np.array([float(name in self.platform.dof) for name in COORDINATES])  # (6,)
 
     @property
     def weight(self) -> float:
-        """Weight of the platform [N]."""
+        """Return the weight of the platform [N]."""
         return float(self.platform.mass * np.linalg.norm(self.gravity))
 
     @property
     def force_scale(self) -> float:
-        """A force [N] to measure others by: the weight, or without gravity the mean of the largest tensions."""
+        """Return a force [N] as a scale for others: the weight, or without gravity the mean of the largest tensions."""
         return self.weight or float(self.t_max.mean())
 
     @property
     def wrench_scale(self) -> np.ndarray:
-        """Factors that bring a wrench to newtons, (6,): 1 for forces [-], 1 / `length` for moments [1/m]."""
+        """Return the factors that bring a wrench to newtons, (6,): 1 for forces [-], 1 / `length` for moments [1/m]."""
         return np.repeat([1.0, 1.0 / self.length], 3)  # (6,)
 
     @property
     def length(self) -> float:
-        """Length that makes moments comparable to forces [m]: the largest distance of an attachment from the CoM."""
+        """Return the length that scales moments to forces [m]: the largest distance of an attachment from the CoM."""
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)
         return float(arms.max()) if arms.max() > 0 else 1.0
 
 
 def inertia_matrix(inertia: Inertia) -> np.ndarray:
-    """Symmetric matrix of (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2]."""
+    """Return the symmetric matrix of (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2]."""
     xx, yy, zz, xy, xz, yz = inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # (3, 3)

@@ -1,4 +1,4 @@
-"""Bodies in space as data: what cables, platform and carriers are to keep away from."""
+"""Bodies in space as data: what cables, platform and carriers must keep away from."""
 
 from __future__ import annotations
 

@@ -251,7 +251,7 @@ def test_diagnosis_of_impossible_inertia():
     robot = load("nist-robocrane")
     platform = robot.platform.model_copy(update={"inertia": (1.0, 1.0, 3.0, 0.0, 0.0, 0.0)})
     warnings = diagnose(robot.model_copy(update={"platform": platform})).warnings
-    assert any("exceeds the sum of the others" in warning for warning in warnings)
+    assert any("exceeds the sum of the other two" in warning for warning in warnings)
 
 
 def test_diagnosis_counts_the_rows_that_move():
