@@ -50,18 +50,18 @@ def main() -> None:
 
 
 def report_start() -> None:
-    """What a process waits for its kernel: with nothing on the disk, and with it."""
+    """Measure how long a process waits for its kernel: with nothing on the disk, and with it."""
     with tempfile.TemporaryDirectory() as folder:
-        for told in ("compile, nothing cached", "load from the disk"):
+        for label in ("compile, nothing cached", "load from the disk"):
             command = [sys.executable, "-c", _START]
             environment = os.environ | {"TOWLINE_CACHE": folder}
             done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
             imported, ready = map(float, done.stdout.split())
-            print(f"{told:28} {ready:8.2f} s, after {imported:.2f} s to import Numba")
+            print(f"{label:28} {ready:8.2f} s, after {imported:.2f} s to import Numba")
 
 
 def report_evaluation(count: int, runs: int) -> None:
-    """Time for `count` poses, and the ratio to map and conversion."""
+    """Measure the time for `count` poses, and the ratio to map and conversion."""
     dynamics = Dynamics(load(ROBOT))
     function = dynamics.functions["wrench_matrix"]
     poses = dynamics.robot.home + np.random.default_rng(1).uniform(-0.3, 0.3, (count, 6))
@@ -92,7 +92,7 @@ def report_evaluation(count: int, runs: int) -> None:
 
 
 def timed(work: Callable[[], np.ndarray | list[np.ndarray]], runs: int) -> tuple[np.ndarray, float]:
-    """What `work` returns and the median of its times, after a run that is not counted."""
+    """Return what `work` returns and the median of its times, after a run that is not counted."""
     result = work()
     times = []
     for _ in range(runs):
@@ -103,7 +103,7 @@ def timed(work: Callable[[], np.ndarray | list[np.ndarray]], runs: int) -> tuple
 
 
 def difference(got: np.ndarray, expected: np.ndarray) -> float:
-    """Largest difference of two matrices of a batch, relative to the larger one's norm."""
+    """Return the largest difference of two matrices of a batch, relative to the larger one's norm."""
     norms = np.linalg.norm(expected, axis=(1, 2))
     return float((np.linalg.norm(got - expected, axis=(1, 2)) / norms).max())
 

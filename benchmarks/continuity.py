@@ -1,11 +1,11 @@
-"""Whether the methods that claim continuity keep it, along random smooth motions of random robots.
+"""Check whether the methods that claim continuity keep it, along random smooth motions of random robots.
 
     python -m towline.benchmarks.continuity [--count 100]
 
 Robots of 7, 8 and 9 cables, and 3 to 6 cables to one point (rank three); of five motions three stay inside the
 available wrench set, one touches its boundary and one follows it for a while. Where a function is continuous with a
 bounded slope, halving the step ten times leaves 2^-10 of a change; at a jump all of it, however often it is halved.
-Methods that answer everywhere also go out of the set and back, and smooth ones are asked for their derivative. The exit
+Methods that answer everywhere also go out of the set and back, and smooth ones give their derivative. The exit
 code is 1 if more than 0.05 of a change is left.
 """
 
@@ -63,7 +63,7 @@ class Motion:
         self.phases = rng.uniform(0, 2 * np.pi, m)
         # The direction to the boundary along which no cable changes sides on the way: the corner then moves smoothly.
         times = np.linspace(0, 2, 41)
-        self.pace, best = (1.0 if kind == "inside" else 0.3), 0.0
+        self.rate, best = (1.0 if kind == "inside" else 0.3), 0.0
         matrices = np.array([self.matrix(moment) for moment in times])  # (times, 6, m)
         for d in rng.normal(size=(50, 6)):
             pulls = d @ matrices  # (times, m)
@@ -72,13 +72,13 @@ class Motion:
                 best, self.corner = apart, np.where(pulls[0] > 0, T_MAX, T_MIN)
         if kind != "inside" and best == 0.0:
             # No such direction: the robot stands still while w moves.
-            self.pace, self.corner = 0.0, np.where(rng.normal(size=6) @ self.matrix(0.0) > 0, T_MAX, T_MIN)
+            self.rate, self.corner = 0.0, np.where(rng.normal(size=6) @ self.matrix(0.0) > 0, T_MAX, T_MIN)
 
     def matrix(self, moment: float) -> Array:
         """Return the wrench matrix at a time, shape (6, m)."""
         (r0, r1), (u0, u1) = self.points, self.directions
-        r = r0 + 0.2 * self.pace * np.sin(moment) * r1
-        u = u0 + 0.4 * self.pace * np.sin(moment + 1.0) * u1
+        r = r0 + 0.2 * self.rate * np.sin(moment) * r1
+        u = u0 + 0.4 * self.rate * np.sin(moment + 1.0) * u1
         u = u / np.linalg.norm(u, axis=0)
         return np.vstack([u, np.asarray(np.cross(r, u, axis=0), dtype=np.float64)])
 
@@ -100,7 +100,7 @@ class Leaving(Motion):
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
         rng = np.random.default_rng([seed, 1])
-        self.pace = 0.0
+        self.rate = 0.0
         A = self.matrix(0.0)
         self.outward = 3.0 * A @ rng.uniform(-T_MAX, T_MAX, A.shape[1])
 

@@ -188,14 +188,14 @@ def awkward_problem(seed: int, m: int | None = None, n: int | None = None) -> tu
     if "fixed" in kinds:
         some = rng.random(m) < 0.3
         high[some] = low[some]
-    room = high - low
+    span = high - low
     if "unlimited" in kinds:
         high[rng.random(m) < 0.3] = np.inf
         low[rng.random(m) < 0.2] = -np.inf
     if "huge limits" in kinds:
         high[rng.random(m) < 0.3] = 10.0 ** rng.uniform(3, 9)
-    t = np.where(np.isfinite(low), low, high - room)
-    t = np.where(np.isfinite(t), t, 0.0) + room * np.clip(rng.uniform(-0.3, 1.3, m), 0.0, 1.0)
+    t = np.where(np.isfinite(low), low, high - span)
+    t = np.where(np.isfinite(t), t, 0.0) + span * np.clip(rng.uniform(-0.3, 1.3, m), 0.0, 1.0)
     t = np.minimum(np.maximum(t, low), high)
     if "corner" in kinds:
         d = rng.normal(size=n) @ A

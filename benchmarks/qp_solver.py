@@ -76,7 +76,7 @@ def solve_problem(
         Not used.
     eps_abs :
         Residuals and duality gap that are good enough. It matters only where the equations are nearly dependent: then
-        those that the tolerance cannot tell from 0 = 0 are left out, if the answer meets the original QP to `eps_abs`.
+        those that equal 0 = 0 within the tolerance are left out, if the answer meets the original QP to `eps_abs`.
     method :
         One of `towline.solvers.methods()` that ends at the optimum.
 
@@ -110,7 +110,7 @@ def solve_problem(
 
 
 def _equations(A: Array, b: Array) -> list[tuple[Array, Array]]:
-    """The equations A x = b, preceded by those without the nearly dependent ones if there are any."""
+    """Return the equations A x = b, preceded by those without the nearly dependent ones if there are any."""
     U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
     rank = int(np.count_nonzero(sigma > _DEPENDENT * sigma[0]))
     if rank in (0, sigma.size):
@@ -120,7 +120,7 @@ def _equations(A: Array, b: Array) -> list[tuple[Array, Array]]:
 
 
 def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Multipliers of the equations and the limits at an optimum x.
+    """Return the multipliers of the equations and the limits at an optimum x.
 
     The variables between their limits determine y by least squares, as long as the signs that it gives at the limits
     are right. At a degenerate vertex they need not be, since too few variables are between: then y and z_box are found
@@ -172,7 +172,7 @@ def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upp
 
 
 def as_qp(problem: TensionProblem) -> dict[str, Any]:
-    """A tension problem as the arguments P, q, A, b, lb, ub of a QP, in units of its largest finite limit.
+    """Return a tension problem as the arguments P, q, A, b, lb, ub of a QP, in units of its largest finite limit.
 
     Moment rows are divided by the problem's length and rows of zeros are left out: absolute tolerances, the only ones
     that solvers share, then mean a part of the largest tension.

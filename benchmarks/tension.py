@@ -32,7 +32,7 @@ __all__ = ["FAILED", "Report", "Row", "run", "write"]
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-# Tensions, or their wrench, this far off are a failure, in units of the largest tension: 1000 times what was asked.
+# Tensions, or their wrench, this far off are a failure, in units of the largest tension: 1000 times what was required.
 FAILED = 1e-6
 SOLVERS = ("daqp", "osqp", "clarabel", "piqp", "proxsuite", "quadprog", "highspy", "scs", "moreau")
 
@@ -44,7 +44,7 @@ class Row:
     Attributes
     ----------
     task, contender, tolerance :
-        Who, at what, and what accuracy it was asked for.
+        The contender, the task, and the accuracy required.
     median_us, p99_us :
         Time of a call [us]; for a batch, of a call divided by its problems: its p99 is one of calls, not of problems.
     ratio :
@@ -56,7 +56,7 @@ class Row:
         Problems, of `problems`, that it got wrong: none, or tensions or a wrench off by more than `FAILED`, for a
         feasible problem; tensions for an infeasible one.
     problems :
-        How many it was given; fewer than asked if it ran out of time.
+        How many it was given; fewer than requested if it ran out of time.
     detail :
         What went wrong beyond that, else empty.
     """
@@ -83,7 +83,7 @@ class Report:
     repeats: int
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain lists and numbers, ready for JSON."""
+        """Return plain lists and numbers, ready for JSON."""
         rows = [asdict(row) for row in self.rows]
         return {"rows": rows, "machine": self.machine, "count": self.count, "repeats": self.repeats}
 
@@ -104,8 +104,8 @@ def run(
     m :
         Numbers of cables, each from 1 to 16.
     limit :
-        Seconds that one contender may spend on one task. It is looked at between calls: whoever passes it is out, with
-        the times that it has.
+        Seconds that one contender may spend on one task. It is checked between calls: a contender that passes it is out,
+        with the times that it has.
     progress :
         Called with the task's name and how many of how many tasks are done.
 
@@ -190,7 +190,7 @@ class _Runner:
             self.detail = f"out after {self.spent:.1f} s"
 
     def counted(self) -> dict[int, list[float]]:
-        """Times [us] of the turns that count, by turn; of turn 0 if there is no other."""
+        """Return the times [us] of the turns that count, by turn; of turn 0 if there is no other."""
         return {turn: times for turn, times in self.blocks.items() if turn > 0} or self.blocks
 
 
@@ -235,7 +235,7 @@ def _row(runner: _Runner, reference: dict[int, list[float]]) -> Row:
 
 
 def _judge(contender: Contender, task: Task, answers: list[Array | None]) -> tuple[float | None, int]:
-    """Largest tension error, and how many answers are wrong."""
+    """Return the largest tension error, and how many answers are wrong."""
     if task.optima is None:
         return None, sum(answer is not None for answer in answers)
     errors, failures = [], 0
@@ -251,7 +251,7 @@ def _judge(contender: Contender, task: Task, answers: list[Array | None]) -> tup
 
 
 def _violation(problem: TensionProblem, x: Array) -> float:
-    """Largest error of the wrench or of a limit."""
+    """Return the largest error of the wrench or of a limit."""
     return float(max(np.abs(problem.A @ x - problem.w).max(), (problem.t_min - x).max(), (x - problem.t_max).max()))
 
 
@@ -266,7 +266,7 @@ def write(report: Report, folder: Path) -> list[Path]:
 
 
 def markdown(report: Report) -> str:
-    """The report as a page: one table for each task, the fastest first."""
+    """Return the report as a page: one table for each task, the fastest first."""
     lines = [
         "# Tension distribution in a hot loop",
         "",
@@ -277,7 +277,7 @@ def markdown(report: Report) -> str:
         f"Failures: no answer, or off by more than {FAILED:g}; for infeasible problems, an answer.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):
-        lines += ["", f"## {task}", "", "| contender | asked for | median us | p99 us | ratio | error | failures |"]
+        lines += ["", f"## {task}", "", "| contender | required | median us | p99 us | ratio | error | failures |"]
         lines += ["|---|---|---:|---:|---:|---:|---:|"]
         rows = [row for row in report.rows if row.task == task]
         for row in sorted(rows, key=lambda row: (np.isnan(row.ratio), row.ratio)):
@@ -291,7 +291,7 @@ def markdown(report: Report) -> str:
 
 
 def _picture(report: Report, path: Path) -> Path:
-    """Ratios of every contender, one mark for each kind of task, at the number of cables nearest to eight."""
+    """Draw the ratios of every contender, one mark for each kind of task, at the number of cables nearest to eight."""
     sizes = {int(row.task.split("= ")[1]) for row in report.rows}
     m = min(sizes, key=lambda size: abs(size - 8))
     names = list(dict.fromkeys(row.contender for row in report.rows))[::-1]

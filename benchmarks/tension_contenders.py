@@ -2,7 +2,7 @@
 
 What is prepared is not timed: arrays in the layout that a solver wants, and for solvers that keep their memory between
 problems (native, reuse) one instance. What is timed begins with such arrays, a new wrench matrix included, and ends
-with the tensions. All are asked for 1e-9 absolute, nothing relative, and are bounded in iterations, since some loop for
+with the tensions. All are set to 1e-9 absolute, nothing relative, and are bounded in iterations, since some loop for
 ever on infeasible problems.
 """
 
@@ -55,7 +55,7 @@ class Contender(NamedTuple):
     name :
         For tables.
     tolerance :
-        What it was asked for.
+        The accuracy that it was set to.
     prepare :
         From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, to a
         function without arguments that returns x of all, shape (batch, variables), and which of them are answers.
@@ -76,9 +76,9 @@ class Contender(NamedTuple):
 
 
 def contenders() -> list[Contender]:
-    """Everyone who is installed, the reference first."""
-    asked = f"{EPS:g} absolute"
-    found = [Contender(REFERENCE, asked, _daqp)]
+    """Return every contender that is installed, the reference first."""
+    required = f"{EPS:g} absolute"
+    found = [Contender(REFERENCE, required, _daqp)]
     for name in methods():
         found.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
     found.append(Contender("towline kernel alone", "its own, 1e-9", _towline_kernel))
@@ -99,25 +99,25 @@ def contenders() -> list[Contender]:
     }
     for module, (name, prepare) in native.items():
         if find_spec(module) is not None:
-            found.append(Contender(name, "exact" if module == "quadprog" else asked, prepare))
+            found.append(Contender(name, "exact" if module == "quadprog" else required, prepare))
     if find_spec("moreau") is not None:
-        found.append(Contender("moreau batch", asked, _moreau_batch, batch=True))
+        found.append(Contender("moreau batch", required, _moreau_batch, batch=True))
     import qpsolvers
 
     for name in sorted(set(_QPSOLVERS) & set(qpsolvers.available_solvers)):
-        tolerance = "exact" if name == "quadprog" else asked
+        tolerance = "exact" if name == "quadprog" else required
         found.append(Contender(f"qpsolvers {name}", tolerance, _through_qpsolvers(name)))
     return found
 
 
 def _stacked(qp: dict[str, Any]) -> tuple[Array, Array, Array]:
-    """Rows, lower and upper limits of lower <= C x <= upper: the equations, then x itself."""
+    """Return rows, lower and upper limits of lower <= C x <= upper: the equations, then x itself."""
     n = qp["q"].size
     return np.vstack([qp["A"], np.eye(n)]), np.r_[qp["b"], qp["lb"]], np.r_[qp["b"], qp["ub"]]
 
 
 def _one_sided(qp: dict[str, Any]) -> tuple[Array, Array]:
-    """C and d of C x <= d, the equations first, then the finite limits."""
+    """Return C and d of C x <= d, the equations first, then the finite limits."""
     n = qp["q"].size
     up, low = np.isfinite(qp["ub"]), np.isfinite(qp["lb"])
     return np.vstack([qp["A"], np.eye(n)[up], -np.eye(n)[low]]), np.r_[qp["b"], qp["ub"][up], -qp["lb"][low]]
@@ -327,7 +327,7 @@ def _quadprog(task: Task) -> Single:
     def run(i: int) -> Array | None:
         try:
             return quadprog.solve_qp(*arguments[i], equations)[0]
-        except ValueError:  # its way to say that the constraints are inconsistent
+        except ValueError:  # raised where the constraints are inconsistent
             return None
 
     return run
@@ -388,7 +388,7 @@ def _scs(task: Task) -> Single:
 
 
 def _moreau_solver(task: Task, size: int) -> tuple[Any, Array, Array, Array, Array]:
-    """A compiled solver for `size` problems at once, and the values of P, A, q and b of all."""
+    """Return a compiled solver for `size` problems at once, and the values of P, A, q and b of all."""
     import moreau
 
     stacked = [_one_sided(qp) for qp in task.qps]

@@ -1,4 +1,4 @@
-"""What the hot-loop benchmark asks: sets of random tension problems of one kind and one number of cables.
+"""The tasks of the hot-loop benchmark: sets of random tension problems of one kind and one number of cables.
 
 Kinds: "feasible"; "infeasible", a wrench beyond the available wrench set by 0.001 to 0.3 of the largest tension;
 "rank-deficient", six equations of rank five, feasible; "soft", an infeasible one of which some wrench may be missing,
@@ -48,7 +48,7 @@ class Task(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Kind and number of cables, for tables."""
+        """Return kind and number of cables, for tables."""
         return f"{self.kind}, m = {self.m}"
 
 
@@ -77,7 +77,7 @@ def _problem(rng: np.random.Generator, kind: str, m: int) -> TensionProblem:
 
 
 def _wrench_matrix(rng: np.random.Generator, m: int, axis: bool) -> Array:
-    """Wrench matrix (6, m) of random directions at attachments within a metre, or on one axis: then of rank five."""
+    """Return the wrench matrix (6, m) of random directions at attachments within a metre, or on one axis: rank five."""
     u = rng.normal(size=(3, m))
     u /= np.linalg.norm(u, axis=0)
     r = rng.uniform(-1.0, 1.0, size=(3, m))
@@ -88,9 +88,9 @@ def _wrench_matrix(rng: np.random.Generator, m: int, axis: bool) -> Array:
 
 
 def _optimum(qp: dict[str, Any]) -> Array:
-    """The optimum of a QP with diagonal cost, proven by multipliers.
+    """Return the optimum of a QP with diagonal cost, proven by multipliers.
 
-    DAQP says which limits are met; the rest is least squares, and the multipliers are the proof.
+    DAQP finds which limits are met; the rest is least squares, and the multipliers are the proof.
     """
     import daqp
 

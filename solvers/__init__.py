@@ -1,6 +1,6 @@
 """Tension distribution: which tensions, inside their limits, give a wrench, or proof that none do.
 
-Plain NumPy arrays in and out; this room knows no robot. State a `TensionProblem`, call `solve`, read the
+Plain NumPy arrays in and out; this package knows no robot. State a `TensionProblem`, call `solve`, read the
 `TensionSolution`, or give arrays to `solve_batch`; an infeasible problem comes with a `Certificate`.
 """
 

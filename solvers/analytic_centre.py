@@ -17,7 +17,7 @@ class AnalyticCentre(Method):
     """Analytic centre of the feasible tensions.
 
     Existence: wherever the feasible tensions have an interior and are bounded; where they have no interior (w on the
-    very boundary), the nearest to t_ref; failed if they are unbounded. Cables without any limit have no say in it. A
+    very boundary), the nearest to t_ref; failed if they are unbounded. Cables without any limit have no influence. A
     smooth function of A (of constant rank), w and the limits; t_ref and weights play no part. Like "centroid" without
     its geometry: any m - rank costs the same, about ten Newton steps, few from the last answer (`start`). Outside the
     feasible set: a certificate.
@@ -31,7 +31,7 @@ class AnalyticCentre(Method):
     exact: ClassVar[bool] = True
     continuous: ClassVar[bool] = True
     options: ClassVar[dict[str, str] | None] = {
-        "start": "tensions to start from [N], shape (m,), say the last answer; they need not give w"
+        "start": "tensions to start from [N], shape (m,), for example the last answer; they need not give w"
     }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
@@ -40,7 +40,7 @@ class AnalyticCentre(Method):
         limited = np.isfinite(form.lower) | np.isfinite(form.upper)
         if limited.all():
             return barrier_point(form, 0.0, 1.0, start)
-        # Cables without limits have no say in the centre: they give what the others leave, in one way if it is bounded.
+        # Cables without limits do not affect the centre: they give what the others leave, in one way if it is bounded.
         unlimited = form.Q[:, ~limited]
         U, sigma, _ = np.linalg.svd(unlimited)
         if sigma.size < unlimited.shape[1] or sigma.min(initial=1.0) <= RANK:

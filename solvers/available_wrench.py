@@ -28,7 +28,7 @@ class Facets:
         (N, K, n), of length one. Directions that are no facet's are among them; they do no harm, as each of them
         bounds the set where it ends.
     low, high
-        The least and the most along each normal, (N, K) [N].
+        The minimum and the maximum along each normal, (N, K) [N].
     outside
         Projection on the wrenches that no tensions can give, (N, n, n); zero where A has n independent columns.
     offset
@@ -83,7 +83,7 @@ def facets(A: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> Facets:
 
 
 def spans(A: np.ndarray) -> np.ndarray:
-    """Whether the columns of each A (N, n, m) span R^n, (N,) of bool."""
+    """Return whether the columns of each A (N, n, m) span R^n, (N,) of bool."""
     from .facet_kernel import full_rank
 
     full = np.empty(len(A), dtype=np.bool_)
@@ -92,7 +92,7 @@ def spans(A: np.ndarray) -> np.ndarray:
 
 
 def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
-    """Rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None: all of R^n."""
+    """Return rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None: all of R^n."""
     full = spans(columns)
     found: list[tuple[np.ndarray, np.ndarray | None]] = [(np.flatnonzero(full), None)] if full.any() else []
     flat = np.flatnonzero(~full)
@@ -104,7 +104,7 @@ def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
 
 
 def _full(columns: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Normals (N, K, n) and the least and the most along them (N, K), of columns (N, n, m) that span R^n."""
+    """Return normals (N, K, n) and minimum and maximum along them (N, K), of columns (N, n, m) that span R^n."""
     from . import facet_kernel
 
     count, n, m = columns.shape
@@ -122,7 +122,7 @@ def _full(columns: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.nd
 def _together(
     described: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]], count: int, n: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Groups of different numbers of facets in common arrays; the first facet fills up what is left."""
+    """Put groups of different numbers of facets into common arrays; the first facet fills up what is left."""
     most_facets = max(normals.shape[1] for _, normals, _, _ in described)
     arrays = np.empty((count, most_facets, n)), np.empty((count, most_facets)), np.empty((count, most_facets))
     for rows, *group in described:

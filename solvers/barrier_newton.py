@@ -41,8 +41,8 @@ _REDUCTION = 0.05
 # Of the way to the nearest limit, what a step may go.
 _FRACTION = 0.99
 
-# A distance to a limit, in units of s, that rounding may turn into none.
-_NO_ROOM = 1e-13
+# A distance to a limit, in units of s, that rounding may cancel.
+_NO_SPACE = 1e-13
 
 # In units of s, which is of order one: a minimiser out here means that there is none.
 _FAR = 1e9
@@ -82,14 +82,14 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
 def _pulled_inside(form: StandardForm, start: Array | None) -> Array:
     """Return a point strictly inside the limits, near `start` if there is one."""
     lower, upper = form.lower, form.upper
-    room = np.minimum(upper - lower, 2.0)
+    space = np.minimum(upper - lower, 2.0)
     if start is None:
         both = np.isfinite(lower) & np.isfinite(upper)
         middle = 0.5 * np.where(both, lower, 0.0) + 0.5 * np.where(both, upper, 0.0)
         start = np.where(both, middle, np.minimum(np.maximum(lower + 0.5, 0.0), upper - 0.5))
         # Of a range much wider than the load, the middle is far from everything.
         start = np.minimum(np.maximum(start, -2.0 + np.maximum(lower, 0.0)), 2.0 + np.maximum(lower, 0.0))
-    return np.minimum(np.maximum(start, lower + 1e-3 * room), upper - 1e-3 * room)
+    return np.minimum(np.maximum(start, lower + 1e-3 * space), upper - 1e-3 * space)
 
 
 def _slopes(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array, Array]:
@@ -131,8 +131,8 @@ def _primal_dual(form: StandardForm, square: float, mu: float, s: Array, warm: b
         s = s + length * step
         at_lower, at_upper = at_lower + length * change_low, at_upper + length * change_high
         below, above = s - form.lower, form.upper - s
-        room = min(float(below.min(initial=np.inf)), float(above.min(initial=np.inf)))
-        if not (np.abs(s).max(initial=0.0) < _FAR and room > _NO_ROOM):
+        space = min(float(below.min(initial=np.inf)), float(above.min(initial=np.inf)))
+        if not (np.abs(s).max(initial=0.0) < _FAR and space > _NO_SPACE):
             return None, iteration + 1
         with np.errstate(invalid="ignore"):
             products = np.concatenate([at_lower * below, at_upper * above])
@@ -182,19 +182,19 @@ def _way_to_zero(values: Array, change: Array) -> float:
 
 def _way_to_limits(form: StandardForm, s: Array, step: Array) -> float:
     """Return how many steps it is to the first limit."""
-    room = np.where(step > 0, form.upper - s, s - form.lower)
+    space = np.where(step > 0, form.upper - s, s - form.lower)
     moving = step != 0.0
-    return float((room[moving] / np.abs(step[moving])).min(initial=np.inf))
+    return float((space[moving] / np.abs(step[moving])).min(initial=np.inf))
 
 
 def _interior_point(form: StandardForm) -> Array | None:
     """Return a point as far inside the limits as a linear program finds one, or None."""
     k = form.lower.size
-    # Of wide ranges, a unit of s is room enough.
-    room = np.minimum(form.upper - form.lower, 1.0)[:, None]
-    rows = np.block([[-np.eye(k), room], [np.eye(k), room]])
+    # Of wide ranges, a unit of s is space enough.
+    space = np.minimum(form.upper - form.lower, 1.0)[:, None]
+    rows = np.block([[-np.eye(k), space], [np.eye(k), space]])
     found = optimise(form, np.r_[np.zeros(k), -1.0], rows, np.r_[-form.lower, form.upper], nonnegative=True, most=0.5)
     if found.s is None:
         return None
-    share = (np.minimum(found.s - form.lower, form.upper - found.s) / room[:, 0]).min(initial=1.0)
+    share = (np.minimum(found.s - form.lower, form.upper - found.s) / space[:, 0]).min(initial=1.0)
     return found.s if share > 1e-9 else None

@@ -50,7 +50,7 @@ class BatchSolution:
         Wall time of the call [s].
     problem :
         A, w, t_min, t_max, t_ref, weights and length, broadcast. Views of what was given, where that was an array of
-        float64: not to be changed as long as `solution` may be asked.
+        float64: not to be changed as long as `solution` may be called.
     rho :
         As it was given.
     backend :
@@ -72,28 +72,28 @@ class BatchSolution:
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Where the tensions can be used as they are, shape (...)."""
+        """Return where the tensions can be used as they are, shape (...)."""
         return self.code == 0
 
     @cached_property
     def status(self) -> NDArray[np.str_]:
-        """The status of each row as text, shape (...): "optimal", "infeasible", ..."""
+        """Return the status of each row as text, shape (...): "optimal", "infeasible", ..."""
         return np.array([status.value for status in _STATUSES])[self.code]
 
     def count(self) -> dict[Status, int]:
-        """How many rows have each status, for those that occur."""
+        """Return how many rows have each status, for those that occur."""
         numbers = np.bincount(self.code.ravel(), minlength=len(_STATUSES))
         return {status: int(number) for status, number in zip(_STATUSES, numbers, strict=True) if number}
 
     def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
-        """Solve one row again by itself, for its certificate and all that a `TensionSolution` can tell.
+        """Solve one row again by itself, for its certificate and all else that a `TensionSolution` has.
 
         With the method "active-set", or "soft-wrench" if `rho` was given; `index` picks it, a number or a tuple.
 
         Raises
         ------
         InputError
-            If the row is invalid; the message says why.
+            If the row is invalid; the message gives the reason.
         """
         accepted = f"index must pick one row of a batch of shape {self.code.shape}"
         try:

@@ -1,7 +1,7 @@
 """The optimum when w is on the boundary of the available wrench set, where rounding decides between yes and no.
 
 There the feasible tensions have no interior, and an error of 1e-16 in A or w makes an exact method see none. `solve`
-comes here if the method found nothing and no certificate says why.
+comes here if the method found nothing and no certificate explains it.
 """
 
 from collections.abc import Iterator
@@ -17,22 +17,22 @@ from .standard_form import StandardForm
 
 __all__ = ["careful_candidates"]
 
-# How much the limits give way, in units of s; every tension is put back inside its limits afterwards, so this much
+# How far the limits move outwards, in units of s; every tension is put back inside its limits afterwards, so this much
 # wrench error remains.
-_ROOM = (1e-13, 1e-12, 1e-11, 1e-10)
+_SLACKS = (1e-13, 1e-12, 1e-11, 1e-10)
 
 
 def careful_candidates(problem: TensionProblem, form: StandardForm) -> Iterator[NDArray[np.float64]]:
     """Yield points s, shape (k,), that give the available wrench nearest to w, the best first.
 
-    The projection of w is available without doubt, its tensions are at hand, and limits with a hair of room around
-    them give even an exact method something to find. Where the weights are eleven decades apart the daqp package finds
+    The projection of w is available without doubt, its tensions are at hand, and limits moved outwards by a hair
+    give even an exact method something to find. Where the weights are eleven decades apart the daqp package finds
     nothing there either, although w may be far from the boundary: then our own kernel may.
     """
     nearest = _nearest_available(problem, form)
     b = form.Q @ nearest
-    for room in _ROOM:
-        upper, lower = np.append(form.upper + room, b), np.append(form.lower - room, b)
+    for slack in _SLACKS:
+        upper, lower = np.append(form.upper + slack, b), np.append(form.lower - slack, b)
         s = bounded_least_norm(upper, lower, form.Q, equalities=b.size).s
         if s is not None:
             yield s

@@ -1,6 +1,6 @@
 """Tension distribution inside a CasADi expression: `casadi_function`.
 
-CasADi is imported here and nowhere else in this room.
+CasADi is imported here and nowhere else in this package.
 """
 
 import re

@@ -40,8 +40,8 @@ class Centroid(Method):
         """Take the centroid of the corners in the null space."""
         freedom = form.N.shape[0]
         if freedom > _MOST:
-            told = f"m - rank is {freedom}, and a centroid is costly beyond {_MOST}; analytic-centre takes any"
-            return Proposal(None, detail=told, final=True)
+            detail = f"m - rank is {freedom}, and a centroid is costly beyond {_MOST}; analytic-centre takes any"
+            return Proposal(None, detail=detail, final=True)
         points = corners(form)
         if points is None:
             return Proposal(None, detail="the feasible tensions have no centroid: unbounded", final=True)

@@ -32,7 +32,7 @@ _LEAST_SHARE = 0.05
 
 
 class CertificateText(NamedTuple):
-    """What a certificate says, as text: `Certificate.describe` in pieces, for tables."""
+    """A certificate as text: `Certificate.describe` in pieces, for tables."""
 
     along: str
     needed: str
@@ -86,12 +86,12 @@ class Certificate:
 
     @property
     def binding(self) -> Indices:
-        """Indices of the cables whose limits determine the support value, ascending."""
+        """Return the indices of the cables whose limits determine the support value, ascending."""
         return np.sort(np.concatenate([self.at_max, self.at_min]))
 
     @property
     def singular(self) -> bool:
-        """True if no cable pulls along the direction: no tensions of either sign, however large, give w."""
+        """Return whether no cable pulls along the direction: no tensions of either sign, however large, give w."""
         return self.binding.size == 0
 
     def verify(self, problem: TensionProblem) -> bool:

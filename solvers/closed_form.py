@@ -58,7 +58,7 @@ def middle(form: StandardForm) -> Array:
 
 
 def outside(form: StandardForm, s: Array) -> str:
-    """Say which cable is farthest outside its limits, in words; empty if none is."""
+    """Describe which cable is farthest outside its limits; empty if none is."""
     beyond = np.maximum(form.lower - s, s - form.upper) * form.unit
     if not (beyond > _SLACK * form.unit).any():
         return ""

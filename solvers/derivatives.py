@@ -87,7 +87,7 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
 def derivatives(problem: TensionProblem, tensions: Array) -> Derivatives:
     """Return the derivatives of the optimum with respect to wrench, limits and wrench matrix.
 
-    What `sensitivity` says of kinks holds for all. The tensions may also be those of "soft-wrench" for a w out of
+    The notes of `sensitivity` on kinks hold for all. The tensions may also be those of "soft-wrench" for a w out of
     reach.
 
     Parameters

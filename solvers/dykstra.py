@@ -6,7 +6,7 @@ $$
 
 Without the correction p the iterates reach some feasible point; with it, the one nearest to where they start. Where p
 is not 0 a limit holds the cable: as soon as those cables are the right ones, the rest is one least-squares problem, and
-the optimality conditions say that they are. The iterations alone would take thousands more where the two sets meet at
+the optimality conditions hold. The iterations alone would take thousands more where the two sets meet at
 a small angle.
 """
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 # stays. The change of p is that same distance (Birgin and Raydan 2005), so a standstill of x alone does not stop it.
 _STEP = 1e-11
 
-# How often to ask whether the cables at their limits are the right ones, and whether the gap between the two sets has
+# How often to check whether the cables at their limits are the right ones, and whether the gap between the two sets has
 # become a proof that they do not meet.
 _CHECK = 50
 
@@ -43,8 +43,8 @@ class Dykstra(Method):
     hence continuous; it ends once the cables at their limits are found, but it may stand still for long before. Stops
     when those cables fulfil the optimality conditions, when the two projections agree to 1e-11 of the size of the
     tensions, when they prove that there is nothing, or after `max_iter`: then the status is inaccurate and `residual`
-    says how far it came. Cost: two matrix products an iteration, tens to thousands of iterations. Outside the feasible
-    set: a certificate.
+    reports how far it came. Cost: two matrix products an iteration, tens to thousands of iterations. Outside the
+    feasible set: a certificate.
     """
 
     name: ClassVar[str] = "dykstra"
@@ -99,7 +99,7 @@ def _optimum_held_by(form: StandardForm, p: Array) -> Array | None:
 
 
 def _apart(form: StandardForm, direction: Array) -> bool:
-    """Say if no s inside the limits reaches b along a direction, shape (r,)."""
+    """Return whether no s inside the limits reaches b along a direction, shape (r,)."""
     pull = direction @ form.Q
     pulling = np.abs(pull) > 1e-11 * np.abs(pull).max()
     far = np.where(pull > 0.0, form.upper, form.lower)[pulling] @ pull[pulling]

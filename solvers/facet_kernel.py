@@ -48,7 +48,7 @@ def facets(
                 for i in range(n):
                     column[j, i, lane] = A[matrix, i, j]
                     square += A[matrix, i, j] ** 2
-                # Columns of length one, so that a short one has a say in where its facet is.
+                # Columns of length one, so that a short one affects where its facet is.
                 per_length[j, lane] = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
         basis[0] = 0.0
         for i in range(n):

@@ -120,7 +120,7 @@ def meet(N: Array, low: Array, high: Array, zero: Array | None = None) -> Array:
 
 
 def inside(s: Array, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Say which of the points s, shape (points, k), are inside the limits, but for rounding."""
+    """Return which of the points s, shape (points, k), are inside the limits, but for rounding."""
     slack = _SLACK * (1.0 + np.abs(s).max(axis=1, initial=0.0))[:, None]
     return ((s >= low - slack) & (s <= high + slack)).all(axis=1)
 

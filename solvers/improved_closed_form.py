@@ -16,9 +16,9 @@ class ImprovedClosedForm(Method):
     """Closed form in which cables beyond their limits are held there, one after the other.
 
     Existence: better than the closed form, still not guaranteed: a cable that was held is never released (status failed
-    then, `detail` says where it stopped). Continuous as long as the same cables are held; where the choice of the worst
-    cable changes it may jump. Cost: at most m - rank + 1 pseudo-inverses. Outside the feasible set: a certificate. With
-    weights the worst cable is the one with the largest weighted excess.
+    then, `detail` reports where it stopped). Continuous as long as the same cables are held; where the choice of the
+    worst cable changes it may jump. Cost: at most m - rank + 1 pseudo-inverses. Outside the feasible set: a
+    certificate. With weights the worst cable is the one with the largest weighted excess.
     """
 
     name: ClassVar[str] = "improved-closed-form"
@@ -42,7 +42,7 @@ class ImprovedClosedForm(Method):
             if np.sqrt(error @ error) > FEASIBILITY * (1.0 + np.abs(s).max(initial=0.0)):
                 return Proposal(None, reduction + 1, f"no redundancy left after {reduction} cables were held")
             if not outside(form, s):
-                # What is but rounding away from a limit is at it: a problem that asks for nothing has no tolerance.
+                # Up to rounding this is at a limit: a problem that requires no wrench has no tolerance.
                 s = np.where(np.abs(s - form.lower) < ROUNDING, form.lower, s)
                 return Proposal(np.where(np.abs(s - form.upper) < ROUNDING, form.upper, s), reduction + 1)
             beyond = np.where(free, np.maximum(form.lower - s, s - form.upper), -np.inf)

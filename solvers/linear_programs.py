@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 # HiGHS is content with 1e-7; what is left after 1e-10, its least, `_nearest` takes away.
 _OPTIONS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
-# HiGHS's status: unbounded, or presolve cannot say whether unbounded or infeasible. A certificate says.
+# HiGHS's status: unbounded, or presolve cannot decide whether unbounded or infeasible. A certificate decides.
 _UNBOUNDED = (3, 4)
 
 # By how much the optimum may be missed in the choice among equally good tensions, relative to its size.
@@ -161,8 +161,8 @@ def optimise(
     )
     if answer.x is None or answer.status != 0:
         unbounded = answer.status in _UNBOUNDED
-        told = "no limit bounds what is optimised" if unbounded else f"highs: {answer.message}"
-        return Proposal(None, detail=told, final=unbounded)
+        detail = "no limit bounds what is optimised" if unbounded else f"highs: {answer.message}"
+        return Proposal(None, detail=detail, final=unbounded)
     return Proposal(_on_the_equations(form, answer.x[:k]), int(answer.nit))
 
 

@@ -44,7 +44,7 @@ class LogBarrier(Method):
     options: ClassVar[dict[str, str] | None] = {
         "barrier": "square root of mu in units of the narrowest range t_max - t_min (of 1 N if there is none); 0.01 if "
         "not given",
-        "start": "tensions to start from [N], shape (m,), say the last answer; they need not give w",
+        "start": "tensions to start from [N], shape (m,), for example the last answer; they need not give w",
     }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

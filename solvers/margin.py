@@ -48,7 +48,7 @@ def capacity_margin(problem: TensionProblem) -> Margin:
     """Return the capacity margin of a wrench, its gradient and the direction of least reserve.
 
     Outside, minus the value is the distance from w to the set: the certificate's shortfall (but for status singular,
-    where the certificate counts the part outside the range of A alone). Inside, every facet is looked at: all subsets
+    where the certificate counts the part outside the range of A alone). Inside, every facet is checked: all subsets
     of rank - 1 of the cables with a choice, 56 for m = 8 and 792 for m = 12 with six equations.
 
     If the set is flat (rank of the cables with a choice below n) it has no inside among all wrenches. Then a wrench in
@@ -101,7 +101,7 @@ def _normals(columns: Array) -> Array:
     rank, k = columns.shape
     subsets = np.array(list(combinations(range(k), rank - 1)), dtype=np.intp).reshape(comb(k, rank - 1), rank - 1)
     chosen = np.zeros((subsets.shape[0], rank, rank))
-    # Columns of length one, so that a short one has a say in where its facet is.
+    # Columns of length one, so that a short one affects where its facet is.
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
     chosen[:, : rank - 1] = unit.T[subsets]

@@ -23,10 +23,10 @@ class Proposal(NamedTuple):
     iterations :
         How many it took, None if not counted.
     detail :
-        The reason in words when `s` is None.
+        The reason when `s` is None.
     final :
-        True if this stands even if the problem is feasible, say because the feasible tensions are unbounded: `solve`
-        does not look in `boundary.py` for what rounding may have lost.
+        True if this stands even if the problem is feasible, for example because the feasible tensions are unbounded:
+        `solve` does not look in `boundary.py` for what rounding may have lost.
     """
 
     s: NDArray[np.float64] | None
@@ -69,22 +69,22 @@ class Method(ABC):
     """Keyword arguments of `propose` and what they mean; None = whatever the back end takes."""
 
     def backends(self) -> list[str]:
-        """Names of the installed back ends, the default first; empty for methods that have none."""
+        """Return the names of the installed back ends, the default first; empty for methods that have none."""
         return []
 
     def attempt(self, problem: TensionProblem) -> tuple[Status, NDArray[np.float64] | None] | None:
-        """Answer on the spot, or return None: then `propose` is asked and judged.
+        """Answer at once, or return None: then `propose` is called and judged.
 
         What is returned here is not judged again. Tensions, (m,) [N], are inside the limits and give w within
         `TensionProblem.tolerance`; "infeasible" and "singular" rest on a direction that proves it by several times as
-        much, so that `certify` finds the sharpest certificate when somebody asks for it.
+        much, so that `certify` finds the sharpest certificate when it is first read.
         """
         return None
 
     def direction(self, problem: TensionProblem) -> NDArray[np.float64] | None:
         """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of `attempt` rests.
 
-        It is asked for only where `certify` finds none.
+        It is computed only where `certify` finds none.
         """
         return None
 

@@ -21,7 +21,7 @@ _SLACK = 1e-12  # How far s, of order one, may pass a limit; `solve` moves it ba
 
 
 class MinNorm(Method):
-    """Pseudo-inverse solution, moved along the null space as little as the limits ask."""
+    """Pseudo-inverse solution, moved along the null space as little as the limits require."""
 
     name: ClassVar[str] = "min-norm"
     guarantee: ClassVar[str] = (

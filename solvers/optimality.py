@@ -8,7 +8,8 @@ N s = N \mu, \qquad \mu_i \ge 0 \text{ at } lower_i, \quad \mu_i \le 0 \text{ at
 \mu_i = 0 \text{ elsewhere}
 $$
 
-Such a $\mu$ is a proof, whoever proposed s. One so large that a limit moved by rounding would move the cost is none.
+Such a $\mu$ is a proof, whatever method proposed s. It proves nothing if it is so large that a limit moved by rounding
+would change the cost.
 """
 
 import numpy as np

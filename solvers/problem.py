@@ -21,7 +21,7 @@ _HEAVIEST, _LIGHTEST = 1e20, 1e-20
 
 @dataclass(frozen=True, eq=False)
 class TensionProblem:
-    r"""Tensions nearest to a wish that give a wrench inside the tension limits.
+    r"""Tensions nearest to reference tensions that give a wrench inside the tension limits.
 
     $$
     \min\limits_t \; \sum_i \omega_i (t_i - t_{\text{ref},i})^2
@@ -42,15 +42,15 @@ class TensionProblem:
         Tension limits [N], shape (m,) or one number for all cables. Equal limits fix a tension; t_min may be -inf and
         t_max +inf.
     t_ref :
-        Tensions to stay near [N], shape (m,) or one number; they need not lie inside the limits. None = 0, which asks
-        for the least norm.
+        Tensions to stay near [N], shape (m,) or one number; they need not lie inside the limits. default: 0, for
+        the least norm.
     weights :
         Weights omega of the cables in the cost, from 1e-20 to 1e20 and at most 1e14 apart, shape (m,) or one number.
         None = 1.
     length :
         Characteristic length [m], from 1e-20 to 1e20, by which moment rows (3 to 5, when n = 6) are divided wherever
         newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes which
-        tensions are optimal. None = 1 m.
+        tensions are optimal. Default: 1 m.
 
     Raises
     ------
@@ -124,17 +124,17 @@ class TensionProblem:
 
     @property
     def n(self) -> int:
-        """Number of wrench rows."""
+        """Return the number of wrench rows."""
         return self.A.shape[0]
 
     @property
     def m(self) -> int:
-        """Number of cables."""
+        """Return the number of cables."""
         return self.A.shape[1]
 
     @cached_property
     def row_scale(self) -> Array:
-        """Diagonal of S, shape (n,): 1 for force rows, 1 / length for moment rows, so that S w is in newtons."""
+        """Return the diagonal of S, shape (n,): 1 for force rows, 1 / length for moment rows; S w is in newtons."""
         scale = np.ones(self.n)
         if self.n == 6:
             scale[3:] = 1.0 / self.length
@@ -142,21 +142,21 @@ class TensionProblem:
 
     @cached_property
     def scaled_A(self) -> Array:
-        """S A, shape (n, m) [N per N]."""
+        """Return S A, shape (n, m) [N per N]."""
         return self.A if self.length == 1.0 else self.row_scale[:, None] * self.A
 
     @cached_property
     def scaled_w(self) -> Array:
-        """S w, shape (n,) [N]."""
+        """Return S w, shape (n,) [N]."""
         return self.w if self.length == 1.0 else self.row_scale * self.w
 
     @cached_property
     def column_norms(self) -> Array:
-        """Norm of each column of S A, shape (m,): the wrench that 1 N in a cable makes [N per N]."""
+        """Return the norm of each column of S A, shape (m,): the wrench that 1 N in a cable makes [N per N]."""
         return np.sqrt(np.einsum("ij,ij->j", self.scaled_A, self.scaled_A))
 
     def tolerance(self, tensions: Array) -> float:
-        r"""Largest wrench error [N] at which `tensions` still count as giving w.
+        r"""Return the largest wrench error [N] at which `tensions` are accepted as giving w.
 
         $$
         10^{-9} \Big( |S w| + \sum_i |S a_i| \, |\hat t_i| \Big)
@@ -164,7 +164,7 @@ class TensionProblem:
         $$
 
         with $\hat t_i$ the tension inside the limits that is nearest to 0: the first part is relative to what the
-        problem asks, never to a limit that happens to be huge; the second is the rounding of A t itself.
+        problem requires, never to a limit that happens to be huge; the second is the rounding of A t itself.
 
         Parameters
         ----------
@@ -174,8 +174,8 @@ class TensionProblem:
         if not isinstance(tensions, np.ndarray) or tensions.shape != self.t_min.shape or tensions.dtype != np.float64:
             tensions = _per_cable("tensions", tensions, self.m)
         nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
-        asked = np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero)
-        return float(FEASIBILITY * asked + ROUNDING * (self.column_norms @ (np.abs(tensions) + np.abs(self.t_ref))))
+        required = np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero)
+        return float(FEASIBILITY * required + ROUNDING * (self.column_norms @ (np.abs(tensions) + np.abs(self.t_ref))))
 
 
 def _real_array(name: str, value: ArrayLike) -> Array:

@@ -37,7 +37,7 @@ def project(problem: TensionProblem) -> tuple[Array, Array]:
         if residual @ residual > 1e-2 * (given @ given):
             break
     # A cable that is not at a limit has no part along the residual, but for rounding. One that has is at its limit, and
-    # it is rounding that says it is not.
+    # only rounding puts it inside.
     still = np.abs(residual @ M) <= _STILL * problem.column_norms * np.sqrt(residual @ residual)
     inside = (closest > problem.t_min) & (closest < problem.t_max) & still
     return closest, _orthogonal_part(residual, M[:, inside])

@@ -60,7 +60,7 @@ class QuadraticProgram(Method):
     options: ClassVar[dict[str, str] | None] = None
 
     def backends(self) -> list[str]:
-        """Names of the installed back ends, the default first."""
+        """Return the names of the installed back ends, the default first."""
         import qpsolvers
 
         return sorted(qpsolvers.available_solvers, key=lambda name: (name != "clarabel", name))
@@ -119,8 +119,8 @@ def _call_once(
                 ) from None
             return Proposal(None, detail=f"{name}: {type(error).__name__}: {error}")
     if not answer.found or answer.x is None or not np.isfinite(answer.x).all():
-        said = answer.extras.get("status") or getattr(answer.extras.get("info"), "status", "found nothing")
-        return Proposal(None, detail=f"{name}: {said}")
+        reason = answer.extras.get("status") or getattr(answer.extras.get("info"), "status", "no solution")
+        return Proposal(None, detail=f"{name}: {reason}")
     return Proposal(np.asarray(answer.x, dtype=np.float64))
 
 

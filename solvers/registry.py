@@ -71,8 +71,9 @@ def solve(
 ) -> TensionSolution:
     """Distribute the tensions of one problem.
 
-    An infeasible problem is an answer, not an exception: the status says so and a certificate proves it. "infeasible"
-    and "singular" never rest on a solver's word, only on a certificate that was verified.
+    An infeasible problem is an answer, not an exception: the status reports it and a certificate proves it. The status
+    "optimal" of a method of least squares rests on multipliers that were verified, "infeasible" and "singular" on a
+    certificate that was verified, never on a solver's word.
 
     Parameters
     ----------
@@ -81,14 +82,14 @@ def solve(
     method :
         One of `methods()`, or a method of your own (docs/adding-a-method.md).
     backend :
-        For "qp", the name of an installed QP solver; None = "clarabel".
+        For "qp", the name of an installed QP solver; default: "clarabel".
     **options :
         Options of the method, see `methods()[name].options`.
 
     Raises
     ------
     InputError
-        If there is no such method, back end or option; the message lists those that there are.
+        If there is no such method, back end or option; the message lists those that exist.
     """
     start = time.perf_counter()
     if (
@@ -106,31 +107,31 @@ def solve(
             return TensionSolution(problem, answer[1], answer[0], "active-set", form_of_kernels, spent, direction=proof)
     chosen, used_backend = _lookup(method, backend, options)
     if chosen is _ACTIVE_SET:
-        used_backend = "daqp"  # which the robust path of this method asks
+        used_backend = "daqp"  # the solver of the robust path
     required("problem", problem, TensionProblem)
     form = standard_form(problem)
-    proposal, verdict = None, None
+    proposal, judgement = None, None
     if form.sigma.size and form.sigma[-1] <= DOUBTFUL * form.sigma[0]:
         coarse = standard_form(problem, DOUBTFUL)
         proposal = _propose(chosen, coarse, used_backend, options)
-        verdict = _accept(problem, coarse, chosen, proposal)
-    if proposal is None or verdict is None:
+        judgement = _accept(problem, coarse, chosen, proposal)
+    if proposal is None or judgement is None:
         proposal = _propose(chosen, form, used_backend, options)
-        verdict = _accept(problem, form, chosen, proposal) or _explain(problem, form, chosen, proposal)
+        judgement = _accept(problem, form, chosen, proposal) or _explain(problem, form, chosen, proposal)
     return TensionSolution(
         problem,
-        verdict.tensions,
-        verdict.status,
+        judgement.tensions,
+        judgement.status,
         chosen.name,
         used_backend,
         time.perf_counter() - start,
-        verdict.certificate,
+        judgement.certificate,
         proposal.iterations,
-        verdict.detail,
+        judgement.detail,
     )
 
 
-class _Verdict(NamedTuple):
+class _Judgement(NamedTuple):
     status: Status
     tensions: NDArray[np.float64] | None = None
     certificate: Certificate | None = None
@@ -138,40 +139,40 @@ class _Verdict(NamedTuple):
 
 
 def _propose(method: Method, form: StandardForm, backend: str | None, options: dict[str, Any]) -> Proposal:
-    """Ask the method, unless its answer is t_ref and that will do."""
+    """Return the proposal of the method, or t_ref at once where that is its answer."""
     at_reference = not form.b.any() and (form.lower <= 0.0).all() and (form.upper >= 0.0).all()
     if at_reference and method.seeks_reference:
         return Proposal(np.zeros(form.moving.size))
     return method.propose(form, backend, **options)
 
 
-def _accept(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict | None:
-    """Return the verdict on tensions that give w and, of a method that solves the least squares, are optimal."""
+def _accept(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Judgement | None:
+    """Return the judgement on tensions that give w and, of a method that solves the least squares, are optimal."""
     tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
     if tensions is None or not _gives_wrench(problem, tensions):
         return None
-    return _Verdict(Status.OPTIMAL, tensions) if not method.least_squares or is_optimal(form, tensions) else None
+    return _Judgement(Status.OPTIMAL, tensions) if not method.least_squares or is_optimal(form, tensions) else None
 
 
-def _explain(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Verdict:
+def _explain(problem: TensionProblem, form: StandardForm, method: Method, proposal: Proposal) -> _Judgement:
     """Judge a proposal that was not accepted: by a certificate, else by verified tensions from elsewhere, else less."""
     tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
     useful = tensions if tensions is not None and _gives_wrench(problem, tensions) else None
     certificate = None if useful is not None else certify(problem)
     if certificate is not None and method.always_answers and tensions is not None:
-        return _Verdict(Status.INACCURATE, tensions, certificate, proposal.detail)
+        return _Judgement(Status.INACCURATE, tensions, certificate, proposal.detail)
     if certificate is not None:
-        return _Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
+        return _Judgement(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     if method.exact and not proposal.final:
         for s in careful_candidates(problem, form):
             candidate = form.tensions(problem, s)
             if _gives_wrench(problem, candidate):
                 if is_optimal(form, candidate):
-                    return _Verdict(Status.OPTIMAL, candidate, detail=_CAREFUL)
+                    return _Judgement(Status.OPTIMAL, candidate, detail=_CAREFUL)
                 useful = candidate if useful is None else useful
     if useful is not None:
-        return _Verdict(Status.INACCURATE, useful, detail="gives the wrench, but multipliers do not prove it optimal")
-    return _Verdict(Status.FAILED if tensions is None else Status.INACCURATE, tensions, detail=proposal.detail)
+        return _Judgement(Status.INACCURATE, useful, detail="gives the wrench, but multipliers do not prove it optimal")
+    return _Judgement(Status.FAILED if tensions is None else Status.INACCURATE, tensions, detail=proposal.detail)
 
 
 def _gives_wrench(problem: TensionProblem, tensions: NDArray[np.float64]) -> bool:

@@ -22,9 +22,9 @@ from .standard_form import StandardForm
 
 __all__ = ["SoftWrench"]
 
-# How much the limits may give way, in units of s, until least squares on the boundary of the available wrench set finds
-# something there despite rounding.
-_ROOM = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
+# How much the limits may move outwards, in units of s, until least squares on the boundary of the available wrench set
+# has a solution despite rounding.
+_SLACKS = (0.0, 1e-13, 1e-12, 1e-11, 1e-10)
 
 
 class SoftWrench(Method):
@@ -71,16 +71,16 @@ class SoftWrench(Method):
 def _nearest_wrench(form: StandardForm) -> Proposal:
     """Give b if that can be, else the available b nearest to it in newtons, with the least norm."""
 
-    def least_norm(b: NDArray[np.float64], room: float) -> Proposal:
-        upper, lower = np.append(form.upper + room, b), np.append(form.lower - room, b)
+    def least_norm(b: NDArray[np.float64], slack: float) -> Proposal:
+        upper, lower = np.append(form.upper + slack, b), np.append(form.lower - slack, b)
         return bounded_least_norm(upper, lower, form.Q, equalities=b.size)
 
     exact = least_norm(form.b, 0.0)
     if exact.s is not None:
         return exact
     nearest, _ = box_least_squares(form.sigma[:, None] * form.Q, form.sigma * form.b, form.lower, form.upper)
-    for room in _ROOM:
-        found = least_norm(form.Q @ nearest, room)
+    for slack in _SLACKS:
+        found = least_norm(form.Q @ nearest, slack)
         if found.s is not None:
             return found
     return Proposal(nearest)

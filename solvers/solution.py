@@ -21,7 +21,7 @@ class Status(StrEnum):
     """The tensions give w inside the limits, within `TensionProblem.tolerance`, and are the method's answer."""
 
     INFEASIBLE = "infeasible"
-    """The limits forbid w; a verified certificate says along which direction and by how much."""
+    """The limits forbid w; a verified certificate shows along which direction and by how much."""
 
     SINGULAR = "singular"
     """w has a part outside the range of A: no tensions of either sign give it, whatever the limits. The certificate's
@@ -29,7 +29,7 @@ class Status(StrEnum):
     if w is in its range the problem may well be optimal."""
 
     INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate says
+    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate proves
     that w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
 
     INVALID = "invalid"
@@ -38,7 +38,7 @@ class Status(StrEnum):
 
     FAILED = "failed"
     """A back end gave up, or called the problem infeasible and could not be believed, or the method has no answer here
-    although other methods may have one; `detail` says what it said."""
+    although other methods may have one; `detail` is its message."""
 
 
 class TensionSolution:
@@ -62,9 +62,9 @@ class TensionSolution:
     iterations :
         Iterations of the method, None if it does not count any.
     detail :
-        What there is to say beyond the status, else empty.
+        What the method reports beyond the status, else empty.
 
-    `direction` computes the direction on which the method's own verdict rests, when it is asked for.
+    `direction` computes the direction on which the method's own status rests, when it is first read.
     """
 
     __slots__ = (
@@ -109,10 +109,10 @@ class TensionSolution:
 
     @property
     def certificate(self) -> Certificate | None:
-        """Why there are no tensions, exactly if `status` is infeasible or singular.
+        """Return why there are no tensions, exactly if `status` is infeasible or singular.
 
         Its `closest` holds the tensions whose wrench is nearest. The method "active-set" proves its status by a
-        direction of its own; the sharpest certificate is then computed when it is first asked for. Where rounding keeps
+        direction of its own; the sharpest certificate is then computed when it is first read. Where rounding keeps
         the projection from finding it (cables parallel to six digits that pull with 1e6 times the load; one problem in
         10^5 of those) the certificate is along the method's own direction, and its shortfall is less than the distance.
 
@@ -126,7 +126,7 @@ class TensionSolution:
         return self._certificate
 
     def _own_proof(self) -> Certificate:
-        """Return the certificate along the direction on which the method's verdict rests."""
+        """Return the certificate along the direction on which the method's status rests."""
         direction = None if self._direction is None else self._direction(self.problem)
         certificate = None if direction is None else certificate_along(self.problem, direction)
         if certificate is None:
@@ -135,12 +135,12 @@ class TensionSolution:
 
     @property
     def feasible(self) -> bool:
-        """True if the tensions can be used as they are."""
+        """Return whether the tensions can be used as they are."""
         return self.status is Status.OPTIMAL
 
     @property
     def residual(self) -> float:
-        """Wrench error |S (A t - w)| [N], S dividing moments by the problem's length; nan without tensions."""
+        """Return the wrench error |S (A t - w)| [N], S dividing moments by the length; nan without tensions."""
         if self.tensions is None:
             return float("nan")
         error = self.problem.scaled_A @ self.tensions - self.problem.scaled_w
@@ -148,7 +148,7 @@ class TensionSolution:
 
     @property
     def bound_violation(self) -> float:
-        """Largest distance of a tension beyond its limits [N]; nan without tensions."""
+        """Return the largest distance of a tension beyond its limits [N]; nan without tensions."""
         if self.tensions is None:
             return float("nan")
         below, above = self.problem.t_min - self.tensions, self.tensions - self.problem.t_max
@@ -156,7 +156,7 @@ class TensionSolution:
 
     @property
     def cost(self) -> float:
-        """Value of the cost, sum of weights_i (t_i - t_ref_i)^2 [N^2]; nan without tensions."""
+        """Return the value of the cost, sum of weights_i (t_i - t_ref_i)^2 [N^2]; nan without tensions."""
         if self.tensions is None:
             return float("nan")
         return float(self.problem.weights @ (self.tensions - self.problem.t_ref) ** 2)

@@ -1,12 +1,12 @@
-r"""The form in which every method sees the problem, whatever its units, scales and rank.
+r"""The form in which every method gets the problem, whatever its units, scales and rank.
 
 $$
 \min_s |s|^2 \quad \text{s.t.} \quad Q s = b, \; lower \le s \le upper
 $$
 
 The rows of Q are orthonormal and s is of order one, so that a tolerance means the same for a toy and for a harbour
-crane. Cables with equal limits are gone: they are constants, and interior-point methods need room between limits. The
-part of w outside the range of A is gone too: whoever asks must look at the residual of the tensions.
+crane. Cables with equal limits are gone: they are constants, and interior-point methods need space between limits. The
+part of w outside the range of A is gone too: callers must check the residual of the tensions.
 """
 
 from typing import NamedTuple

@@ -15,7 +15,7 @@ class Case(NamedTuple):
 
 
 def geometric_matrix(rng, m):
-    """Wrench matrix (6, m) of unit cable directions at attachments within a metre."""
+    """Return the wrench matrix (6, m) of unit cable directions at attachments within a metre."""
     u = rng.normal(size=(3, m))
     u /= np.linalg.norm(u, axis=0)
     r = rng.uniform(-1.0, 1.0, size=(3, m))
@@ -23,7 +23,7 @@ def geometric_matrix(rng, m):
 
 
 def random_tensions(rng, m):
-    """Tensions inside the limits; in every second draw many of them at a limit."""
+    """Return tensions inside the limits; in every second draw many of them at a limit."""
     t = rng.uniform(T_MIN, T_MAX, m)
     if rng.random() < 0.5:
         t[rng.random(m) < 0.4] = T_MIN
@@ -37,7 +37,7 @@ def random_feasible(rng, m):
 
 
 def random_infeasible(rng, m):
-    """A wrench pushed out of the available wrench set along a direction, by 0.001 N to 20 N.
+    """Return a wrench pushed out of the available wrench set along a direction, by 0.001 N to 20 N.
 
     With fewer than six cables half of the directions lie in the range of A: those are infeasible, the others singular.
     """
@@ -86,7 +86,7 @@ def _zoo():
     yield "twin cables", TensionProblem(twins, twins @ inside, T_MIN, T_MAX), "optimal"
     yield "opposed cables", TensionProblem(opposed, opposed @ inside, T_MIN, T_MAX), "optimal"
     yield "rank three, in range", TensionProblem(flat, flat @ inside, T_MIN, T_MAX), "optimal"
-    yield "rank three, a moment asked", TensionProblem(flat, spatial @ inside, T_MIN, T_MAX), "singular"
+    yield "rank three, a moment required", TensionProblem(flat, spatial @ inside, T_MIN, T_MAX), "singular"
     yield "rank three, too far", TensionProblem(flat, [0, 0, 500, 0, 0, 0], T_MIN, T_MAX), "infeasible"
     yield "all tensions fixed, right", TensionProblem(spatial, spatial @ inside, inside, inside), "optimal"
     yield "all tensions fixed, wrong", TensionProblem(spatial, spatial @ inside + 1, inside, inside), "infeasible"

@@ -9,7 +9,7 @@ from scipy.sparse import csc_matrix
 
 
 def row_scale(n, length):
-    """Diagonal of S as a list: what makes newton metres newtons."""
+    """Return the diagonal of S as a list: what makes newton metres newtons."""
     return [1.0 / length if n == 6 and row >= 3 else 1.0 for row in range(n)]
 
 
@@ -47,7 +47,7 @@ def distance_to_available(A, w, t_min, t_max, length=1.0):
     t_rows = np.hstack([np.eye(m), np.zeros((m, 1))])
     tau_row = np.r_[np.zeros(m), -1.0]
     wrench_rows = np.hstack([S @ A, np.zeros((n, 1))])
-    high, low = t_max < 1e9 * size, t_min > -1e9 * size  # an interior-point method cannot see both 1 and 1e12
+    high, low = t_max < 1e9 * size, t_min > -1e9 * size  # an interior-point method cannot resolve both 1 and 1e12
     rows = np.vstack([t_rows[high], -t_rows[low], tau_row, wrench_rows])
     right = np.concatenate([t_max[high], -t_min[low], [0.0], S @ w]) / size
     cones = [clarabel.NonnegativeConeT(int(high.sum() + low.sum())), clarabel.SecondOrderConeT(n + 1)]

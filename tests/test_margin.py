@@ -167,7 +167,7 @@ def test_the_casadi_function_is_solve_with_a_derivative():
 
 
 def test_the_casadi_function_works_inside_a_nonlinear_program():
-    """Which load, near a wished one, is carried with the least effort? A quadratic program, solved as such as well."""
+    """Compare with the same quadratic program, solved as such: the load, near a wished one, of the least effort."""
     rng = np.random.default_rng(7)
     problem = inner_problem(rng, 8)
     function = casadi_function(8)

@@ -1,4 +1,4 @@
-"""Each method against what it claims: status, optimality, continuity; agreement where theory says they agree."""
+"""Check each method against what it claims: status, optimality, continuity; agreement where theory says they agree."""
 
 import re
 import subprocess
@@ -73,13 +73,13 @@ def test_every_feasible_problem_is_solved_by_methods_that_say_so(method):
 
 
 def inner_problem(rng, m, **wish):
-    """A problem with tensions well inside the limits."""
+    """Return a problem with tensions well inside the limits."""
     A = geometric_matrix(rng, m)
     return TensionProblem(A, A @ rng.uniform(5, 50, m), T_MIN, T_MAX, **wish)
 
 
 def best_along(problem, gradient):
-    """Least gradient . t among the feasible tensions, by linear program."""
+    """Return the least gradient . t among the feasible tensions, by linear program."""
     bounds = np.column_stack([problem.t_min, problem.t_max])
     answer = linprog(gradient, A_eq=problem.A, b_eq=problem.w, bounds=bounds, method="highs")
     assert answer.status == 0
@@ -130,7 +130,7 @@ def test_linear_programs_reach_the_optimum_of_a_plain_formulation():
 
 @pytest.mark.parametrize("p", [3, 4, 8])
 def test_p_norm_is_optimal(p):
-    """No feasible direction goes down: the gradient's best feasible point is the answer itself."""
+    """Check that no feasible direction goes down: the gradient's best feasible point is the answer itself."""
     rng = np.random.default_rng(35)
     for k in range(20):
         m = 7 + k % 3
@@ -269,7 +269,7 @@ CONTINUOUS = [name for name, method in methods().items() if method.continuous]
 
 @pytest.mark.parametrize("method", CONTINUOUS)
 def test_methods_that_claim_continuity_do_not_jump(method):
-    """Twenty motions; `python -m towline.benchmarks.continuity` takes a hundred."""
+    """Check twenty motions; `python -m towline.benchmarks.continuity` takes a hundred."""
     result = continuity(method, range(20))
     print(method, result)
     assert result.worst <= JUMP
@@ -278,7 +278,7 @@ def test_methods_that_claim_continuity_do_not_jump(method):
 
 
 def test_the_continuity_test_can_see():
-    """Linear programs do jump as the cables turn; one of twenty motions shows it."""
+    """Check that linear programs jump as the cables turn; one of twenty motions shows it."""
     assert continuity("1-norm", range(20)).worst > 0.3
 
 

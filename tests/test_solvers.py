@@ -95,8 +95,8 @@ def test_methods_and_a_linear_program_agree_on_500_feasible_problems():
         problem = random_feasible(rng, m=3 + k % 6)
         assert linear_program_status(problem.A, problem.w, problem.t_min, problem.t_max) == "optimal"
         solutions = {contender: solve(problem, *contender) for contender in CONTENDERS}
-        told = {contender: solution.detail for contender, solution in solutions.items() if not solution.feasible}
-        assert not told, f"problem {k}"
+        details = {contender: solution.detail for contender, solution in solutions.items() if not solution.feasible}
+        assert not details, f"problem {k}"
         for contender, solution in solutions.items():
             apart = np.abs(solution.tensions - solutions["active-set", None].tensions).max() / T_MAX
             worst[contender] = max(worst[contender], apart)
@@ -106,11 +106,11 @@ def test_methods_and_a_linear_program_agree_on_500_feasible_problems():
 
 def test_methods_and_a_linear_program_agree_on_200_infeasible_problems():
     rng = np.random.default_rng(200)
-    seen = set()
+    statuses = set()
     for k in range(200):
         problem = random_infeasible(rng, m=3 + k % 6)
         expected = linear_program_status(problem.A, problem.w, problem.t_min, problem.t_max)
-        seen.add(expected)
+        statuses.add(expected)
         certificates = []
         for contender in CONTENDERS:
             solution = solve(problem, *contender)
@@ -118,7 +118,7 @@ def test_methods_and_a_linear_program_agree_on_200_infeasible_problems():
             certificates.append(solution.certificate)
         assert_proves(certificates[0], problem)
         assert {c.shortfall for c in certificates} == {certificates[0].shortfall}
-    assert seen == {"infeasible", "singular"}
+    assert statuses == {"infeasible", "singular"}
 
 
 def test_active_set_satisfies_the_optimality_conditions():
@@ -415,7 +415,7 @@ def test_importing_costs_nothing_heavy():
 
 
 def test_weights_fourteen_decades_apart():
-    """The methods of least squares give the optimum; the daqp package alone finds nothing in one of ten."""
+    """Check that the methods of least squares give the optimum; the daqp package alone finds nothing in one of ten."""
     rng = np.random.default_rng(0)
     for _ in range(60):
         A = rng.normal(size=(6, 8))

@@ -38,8 +38,8 @@ def test_awkward_tensions_are_those_of_enumeration(seed):
     expected = optimum_by_enumeration(A, w, low, high, wish, weights)
     if solution.feasible and expected is not None:
         # The reference takes wrench errors up to 1e-9, which a nearly singular matrix makes visible in the tensions.
-        asked = problem.tolerance(solution.tensions) / 1e-9
-        if np.linalg.norm(A @ expected - w) <= 1e-13 * asked:
+        required = problem.tolerance(solution.tensions) / 1e-9
+        if np.linalg.norm(A @ expected - w) <= 1e-13 * required:
             size = max(np.abs(expected).max(), np.abs(low[np.isfinite(low)]).max(initial=0.0))
             np.testing.assert_allclose(solution.tensions, expected, rtol=0, atol=1e-8 * size)
     elif solution.feasible != (expected is not None):
@@ -47,7 +47,7 @@ def test_awkward_tensions_are_those_of_enumeration(seed):
 
 
 def certificate_is_close(problem, solution):
-    """Whether the two may differ: w is within 1e-9 of the boundary, relative to what is asked."""
+    """Return whether the two may differ: w is within 1e-9 of the boundary, relative to what is required."""
     if solution.certificate is None:
         return linear_program_status(problem.A, problem.w, problem.t_min, problem.t_max) == "optimal" or solution.detail
     return solution.certificate.shortfall < 1e3 * problem.tolerance(solution.certificate.closest)
@@ -182,7 +182,7 @@ def test_never_nan_never_outside_and_every_certificate_verifies(seed):
 
 
 def nearly_unavailable(seed):
-    """Wrenches 1e-12 to 1e-6 beyond the available set, relative to what is asked, and just inside.
+    """Yield wrenches 1e-12 to 1e-6 beyond the available set, relative to what is required, and just inside.
 
     At corners and facets of awkward problems, or where cables parallel to some digits pull with up to 1e6 times the
     load: there rounding decides most.
@@ -227,7 +227,7 @@ def test_no_infeasible_answer_is_without_its_certificate():
 
 
 def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch):
-    """As if the projection never found anything: it does, but for one in 10^5 problems with nearly parallel cables."""
+    """Run as if the projection failed, which it does for one in 10^5 problems with nearly parallel cables."""
     from towline.solvers import solution as module
 
     monkeypatch.setattr(module, "certify", lambda problem: None)
@@ -245,7 +245,7 @@ def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch
 @pytest.mark.parametrize("weight", [0.0, -1.0, np.nan, np.inf, 1e30])
 @pytest.mark.parametrize("rho", [None, 1.0])
 def test_the_weight_of_a_single_cable_is_checked_too(weight, rho):
-    """One number for one cable: it once passed for "no weights"."""
+    """Check one number for one cable: it once passed for "no weights"."""
     for matrix in (np.ones((1, 1)), np.ones((20, 2, 1))):
         batch = solve_batch(matrix, np.full(matrix.shape[-2], 0.5), 0.0, 1.0, weights=weight, rho=rho)
         assert set(batch.count()) == {Status.INVALID}
@@ -253,7 +253,7 @@ def test_the_weight_of_a_single_cable_is_checked_too(weight, rho):
 
 @pytest.mark.parametrize("rho", [1.0, 1e9])
 def test_the_residual_of_a_soft_row_is_that_of_its_tensions(rho):
-    """For rows that go alone as well: nearly no weight on one cable, no matrix at all, a huge limit."""
+    """Check rows that go alone as well: nearly no weight on one cable, no matrix at all, a huge limit."""
     rng = np.random.default_rng(3)
     A, low, high = rng.normal(size=(40, 2, 9)), np.zeros((40, 9)), np.ones((40, 9))
     w = np.einsum("rim,rm->ri", A, rng.uniform(0, 1, (40, 9)))
@@ -276,7 +276,7 @@ def test_a_soft_row_solved_again_is_the_same_row():
 
 @pytest.mark.parametrize("rho", [None, 1.0])
 def test_cables_that_are_all_fixed(rho):
-    """Nothing is left to choose."""
+    """Check that nothing is left to choose."""
     problem = TensionProblem(np.ones((2, 3)), [1.0, 1.0], 0.5, 0.5)
     soft = solve(problem, "soft-wrench") if rho is None else solve(problem, "soft-wrench", rho=rho)
     assert (soft.tensions == 0.5).all()

@@ -74,7 +74,7 @@ def test_vectors_compute_as_numpy_does(arithmetic, x, y, a):
 
 
 def mixture(rng, m, count):
-    """Feasible and infeasible problems of one shape, with weights, references and lengths of their own."""
+    """Return feasible and infeasible problems of one shape, with weights, references and lengths of their own."""
     rows = [(random_feasible, random_infeasible)[k % 2](rng, m) for k in range(count)]
     return [
         TensionProblem(
@@ -96,7 +96,7 @@ def stacked(problems):
 
 
 def shortfall_along(problem, d):
-    """From the data alone: d . w - h(d), and the norm of d that is to be one."""
+    """Return from the data alone d . w - h(d), and the norm of d that is to be one."""
     pulls = d @ problem.A
     support = np.where(pulls > 0, pulls * problem.t_max, pulls * problem.t_min).sum()
     return d @ problem.w - support, np.linalg.norm(d / np.repeat([1.0, 1.0 / problem.length], 3))
@@ -133,7 +133,7 @@ def test_a_soft_batch_minimises_what_soft_wrench_does(m, rho):
         t = batch.tensions[row]
         assert (t >= problem.t_min).all()
         assert (t <= problem.t_max).all()
-        room = 1e-9 * problem.t_max.max()
+        margin = 1e-9 * problem.t_max.max()
         # The gradient vanishes between the limits and pushes against them at the limits.
         weights = problem.weights / problem.weights.max()
         error = problem.scaled_A @ t - problem.scaled_w
@@ -141,8 +141,8 @@ def test_a_soft_batch_minimises_what_soft_wrench_does(m, rho):
         size = 1e-9 * (
             np.abs(weights * (t - problem.t_ref)).max() + rho * np.abs(problem.scaled_A.T).max() * problem.t_max.max()
         )
-        assert (gradient[t < problem.t_max - room] > -size).all()
-        assert (gradient[t > problem.t_min + room] < size).all()
+        assert (gradient[t < problem.t_max - margin] > -size).all()
+        assert (gradient[t > problem.t_min + margin] < size).all()
         assert batch.residual[row] == pytest.approx(np.linalg.norm(error), rel=1e-6, abs=1e-12)
         single = solve(problem, method="soft-wrench", rho=rho)
         np.testing.assert_allclose(t, single.tensions, rtol=0, atol=1e-6 * problem.t_max.max())
@@ -156,7 +156,7 @@ def test_a_soft_batch_minimises_what_soft_wrench_does(m, rho):
 
 
 def test_a_soft_batch_goes_through_every_path():
-    """Rank-deficient, fixed, unlimited, invalid: everything but the invalid has tensions."""
+    """Solve rank-deficient, fixed, unlimited, invalid: everything but the invalid has tensions."""
     rng = np.random.default_rng(1)
     A, w, low, high = rng.normal(size=(40, 6, 8)), rng.normal(size=(40, 6)), np.zeros((40, 8)), np.ones((40, 8))
     A[:10, 5] = A[:10, 4]
@@ -223,7 +223,7 @@ def test_machine_code_of_other_sources_is_forgotten(tmp_path, monkeypatch):
     for change in (source, tmp_path / "tolerances.py"):
         index.touch()
         change.write_text("a = 2")
-        os.utime(change, (1000, 1000))  # as old as can be: what counts is what it says
+        os.utime(change, (1000, 1000))  # as old as possible: the content decides
         compiled._forget_old_code()
         assert not index.exists()
 

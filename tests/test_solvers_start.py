@@ -118,6 +118,6 @@ def test_a_solution_reports_the_code_that_answered():
     assert solve(problem).backend == compiled.current().backend
     assert solve(problem, "daqp").backend is None
     assert solve(problem, "qp").backend == "clarabel"
-    # Directions that only rounding tells from none are left to the robust path.
+    # Directions that only rounding separates from none are left to the robust path.
     doubtful = TensionProblem([[1.0, 1.0], [1.0, 1.0 + 1e-11]], [2.0, 2.0], 0.0, 60.0)
     assert solve(doubtful).backend == "daqp"

@@ -1,4 +1,4 @@
-"""Cables without limits and many spare cables: every method answers rightly, in milliseconds, or says why it does not.
+"""Cables without limits and many spare cables: every method answers rightly, in milliseconds, or reports why not.
 
 A wrench that may be missed is such a problem: the missing part is six cables without limits and with a high price.
 """
@@ -17,7 +17,7 @@ from towline.solvers import TensionProblem, methods, solve
 
 from .problems import geometric_matrix
 
-# What a method may say instead of tensions, by its docstring.
+# What a method may report instead of tensions, by its docstring.
 REFUSALS = {
     "closed-form": "leaves the limits of cable",
     "improved-closed-form": "no redundancy left",
@@ -32,7 +32,7 @@ SLOW = 0.05  # s; ten times what the slowest takes in the median
 
 
 def unlimited_problem(seed):
-    """Robot of 6 to 16 cables, three or six equations, some limits missing on one side or both, w well inside."""
+    """Return a robot of 6 to 16 cables, three or six equations, some without a limit or two, w well inside."""
     rng = np.random.default_rng(seed)
     m = int(rng.integers(6, 17))
     A = geometric_matrix(rng, m)[: rng.choice([3, 6])]
@@ -51,7 +51,7 @@ PROBLEMS = [
 
 
 def linear_optimum(problem, cost, rows=None, right=None):
-    """Least cost . (t, extra), or None if there is no bound."""
+    """Return the least cost . (t, extra), or None if there is no bound."""
     extras = len(cost) - problem.m
     bounds = [*zip(problem.t_min, problem.t_max, strict=True), *[(None, None)] * extras]
     finite = slice(None) if right is None else np.isfinite(right)
@@ -68,7 +68,7 @@ def linear_optimum(problem, cost, rows=None, right=None):
 
 
 def optimum_is_missed_by(problem, method, t):
-    """How far t is from what the method promises, relative to the sizes at hand."""
+    """Return how far t is from what the method promises, relative to the sizes at hand."""
     m, identity, one = problem.m, np.eye(problem.m), np.ones((problem.m, 1))
     size = np.abs(t).max()
     if method in LEAST_SQUARES:
@@ -133,7 +133,7 @@ def test_answers_are_right_and_refusals_are_told(method):
 
 
 def test_refusals_are_right():
-    """An unbounded set, or no bound on what is optimised, by linear programs that know nothing of the methods."""
+    """Detect an unbounded set, or no bound on what is optimised, by linear programs of their own."""
     for problem in PROBLEMS:
         unbounded = any(
             linear_optimum(problem, sign * row) is None for row in np.eye(problem.m) for sign in (1.0, -1.0)
@@ -163,7 +163,7 @@ def test_a_wrench_out_of_reach_is_told_by_a_certificate_whatever_the_method_refu
 @pytest.mark.parametrize("cables", [4, 5, 6])
 @pytest.mark.parametrize("length", [1.0, 0.058])
 def test_the_rounding_of_a_robot_file_does_not_choose_the_tensions(cables, length):
-    """A load below the centre of a regular polygon, in numbers of twelve digits: the tensions are equal by symmetry.
+    """Check a load below the centre of a regular polygon, in twelve digits: the tensions are equal by symmetry.
 
     Cable lines meet in one point but for rounding, which makes singular values of 1e-12 instead of 0.
     """

@@ -16,7 +16,6 @@ from .jit import compilable
 from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
 
 __all__ = [
-    "ASKED",
     "B_",
     "DIAG",
     "GOOD",
@@ -29,6 +28,7 @@ __all__ = [
     "PER_LENGTH",
     "PROVEN",
     "REF",
+    "REQUIRED",
     "ROUNDED",
     "SA",
     "SHORTFALL",
@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 # Single rows.
-PER_LENGTH, ASKED, ROUNDED, SIZE, SLACKS, GOOD_MATRIX, GOOD, PROVEN, SUPPORT, SHORTFALL = range(10)
+PER_LENGTH, REQUIRED, ROUNDED, SIZE, SLACKS, GOOD_MATRIX, GOOD, PROVEN, SUPPORT, SHORTFALL = range(10)
 _SINGLE = 10
 # Rows of m: limits, reference, newtons in one unit of s and the inverse, column norms; limits for s; s; basis vectors.
 T_LOW, T_HIGH, REF, UNIT, PER_UNIT, NORM, LOW, HIGH, S_, N0, N1 = range(11)
@@ -164,7 +164,7 @@ def _prepare_matrix(weighted, n, m, W):
 
 @compilable()
 def _prepare_limits(n, m, W):
-    """State limits and right-hand side for s, and sum up what the problem asks."""
+    """State limits and right-hand side for s, and sum up what the problem requires."""
     required, per_length = splat(0.0), load(W, PER_LENGTH)
     for r in range(n):
         x = load(W, wrench(SW, n, m) + r)
@@ -174,12 +174,12 @@ def _prepare_limits(n, m, W):
         store(W, wrench(Y, n, m) + r, x)
         required = required + x * x
     good = (load(W, GOOD_MATRIX) > 0.0) & (required < 1e100)
-    asked, rounded, size = sqrt(required), splat(0.0), splat(0.0)
+    size_required, rounded, size = sqrt(required), splat(0.0), splat(0.0)
     for c in range(m):
         low, high = load(W, cable(T_LOW, m) + c), load(W, cable(T_HIGH, m) + c)
         ref, norm = load(W, cable(REF, m) + c), load(W, cable(NORM, m) + c)
         good = good & (low <= high) & (low <= 1e50) & (high >= -1e50) & (magnitude(ref) < 1e50)
-        asked = asked + norm * magnitude(minimum(maximum(low, splat(0.0)), high))
+        size_required = size_required + norm * magnitude(minimum(maximum(low, splat(0.0)), high))
         rounded = rounded + norm * magnitude(ref)
         per_unit = load(W, cable(PER_UNIT, m) + c)
         low, high = (low - ref) * per_unit, (high - ref) * per_unit
@@ -189,7 +189,7 @@ def _prepare_limits(n, m, W):
         for r in range(n):
             row = wrench(Y, n, m) + r
             store(W, row, load(W, row) - load(W, matrix(SA, n, m) + r * m + c) * ref)
-    store(W, ASKED, asked)
+    store(W, REQUIRED, size_required)
     store(W, ROUNDED, rounded)
     store(W, SIZE, size)
     store(W, SLACKS, SLACK * size)
@@ -215,7 +215,7 @@ def judge(soft, n, m, W):
             total = total + load(W, matrix(SA, n, m) + r * m + c) * load(W, cable(S_, m) + c)
         error = error + total * total
     error = sqrt(error)
-    met = error <= FEASIBILITY * load(W, ASKED) + ROUNDING * rounded
+    met = error <= FEASIBILITY * load(W, REQUIRED) + ROUNDING * rounded
     good = load(W, GOOD) > 0.0
     code = where(met, splat(1.0 * OPTIMAL), splat(1.0 * (INACCURATE if soft else UNSURE)))
     store(W, GOOD, where(good, code, splat(1.0 * UNSURE)))

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import compilable
-from .lanes import ASKED, B_, GOOD, HIGH, LOW, NORM, S_, UNIT, Y, cable, matrix, wrench
+from .lanes import B_, GOOD, HIGH, LOW, NORM, REQUIRED, S_, UNIT, Y, cable, matrix, wrench
 from .lanes_proof import prove_in_lanes
 from .simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, store, where
 
@@ -64,7 +64,7 @@ def newton_in_lanes(soft, steps, again, n, m, W, V):
             store(V, r + i, load(W, wrench(Y, n, m) + i))
         smallest = _factor(n, m, W, V, damping)
         _solve(n, m, V)
-        # For a matrix that lacks rank "infeasible" may be wrong: those are left to `single`, and nan says so next time.
+        # Without full rank "infeasible" may be wrong: such matrices are left to `single`, and nan marks them next time.
         judged = (smallest > _SMALL_PIVOT * size) | (splat(soft) > 0.0)
         for i in range(n):
             store(V, y + i, where(judged, load(V, step + i), splat(np.nan)))
@@ -111,7 +111,7 @@ def _evaluate(soft, found, n, m, W, V):
     """Find s, r and the free cables for y; s stays as it is where `found`. Return where r is rounding."""
     y, _, r, pull, _, free, _ = _rows(n, m)
     _pulls(n, m, W, V, y, pull)
-    terms, error = load(W, ASKED), splat(0.0)
+    terms, error = load(W, REQUIRED), splat(0.0)
     for c in range(m):
         low, high, p = load(W, cable(LOW, m) + c), load(W, cable(HIGH, m) + c), load(V, pull + c)
         s = minimum(maximum(p, low), high)

@@ -6,11 +6,11 @@ from ...tolerances import FEASIBILITY, NEGLIGIBLE, ROUNDING
 from .codes import CLEAR
 from .jit import compilable
 from .lanes import (
-    ASKED,
     NORM,
     PER_LENGTH,
     PROVEN,
     REF,
+    REQUIRED,
     SA,
     SHORTFALL,
     SUPPORT,
@@ -31,7 +31,7 @@ __all__ = ["prove_in_lanes"]
 def prove_in_lanes(chosen, n, m, W, V, d):
     """Keep the directions in rows d of V, in the units of S w, where `chosen` and proven; return where.
 
-    What is kept are the unit direction for w itself, its support and the shortfall; PROVEN says where.
+    What is kept are the unit direction for w itself, its support and the shortfall; PROVEN marks where.
     """
     square = splat(0.0)
     for i in range(n):
@@ -58,7 +58,7 @@ def prove_in_lanes(chosen, n, m, W, V, d):
         reach = where(counts, reach, splat(0.0))
         support = support + reach
         rounded = rounded + 1e2 * magnitude(reach)
-    doubt = CLEAR * (FEASIBILITY * load(W, ASKED) + ROUNDING * rounded)
+    doubt = CLEAR * (FEASIBILITY * load(W, REQUIRED) + ROUNDING * rounded)
     proven = usable & (pulls > 0.0) & (demand - support > doubt)  # nan of infinite limits proves nothing
     store(W, PROVEN, where(proven, splat(1.0), load(W, PROVEN)))
     store(W, SUPPORT, where(proven, support, load(W, SUPPORT)))

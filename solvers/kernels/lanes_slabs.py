@@ -1,7 +1,7 @@
 """Many problems at once with at most two more cables than equations: reduction, then one slab after another.
 
 The same steps as `reduction` and `slabs`, without branches and without pivoting: a matrix that would need it, or one
-that lacks rank, is left to `single`. For a problem without tensions the limits that exclude them give the direction
+without full rank, is left to `single`. For a problem without tensions the limits that exclude them give the direction
 that proves it.
 """
 
@@ -134,7 +134,7 @@ def slabs_in_lanes(n, m, W, V):
             den = a_j * along0 + b_j * along1
             parallel = magnitude(den) < PARALLEL
             low_j, high_j = load(W, cable(LOW, m) + j) - here, load(W, cable(HIGH, m) + j) - here
-            # Where a slab whose limit is near is nearly parallel, rounding says where it is met.
+            # Where a slab whose limit is near is nearly parallel, rounding decides where it is met.
             near = (magnitude(den) < _STEEP) & ((low_j > -slack * _NEAR) | (high_j < slack * _NEAR))
             good = good & ~(moves & near)
             inverse = 1.0 / den

@@ -1,4 +1,4 @@
-"""Whether a direction proves a wrench out of reach: nothing is called infeasible that this does not confirm."""
+"""Check whether a direction proves a wrench out of reach: nothing is called infeasible that this does not confirm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["outside_range", "proves"]
 
 @compilable()
 def proves(A, w, lower, upper, ref, n, m, per_length, d, info):
-    """Whether the scaled direction d (n,), made unit and unscaled here, proves w out of reach.
+    """Check whether the scaled direction d (n,), made unit and unscaled here, proves w out of reach.
 
     Return INFEASIBLE, SINGULAR if no cable pulls along it, or UNSURE; info gets support and shortfall.
     """
@@ -26,13 +26,13 @@ def proves(A, w, lower, upper, ref, n, m, per_length, d, info):
     if not 0.0 < total < np.inf:
         return UNSURE
     total = 1.0 / math.sqrt(total)
-    demand, asked = 0.0, 0.0
+    demand, required = 0.0, 0.0
     for i in range(n):
         scale = per_length if n == 6 and i >= 3 else 1.0
         d[i] *= total * scale
         demand += d[i] * w[i]
-        asked += (scale * w[i]) * (scale * w[i])
-    asked = math.sqrt(asked)
+        required += (scale * w[i]) * (scale * w[i])
+    required = math.sqrt(required)
     rounding, largest = 0.0, 0.0
     for c in range(m):
         square = 0.0
@@ -42,7 +42,7 @@ def proves(A, w, lower, upper, ref, n, m, per_length, d, info):
         largest = max(largest, square)
         norm = math.sqrt(square)
         nearest = abs(min(max(lower[c], 0.0), upper[c]))
-        asked += norm * nearest
+        required += norm * nearest
         rounding += norm * (abs(ref[c]) + nearest)
     small = NEGLIGIBLE * math.sqrt(largest)
     support = 0.0
@@ -58,7 +58,7 @@ def proves(A, w, lower, upper, ref, n, m, per_length, d, info):
             rounding += 1e2 * abs(reach)
     info[0], info[1] = support, demand - support
     # `not` for the nan of infinite limits
-    if not demand - support > CLEAR * (FEASIBILITY * asked + ROUNDING * rounding):
+    if not demand - support > CLEAR * (FEASIBILITY * required + ROUNDING * rounding):
         return UNSURE
     return status
 

@@ -12,7 +12,7 @@ __all__ = ["reduce", "reflect"]
 
 @compilable()
 def reflect(B, tau, j, mm, x, at):
-    """x[at : at + mm] -= tau v v^T x with the reflector v = B[j, j:]."""
+    """Subtract tau v v^T x from x[at : at + mm] with the reflector v = B[j, j:]."""
     dot = 0.0
     for c in range(j, mm):
         dot += B[j * mm + c] * x[at + c]

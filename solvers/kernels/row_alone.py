@@ -18,7 +18,7 @@ __all__ = ["solve_row"]
 
 @compilable()
 def _is_valid(A, w, lower, upper, ref, weights, length, n, m):
-    """Whether the numbers of a row are a problem, as `TensionProblem` has it."""
+    """Return whether the numbers of a row are a problem, as `TensionProblem` has it."""
     if not 1e-20 <= length <= 1e20:
         return False
     for i in range(n * m):
@@ -78,8 +78,8 @@ def _soft(A, w, lower, upper, ref, weights, length, soft, n, m, t, d, info, work
         missing /= length if n == 6 and i >= 3 else 1.0
         total += missing * missing
     info[2] = math.sqrt(total)
-    asked, rounded = what_counts(A, w, lower, upper, ref, t, length, n, m)
-    if info[2] <= FEASIBILITY * asked + ROUNDING * rounded:
+    required, rounded = what_counts(A, w, lower, upper, ref, t, length, n, m)
+    if info[2] <= FEASIBILITY * required + ROUNDING * rounded:
         return OPTIMAL
     if proves(A, w, lower, upper, ref, n, m, 1.0 / length, e, info) == INFEASIBLE:
         for i in range(n):

@@ -94,7 +94,7 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, row: Any) -> Any:
 
 
 def _instruction(function: Callable[..., Any]) -> Any:
-    """Define an intrinsic; a type checker is not told of the typing context, which Numba adds."""
+    """Define an intrinsic; the typing context, which Numba adds, is hidden from type checkers."""
     return intrinsic(function)
 
 
@@ -175,7 +175,7 @@ def where(typingctx: Any, chosen: Any, yes: Any, no: Any) -> Any:
 
 @_instruction
 def any_of(typingctx: Any, chosen: Any) -> Any:
-    """Whether a mask holds in any lane."""
+    """Return whether a mask holds in any lane."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         bits = ir.IntType(WIDTH)

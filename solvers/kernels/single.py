@@ -41,22 +41,22 @@ def work_size(n: int, m: int) -> int:
 
 @compilable()
 def what_counts(A, w, lower, upper, ref, t, length, n, m):
-    """Return what the problem asks, and the sum of terms that rounding is a part of: see `TensionProblem.tolerance`."""
+    """Return what the problem requires, and the sum of the terms that are rounded: see `TensionProblem.tolerance`."""
     per_length = 1.0 / length
     required, rounding = 0.0, 0.0
     for i in range(n):
         x = w[i] * (per_length if n == 6 and i >= 3 else 1.0)
         required += x * x
-    asked = math.sqrt(required)
+    needed = math.sqrt(required)
     for c in range(m):
         square = 0.0
         for i in range(n):
             x = A[i * m + c] * (per_length if n == 6 and i >= 3 else 1.0)
             square += x * x
         norm = math.sqrt(square)
-        asked += norm * abs(min(max(lower[c], 0.0), upper[c]))
+        needed += norm * abs(min(max(lower[c], 0.0), upper[c]))
         rounding += norm * (abs(t[c]) + abs(ref[c]))
-    return asked, rounding
+    return needed, rounding
 
 
 # One signature, so that Numba does not compile it once more for arrays that may be written.
@@ -156,7 +156,7 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
             t[i] += unit[c] * s[c]
         for c in range(m):
             t[c] = min(max(t[c], lower[c]), upper[c])
-        asked, rounding = what_counts(A, w, lower, upper, ref, t, length, n, m)
+        needed, rounding = what_counts(A, w, lower, upper, ref, t, length, n, m)
         error = 0.0
         for i in range(n):
             total = -w[i]
@@ -166,7 +166,7 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
                 total *= per_length
             error += total * total
         info[2] = math.sqrt(error)
-        if info[2] <= FEASIBILITY * asked + ROUNDING * rounding:
+        if info[2] <= FEASIBILITY * needed + ROUNDING * rounding:
             return OPTIMAL
     if outcome == 2:
         return UNSURE
