@@ -104,8 +104,8 @@ def run(
     m :
         Numbers of cables, each from 1 to 16.
     limit :
-        Seconds that one contender may spend on one task. It is checked between calls: a contender that passes it is out,
-        with the times that it has.
+        Seconds that one contender may spend on one task. It is checked between calls: a contender that passes it is
+        out, with the times that it has.
     progress :
         Called with the task's name and how many of how many tasks are done.
 

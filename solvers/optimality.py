@@ -33,7 +33,9 @@ def is_optimal(form: StandardForm, tensions: NDArray[np.float64]) -> bool:
     above, below = s - form.lower, form.upper - s
     near = AT_LIMIT * max(1.0, np.sqrt(square))
     held = (above <= near) | (below <= near)
-    most = DECISIVE / SLACK * square
+    # A limit is known to rounding of its own size, that of an infinite one to rounding of everything.
+    size = np.minimum(np.maximum(np.abs(form.lower), np.abs(form.upper)), 1.0)[held]
+    most = DECISIVE / SLACK * square / np.maximum(size, SLACK)
     normals = form.N[:, held]
     low, high = np.where(below[held] <= near, -most, 0.0), np.where(above[held] <= near, most, 0.0)
     multipliers, _ = box_least_squares(normals, gradient, low, high)

@@ -8,6 +8,7 @@ import numpy as np
 
 from .codes import DECISIVE, DEPENDENT, PARALLEL, STATIONARY
 from .jit import compilable
+from .slabs import rounding_of
 
 __all__ = ["dual_active_set"]
 
@@ -46,7 +47,7 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
             for j in range(q):
                 i = active[j]
                 s[i] = lower[i] if side[i] > 0.0 else upper[i]
-            return 0 if _is_optimal(N, k, s, mm, slack, u, side, active, q) else 2
+            return 0 if _is_optimal(N, k, s, lower, upper, mm, slack, u, side, active, q) else 2
         own = 0.0  # the multiplier of p
         size = 0.0
         for c in range(k):
@@ -135,18 +136,18 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
 
 
 @compilable()
-def _is_optimal(N, k, s, mm, slack, u, side, active, q):
+def _is_optimal(N, k, s, lower, upper, mm, slack, u, side, active, q):
     """Return whether the multipliers u (q,) of the active limits prove that s is the point of least norm."""
-    square, largest = 0.0, 0.0
+    square = 0.0
     for i in range(mm):
         square += s[i] * s[i]
     size = math.sqrt(square)
     for j in range(q):
         if u[j] < -STATIONARY * size:
             return False
-        largest = max(largest, u[j])
-    if largest * slack > DECISIVE * square:
-        return False
+        i = active[j]
+        if u[j] * rounding_of(lower[i], upper[i], slack) > DECISIVE * square:
+            return False
     for c in range(k):
         rest = 0.0
         for i in range(mm):

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from .codes import DECISIVE, PARALLEL, STATIONARY
+from .codes import DECISIVE, PARALLEL, SLACK, STATIONARY
 from .jit import compilable
 
-__all__ = ["nearest_in_slabs"]
+__all__ = ["nearest_in_slabs", "rounding_of"]
 
 
 @compilable()
@@ -89,5 +89,13 @@ def nearest_in_slabs(N0, N1, s, lower, upper, mm, slack, push):
         return 0
     a, b = N0[last_moved], N1[last_moved]
     wrong_sign = pull * math.sqrt(a * a + b * b) < -STATIONARY * math.sqrt(square)
-    too_large = max(pull, abs(pull_other)) * slack > DECISIVE * square
-    return 2 if wrong_sign or too_large else 0
+    change = pull * rounding_of(lower[last_moved], upper[last_moved], slack)
+    if other >= 0:
+        change = max(change, abs(pull_other) * rounding_of(lower[other], upper[other], slack))
+    return 2 if wrong_sign or change > DECISIVE * square else 0
+
+
+@compilable()
+def rounding_of(lower, upper, slack):
+    """Return how far rounding may move a limit: relative to the limits themselves, at most the slack."""
+    return min(slack, SLACK * max(abs(lower), abs(upper)))
