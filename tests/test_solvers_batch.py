@@ -30,6 +30,18 @@ def test_a_thousand_awkward_problems_are_right():
     assert report.worst < 1e-8
 
 
+# Problems that were once called optimal and were not, or whose optimum was not proven: a limit that rounding decides, and
+# weights that differ by a factor of 1e7.
+ONCE_WRONG = (700761054, 701602655, 900030494, 900036523, 900054442, 900085142, 900089350, 900089136)
+
+
+@pytest.mark.parametrize("seed", ONCE_WRONG)
+def test_optimal_is_what_multipliers_prove(seed):
+    report = check(range(seed, seed + 1))
+    assert report.disagreements == []
+    assert dict(report.statuses) == {"optimal": 1}
+
+
 @pytest.mark.parametrize("seed", range(150))
 def test_awkward_tensions_are_those_of_enumeration(seed):
     A, w, low, high, wish, weights = awkward_problem(10_000 + seed, m=1 + seed % 6)
