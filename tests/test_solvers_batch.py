@@ -30,7 +30,7 @@ def test_a_thousand_awkward_problems_are_right():
     assert report.worst < 1e-8
 
 
-# Problems that were once called optimal and were not, or whose optimum was not proven: a limit that rounding decides, and
+# Problems once called optimal that were not, or whose optimum was not proven: a limit that rounding decides, and
 # weights that differ by a factor of 1e7.
 ONCE_WRONG = (700761054, 701602655, 900030494, 900036523, 900054442, 900085142, 900089350, 900089136)
 
