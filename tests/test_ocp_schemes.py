@@ -11,7 +11,7 @@ from towline.ocp.audits.audit import audit
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.nlp.solver import Solver
-from towline.ocp.tasks import spline
+from towline.ocp.tasks import bernstein
 from towline.ocp.tasks.scenario import Deviation, lay_out
 from towline.ocp.tasks.scheme import SCHEMES
 from towline.ocp.tasks.task import Task
@@ -87,9 +87,9 @@ def test_bernstein_points_bound_the_motion(name):
     motion = Deviation(nodes, q, v, a, np.zeros((len(nodes), 1)), scheme, jerk)
     position, speed, acceleration = motion.evaluate(np.linspace(0, h * (1 - 1e-9), 500))[:3]
     points = scheme.acceleration(h, a[: scheme.size + 1], None if jerk is None else (jerk[0], jerk[1]))
-    speeds = spline.integral(h, v[0], points)
-    places = spline.integral(h, q[0], speeds)
-    told = spline.joined(h, places, v[0], q[scheme.size], v[scheme.size])
+    speeds = bernstein.integral(h, v[0], points)
+    places = bernstein.integral(h, q[0], speeds)
+    told = bernstein.joined(h, places, v[0], q[scheme.size], v[scheme.size])
     np.testing.assert_allclose(told, places, atol=1e-9)
     for values, bound in ((position, places), (speed, speeds), (acceleration, points)):
         assert (values <= np.max(bound, axis=0) + 1e-9).all()
@@ -99,8 +99,8 @@ def test_bernstein_points_bound_the_motion(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_mean_squares_are_quadratures(name):
     points = list(np.random.default_rng(2).normal(size=(SCHEMES[name].degree + 1, 3)))
-    truth = quad(lambda s: np.sum(spline.value(points, s) ** 2), 0, 1)[0]
-    assert spline.mean_square(points, np.dot) == pytest.approx(truth, rel=1e-10)
+    truth = quad(lambda s: np.sum(bernstein.value(points, s) ** 2), 0, 1)[0]
+    assert bernstein.mean_square(points, np.dot) == pytest.approx(truth, rel=1e-10)
     weights = SCHEMES[name].quadrature(6)
     assert weights.sum() == pytest.approx(1)
 

@@ -314,11 +314,11 @@ def test_uniform_waypoints_rest_nowhere():
 @pytest.mark.parametrize(
     ("law", "message"),
     [
-        ({"s": (0, 1), "speeds": (0, 0)}, "both 0"),
+        ({"s": (0, 1), "speeds": (0, 0)}, "must not be 0 twice in a row"),
         ({"s": (0, 0.5), "speeds": (0, 1)}, "from 0 to 1"),
-        ({"s": (0, 0.6, 0.5, 1), "speeds": (0, 1, 1, 0)}, "must rise"),
-        ({"s": (0, 0.5, 1), "speeds": (0, 1)}, "one for each s"),
-        ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "frame": "quad"}, "not that of along"),
+        ({"s": (0, 0.6, 0.5, 1), "speeds": (0, 1, 1, 0)}, "must increase"),
+        ({"s": (0, 0.5, 1), "speeds": (0, 1)}, "one number for each of the 3 s"),
+        ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "frame": "quad"}, "must be that of along"),
     ],
 )
 def test_laws_that_are_none_are_refused(law, message):
@@ -347,7 +347,7 @@ def given(paths):
         ("wang-flying", CENTRE, {"margin": -1}, "margin"),
         ("wang-flying", CENTRE, {"limits": {"platform_speed": 0}}, "platform_speed"),
         ("wang-flying", CENTRE, {"wind": (1, 0, 0)}, r"wind must be \[0, 0, 0\], still air"),
-        ("cogiro", ROUND_TRIP, {"wind": (0, 0, 0)}, "no platform.aero"),
+        ("cogiro", ROUND_TRIP, {"wind": (0, 0, 0)}, "without platform.aero"),
         ("wang-flying", CENTRE, {"tube": {"position": 0.1}}, "tube must be left out"),
         ("wang-flying", CENTRE, {"base": {"kind": "free"}}, "base.kind must be hold or given"),
         ("cogiro", ROUND_TRIP, {"limits": {"tension_rate": 3}}, "limits.tension_rate cannot be kept"),
