@@ -174,7 +174,7 @@ def test_quadrotors_move_as_forward_dynamics_moves_them():
     [
         ({"cable_speed": -1}, "limits.cable_speed"),
         ({"soft": {"cable_speed": 1}}, "got 'cable_speed'"),
-        ({"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [0, 1, 1]}]}, "is not below max"),
+        ({"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [0, 1, 1]}]}, "must be smaller than max"),
         ({"keep_out": [{"kind": "cone"}]}, "limits.keep_out"),
         ({"cable_length": {"min": 2, "max": 1}}, "min must be at most max"),
     ],
