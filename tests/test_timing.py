@@ -347,7 +347,7 @@ def given(paths):
         ("wang-flying", CENTRE, {"margin": -1}, "margin"),
         ("wang-flying", CENTRE, {"limits": {"platform_speed": 0}}, "platform_speed"),
         ("wang-flying", CENTRE, {"wind": (1, 0, 0)}, r"wind must be \[0, 0, 0\], still air"),
-        ("cogiro", ROUND_TRIP, {"wind": (0, 0, 0)}, "without platform.aero"),
+        ("cogiro", ROUND_TRIP, {"wind": (0, 0, 0)}, "no platform.aero"),
         ("wang-flying", CENTRE, {"tube": {"position": 0.1}}, "tube must be left out"),
         ("wang-flying", CENTRE, {"base": {"kind": "free"}}, "base.kind must be hold or given"),
         ("cogiro", ROUND_TRIP, {"limits": {"tension_rate": 3}}, "limits.tension_rate cannot be kept"),
