@@ -23,7 +23,7 @@ def plan(
     robot: RobotArgument,
     task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="NetCDF file to write; none: ROBOT-TASK.nc in this folder.")
+        Path | None, typer.Option("--out", help="NetCDF file to write; default: ROBOT-TASK.nc in this folder.")
     ] = None,
     figures: Annotated[
         Path | None, typer.Option("--figures", help="Folder to draw path, views, tensions, base and limits in.")

@@ -1,11 +1,12 @@
 """`plan`: from a robot and a task to a motion inside the tension limits, or to the reason why there is none.
 
-The planner climbs a ladder, and the first stage that knows the answer gives it:
+The planner works in stages, and the first that has the answer gives it:
 
 1. rest along the path (`rest_margin`): where a motion that the task fixes rests, no duration helps;
-2. durations (`durations`) and timing (`pace`), if the duration alone is free: which ones and which time laws can be;
-3. the nonlinear program (`program`), audited, and refined where the audit objects;
-4. the elastic program: the motion that misses least, which is where the program starts again, or the closest motion.
+2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which of them are possible;
+3. the nonlinear program (`program`), audited, and refined where the audit reports violations;
+4. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
+   result.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
 NO_SLACK = 1e-6  # of the weight: a motion that misses less at its nodes is a start for another try
-LONGER = 1.002  # than the shortest duration: between the places that were asked a little more can be needed
-LONGEST = 100.0  # times the duration that was asked: a longer one is no help
+LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
+LONGEST = 100.0  # times the requested duration: a longer one does not help
 
 
 def plan(
@@ -91,7 +92,7 @@ def plan(
 
 
 class Planner:
-    """Plans one task, again if need be: programs and solvers are kept, and the last solution to start from.
+    """Plan one task, any number of times: programs, solvers and the last solution, to start from, are kept.
 
     Parameters
     ----------
@@ -123,65 +124,65 @@ class Planner:
 
 
 def _climb(search: Search, start: Deviation | None) -> Plan:
-    """One stage after the other."""
+    """Plan stage after stage."""
     scenario = search.scenario
     if scenario.is_fixed:
         return _fixed_motion(search)
     proven = _rest_along_the_path(search)
     if proven is not None:
         return proven
-    paced, own = _pace(search) if scenario.count == 0 else (None, True)
-    if paced is not None and not (own and paced.feasible):
-        return paced
+    timed, own = _time_law(search) if scenario.count == 0 else (None, True)
+    if timed is not None and not (own and timed.feasible):
+        return timed
     found = _free_motion(search, start)
-    if paced is None or (found.feasible and cost(found) <= cost(paced)):
+    if timed is None or (found.feasible and cost(found) <= cost(timed)):
         return found
-    return replace(paced, build_s=search.build_s, solve_s=search.solve_s)
+    return replace(timed, build_s=search.build_s, solve_s=search.solve_s)
 
 
 def _fixed_motion(search: Search) -> Plan:
-    """Nothing is free but the tensions: each instant is a tension-distribution problem of its own.
+    """Plan a task that leaves only the tensions free: each instant is a tension-distribution problem of its own.
 
-    Limits on how the tensions change and on what carriers feel of them are kept by some choices of tensions and not by
-    others: where these alone are passed, the program looks for a choice that keeps them.
+    Some tensions keep the limits on tension rates and on the forces at the carriers, and others do not. Where only
+    these limits are exceeded, the program searches for tensions that keep them.
     """
     start = time.perf_counter()
-    seen = search.audit_motion(search.scenario, None)
+    audit = search.audit_motion(search.scenario, None)
     spent = time.perf_counter() - start
-    status = MotionStatus.FEASIBLE if seen.passed else MotionStatus.INFEASIBLE
-    if not seen.passed and other_tensions_may_pass(search.scenario, seen):
+    status = MotionStatus.FEASIBLE if audit.passed else MotionStatus.INFEASIBLE
+    if not audit.passed and other_tensions_may_pass(search.scenario, audit):
         chosen = _free_motion(search, None)
-        if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, seen):
+        if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, audit):
             return chosen
         status = MotionStatus.NOT_FOUND
-    relaxed = None if seen.passed else _longer(search, search.scenario, _durations(search, search.scenario))
-    return Plan(search.scenario, status, None, seen, build_s=0.0, solve_s=spent, relaxed=relaxed)
+    relaxed = None if audit.passed else _longer(search, search.scenario, _durations(search, search.scenario))
+    return Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, relaxed=relaxed)
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
-    """Which durations the path leaves; None: not known."""
+    """Return the durations that the path allows; None if they are not known."""
     with search.stage("durations") as stage:
         left = durations(scenario)
-        stage.message = _told(left)
+        stage.message = _message(left)
     return left
 
 
 def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relaxed | None:
-    """A duration near that of a scenario for which the motion is possible, if there is one."""
-    asked = scenario.duration
+    """Return the nearest duration at which a scenario's motion is possible; None if there is none."""
+    requested = scenario.duration
     if left is None or not left.exist:
         return None
-    near = min(max(asked, LONGER * left.shortest), left.longest / LONGER)
-    if near < left.shortest or near > LONGEST * asked:
+    near = min(max(requested, LONGER * left.shortest), left.longest / LONGER)
+    if near < left.shortest or near > LONGEST * requested:
         return None
     longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
-    seen = search.audit_motion(longer, None, f"audit of {near:.4g} s")
-    if not seen.passed:
+    audit = search.audit_motion(longer, None, f"audit of {near:.4g} s")
+    if not audit.passed:
         return None
-    return Relaxed("duration", "s", asked, near, Plan(longer, MotionStatus.FEASIBLE, None, seen, 0.0, 0.0))
+    return Relaxed("duration", "s", requested, near, Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0))
 
 
-def _told(left: Durations | None) -> str:
+def _message(left: Durations | None) -> str:
     if left is None:
         return ""
     if not left.exist:
@@ -191,7 +192,7 @@ def _told(left: Durations | None) -> str:
 
 
 def _rest_along_the_path(search: Search) -> Plan | None:
-    """How far rest is from the tension limits; a proof if the motion rests at an end where nothing holds it."""
+    """Compute the margin of rest; return a plan only if the motion rests at an end where it provably cannot."""
     with search.stage("rest along the path") as stage:
         margin = rest_margin(search.scenario)
         stage.message = margin.describe()
@@ -203,10 +204,10 @@ def _rest_along_the_path(search: Search) -> Plan | None:
     return None if proven is None else Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
-def _pace(search: Search) -> tuple[Plan | None, bool]:
-    """Of a motion whose pace alone is free: what the fastest law is worth, and whether the path's own law may do.
+def _time_law(search: Search) -> tuple[Plan | None, bool]:
+    """Plan a motion whose time law alone is free by the fastest law; return also whether the path's own law may do.
 
-    The plan is feasible, or the proof that no pace will do, or None: not known.
+    The plan is feasible, or proves that no time law is; it is None if neither is known.
     """
     scenario, span = search.scenario, search.scenario.duration_range
     if span is None:
@@ -221,22 +222,22 @@ def _pace(search: Search) -> tuple[Plan | None, bool]:
         return None, own
     if timing.duration is not None and span.min <= timing.duration <= span.max:
         chosen = scenario.along(timing.path, timing.duration)
-        seen = search.audit_motion(chosen, None, "audit of that")
-        return (Plan(chosen, MotionStatus.FEASIBLE, None, seen, 0.0, 0.0) if seen.passed else None), own
+        audit = search.audit_motion(chosen, None, "audit with the fastest time law")
+        return (Plan(chosen, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None), own
     too_slow = timing.duration is not None and BOUND * timing.duration > span.max
     if own or not (too_slow or timing.certificate is not None):
         return None, own
     # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
     slowest = scenario.lasting(span.max)
-    seen = search.audit_motion(slowest, None, f"audit of {span.max:.4g} s")
-    if seen.passed:
+    audit = search.audit_motion(slowest, None, f"audit of {span.max:.4g} s")
+    if audit.passed:
         return None, True
     relaxed = _longer(search, slowest, left)
-    return Plan(slowest, MotionStatus.INFEASIBLE, None, seen, 0.0, 0.0, relaxed=relaxed), own
+    return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, relaxed=relaxed), own
 
 
 def _coarse(search: Search) -> Deviation | None:
-    """The optimum on a coarse mesh, to start a fine one from; None where that would save no time."""
+    """Return the optimum on a coarse mesh, to start a fine one from; None if that would save no time."""
     steps = search.scenario.task.steps
     if steps < 4 * COARSE or search.knows(Mesh(steps)):
         return None
@@ -245,7 +246,7 @@ def _coarse(search: Search) -> Deviation | None:
 
 
 def _free_motion(search: Search, start: Deviation | None) -> Plan:
-    """Solve, audit, refine what the audit objects to; if there is no solution, look for the closest motion first."""
+    """Solve, audit and refine; if the program has no solution, search for the closest motion first."""
     scenario = search.scenario
     steps = scenario.task.steps
     coarse = _coarse(search) if start is None else None
@@ -263,16 +264,16 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
 def _refine(search: Search, outcome: Outcome) -> None:
     """Audit a solution, and solve again with more nodes as long as the audit reports violations."""
     scenario, steps = search.scenario, search.scenario.task.steps
-    seen = search.audit(outcome)
+    audit = search.audit(outcome)
     reserve, shrink = 0.0, 0.0
     for attempt in range(1, REFINEMENTS + 1):
-        if seen.passed or not outcome.success or search.seconds_left <= 0:
+        if audit.passed or not outcome.success or search.seconds_left <= 0:
             break
         # Between finer nodes less can happen; a little distance from the limits takes care of what still does.
         steps = min(2 * steps, MOST_STEPS)
-        missed = float(seen.violation.max()) / scenario.robot.force_scale
+        missed = float(audit.violation.max()) / scenario.robot.force_scale
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
-        shrink = SHRINK * attempt if seen.excess else shrink
+        shrink = SHRINK * attempt if audit.excess else shrink
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
         outcome = search.solve("program", mesh, outcome.deviation)
-        seen = search.audit(outcome)
+        audit = search.audit(outcome)

@@ -28,7 +28,7 @@ class RunningStage:
 
 
 class Search:
-    """Solves one scenario's programs, and keeps the time that it took and what each stage said."""
+    """Solve one scenario's programs, and record the time and the message of each stage."""
 
     def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
         self.scenario, self._solvers, self._progress = scenario, solvers, progress
@@ -39,24 +39,24 @@ class Search:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[RunningStage]:
-        """Record what happens inside as a stage of the ladder."""
+        """Record what happens inside as a stage."""
         start, running = time.perf_counter(), RunningStage()
         yield running
         self.stages.append(Stage(name, running.message, time.perf_counter() - start))
 
-    def _seen(self, iteration: int, objective: float, infeasibility: float) -> None:
-        """Keep what an iteration came to, and tell whoever asked."""
+    def _iteration(self, iteration: int, objective: float, infeasibility: float) -> None:
+        """Record an iteration, and report it."""
         self._iterates.append((iteration, objective, infeasibility))
         if self._progress is not None:
             self._progress(iteration, objective, infeasibility)
 
     @property
     def seconds_left(self) -> float:
-        """What the task's time limit leaves to the solver [s]."""
+        """Return how much of the task's time limit is left to the solver [s]."""
         return max(self.scenario.task.time_limit - self.solve_s, 0.0)
 
     def knows(self, mesh: Mesh) -> bool:
-        """Whether the program of `mesh` has been made: then it may have a solution to start from."""
+        """Return whether the program of `mesh` exists: it may have a solution to start from."""
         return mesh in self._solvers
 
     def solve(self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False) -> Outcome:
@@ -72,7 +72,7 @@ class Search:
             solver.prepare(guess, coarser)
             built = time.perf_counter()
             at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-            outcome = solver.solve(at, self._seen, coarser, self.seconds_left)
+            outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
             self.build_s += built - start
             self.solve_s += time.perf_counter() - built
             stage.message = f"{outcome.message}, {outcome.iterations} iterations"
@@ -103,18 +103,18 @@ class Search:
         )
 
     def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
-        """What the audit says of any motion."""
+        """Audit any motion."""
         with self.stage(name) as stage:
-            seen = audit(scenario, deviation)
-            stage.message = "passed" if seen.passed else describe(seen)
-        return seen
+            audited = audit(scenario, deviation)
+            stage.message = "passed" if audited.passed else describe(audited)
+        return audited
 
 
-def describe(seen: Audit) -> str:
-    """What the audit objects to, in short."""
-    told = []
-    if seen.violation.max() > seen.tolerance:
-        told.append(f"short by up to {seen.violation.max():.3g} N at t = {seen.times[seen.worst]:.3f} s")
-    if seen.excess:
-        told.append(f"{len(seen.excess)} other limit{'s' * (len(seen.excess) > 1)} broken")
-    return ", ".join(told)
+def describe(audited: Audit) -> str:
+    """Return the violations of an audit in short."""
+    lines = []
+    if audited.violation.max() > audited.tolerance:
+        lines.append(f"short by up to {audited.violation.max():.3g} N at t = {audited.times[audited.worst]:.3f} s")
+    if audited.excess:
+        lines.append(f"{len(audited.excess)} other limit{'s' * (len(audited.excess) > 1)} broken")
+    return ", ".join(lines)

@@ -25,31 +25,31 @@ ON_PATH = 2e-6  # of a path's length: how far the handed-on spline may be off
 
 
 def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
-    """The fastest law along the path of a scenario without freedom but its duration, or None; and what is to be said.
+    """Return the fastest law along the path of a scenario whose duration alone is free, or None, and the message.
 
-    Limits of the task that `time_along` does not know are left out: then its time is a bound still.
+    Limits of the task that `time_along` does not know are left out: its time is a lower bound even so.
     """
     task, still = scenario.task, [RestPath]
     if any(type(path) not in still for path in scenario.carrier_paths.values()):
-        return None, "not asked: carriers move by times of their own"
+        return None, "not computed: carriers have time laws of their own"
     if scenario.wind_box is not None:
-        return None, "not asked: in moving air the drag is no multiple of the speed's square"
+        return None, "not computed: in moving air the drag is not proportional to the square of the speed"
     path = _curve(task.path)
     if path is None:
-        return None, f"not asked: a path of kind {task.path.kind} with times or speeds of its own at its ends"
+        return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
     hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
     alone = {"path": path, "limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}
     try:
         timing = time_along(scenario.robot, task.model_copy(update=alone))
     except (InputError, SolverError) as error:
-        return None, f"not asked: {str(error).removeprefix('time_along: ')}"
+        return None, f"not computed: {str(error).removeprefix('time_along: ')}"
     if timing.feasible:
         return timing, f"the fastest law takes {timing.duration:.6g} s"
     return timing, f"{timing.status.value}: at {100 * (timing.at or 0.0):.3g} % of the path"
 
 
 def _curve(path: AnyPath) -> AnyPath | None:
-    """The same places, but resting nowhere; None of a path that does not go from rest to rest as long as it likes."""
+    """Return the same curve without rest on it; None if the path does not go from rest to rest in any duration."""
     if not path.stretches or getattr(path, "timing", None) != "smooth":
         return None
     if isinstance(path, LinePath):
@@ -58,7 +58,7 @@ def _curve(path: AnyPath) -> AnyPath | None:
 
 
 def _through(path: WaypointPath) -> WaypointPath | None:
-    """A natural spline through many points of a smooth one, closest where it starts and ends."""
+    """Return a natural spline through many points of a smooth path, densest at its ends; None if it deviates."""
     shares = np.linspace(0.0, 1.0, LOOKS)
     looks = path.by_fraction(shares).pose
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(looks, axis=0), axis=1))])
@@ -67,7 +67,7 @@ def _through(path: WaypointPath) -> WaypointPath | None:
     at[[0, -1]] = 0.0, 1.0
     points = tuple((x, y, z, roll, pitch, yaw) for x, y, z, roll, pitch, yaw in path.by_fraction(at).pose.tolist())
     spline = WaypointPath(kind="waypoints", frame=path.frame, points=points, timing="uniform")
-    # Between the points: what is across the path counts, where along it is for the time law to say.
+    # Between the points only the deviation across the path matters: the time law decides where along it.
     between = (wanted[1:] + wanted[:-1]) / 2
     wanted_pose, along, _ = path.by_fraction(np.interp(between, way, shares))
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
