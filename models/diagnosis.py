@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,9 +44,10 @@ class Diagnosis:
     warnings: list[str]
 
 
-def diagnose(robot: Robot) -> Diagnosis:
+def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:
     """Diagnose `robot` at its home pose, with its carriers at home."""
     dynamics = Dynamics(robot)
+    robot = dynamics.robot
     scale = robot.wrench_scale[:, None]
     rows = robot.dof_mask[:, None]
     A = dynamics.wrench_matrix(robot.home) * scale * rows

@@ -52,7 +52,7 @@ def as_robot(robot: object) -> Robot:
         return robot
     if isinstance(robot, str | os.PathLike):
         return load(robot)
-    raise InputError(f"robot: must be a Robot, a name of the library or the path of a robot file, got {shown(robot)}")
+    raise InputError(f"robot must be a Robot, a name of the library or the path of a robot file, got {shown(robot)}")
 
 
 def _exists(path: Path) -> bool:

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
+from ..inputs import required, whole_number
 from .dynamics import Dynamics
 from .robot import Robot
 from .rotation import rotation
@@ -90,8 +91,8 @@ def equilibria(
     InputError
         If `lengths` or `carrier_pose` has a wrong shape or value, or the robot has no gravity.
     """
-    if starts < 1:
-        raise InputError(f"starts: {starts}; accepted: 1 and more")
+    robot = required("robot", robot, Robot)
+    starts = whole_number("starts", starts, 1, 1_000_000)
     try:
         wanted = np.asarray(lengths, dtype=float)
     except (TypeError, ValueError):

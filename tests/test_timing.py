@@ -355,7 +355,7 @@ def given(paths):
         ("flycrane", CENTRE, {}, "of kind quadrotor"),
         ("planar-4", {**CENTRE, "end": [0, 0.3, -1]}, {}, "cannot move so"),
         ("wang-ctmrts", {"kind": "line", "start": [1.2, 0.9, 0.3], "end": [1.3, 1, 0.5]}, {}, "rank 3 of 6"),
-        (7, CENTRE, {}, "robot: must be a Robot"),
+        (7, CENTRE, {}, "robot must be a Robot"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line(robot, path, more, message):
