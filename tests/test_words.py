@@ -81,14 +81,11 @@ PENDING = {
     "benchmarks",
     "cli",
     "docs/benchmarks",
-    "docs/benchmarks.md",
-    "docs/errata",
     "models",
     "ocp",
     "solvers",
-    "studies",
 }
-PENDING |= {"notebooks/05_trajectory_planning.ipynb", "workspace"}
+PENDING |= {"workspace"}
 PACKAGES = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
 MODULES = [
     str(file.relative_to(ROOT)) for package in PACKAGES for file in ROOT.joinpath(*package.split(".")[1:]).glob("*.py")

@@ -106,7 +106,7 @@ def _given() -> Claim:
 
 
 def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, unit: str) -> Claim:
-    """One step by hand against `driving_force`."""
+    """Compare one step by hand against `driving_force`."""
     off = float(np.abs(run - own).max())
     return compared(
         name,
