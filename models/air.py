@@ -40,9 +40,9 @@ def trapezoid(
     """
     times, places = _numbers("times", times, None), _numbers("corners", corners, 4, 0.0)
     if (np.diff(places) < 0).any() or places[-1] > 1:
-        raise InputError(f"corners: {corners!r}; accepted: four rising numbers in [0, 1]")
+        raise InputError(f"corners must be four rising numbers from 0 to 1, got {corners!r}")
     if (np.diff(times) < 0).any():
-        raise InputError("times: fall; accepted: rising times")
+        raise InputError("times must rise, got times that fall")
     noise = float(_numbers("noise", [noise], 1, 0.0)[0])
     share = (times - times[0]) / max(times[-1] - times[0], 1e-12)
     envelope = np.interp(share, places, [0.0, 1.0, 1.0, 0.0])
@@ -85,7 +85,7 @@ def dryden(
     sigmas, lengths = _numbers("intensity", intensity, 3, 0.0), _numbers("scale", scale, 3, 1e-9)
     speed = float(np.linalg.norm(mean_wind))
     if not np.linalg.norm(mean_wind[:2]) > 0:
-        raise InputError(f"mean: {tuple(mean)!r} has no horizontal part; accepted: a wind along the ground [m/s]")
+        raise InputError(f"mean must be a wind [m/s] with a horizontal part, got {tuple(mean)!r}")
     steps = np.diff(times)
     if len(steps) and not (steps.min() > 0 and np.ptp(steps) < 1e-6 * steps.mean()):
         raise InputError("times: must rise in equal steps")
@@ -139,7 +139,7 @@ def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int | None, 
     except (TypeError, ValueError):
         array = np.zeros((0, 0))
     if array.ndim != 1 or not len(array) or (count and len(array) != count) or not np.isfinite(array).all():
-        raise InputError(f"{name}: {value!r}; accepted: {count or 'a row of'} finite numbers")
+        raise InputError(f"{name} must be {count or 'a row of'} finite numbers, got {value!r}")
     if (array < least).any():
-        raise InputError(f"{name}: {value!r}; accepted: numbers >= {least:g}")
+        raise InputError(f"{name} must be numbers >= {least:g}, got {value!r}")
     return array

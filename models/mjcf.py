@@ -58,10 +58,12 @@ def to_mjcf(robot: Robot) -> str:
 def _check(robot: Robot) -> None:
     for index, cable in enumerate(robot.cables):
         if cable.pulley is not None:
-            raise InputError(f"cables[{index}].pulley: MuJoCo's tendons have no swivelling pulleys; accepted: null")
+            raise InputError(
+                f"cables[{index}].pulley must be null, because MuJoCo's tendons have none"
+            )
     for index, carrier in enumerate(robot.carriers):
         if carrier.name == "platform":
-            raise InputError(f"carriers[{index}].name: 'platform' is the platform's name in MuJoCo; accepted: another")
+            raise InputError(f"carriers[{index}].name must not be 'platform', which is the platform's name in MuJoCo")
     bodies = {"platform": robot.inertia} if robot.platform.inertia else {}
     for index, carrier in enumerate(robot.carriers):
         if isinstance(carrier, QuadrotorCarrier):
@@ -74,9 +76,7 @@ def _check(robot: Robot) -> None:
                 f"none above the sum of the others, none below {SMALLEST_INERTIA:g}"
             )
     if len(robot.platform.dof) < 6 and any(robot.home[3:]):
-        raise InputError(
-            f"platform.home: {robot.home.tolist()} is turned, but not all six coordinates move; accepted: a level home"
-        )
+        raise InputError(f"platform.home must be level unless all six coordinates move, got {robot.home.tolist()}")
 
 
 def _add_carriers(robot: Robot, world: ET.Element, motors: ET.Element) -> None:

@@ -32,7 +32,7 @@ class RelativeDynamics:
     def __init__(self, robot: Robot):
         if len(robot.carriers) != 1:
             raise InputError(
-                f"relative: robot {robot.name!r} has {len(robot.carriers)} carriers; accepted: robots with one carrier"
+                f"relative must have a robot with one carrier, got {robot.name!r} with {len(robot.carriers)}"
             )
         self.robot = robot
         self.functions: dict[str, ca.Function] = _relative_functions(robot)

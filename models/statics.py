@@ -96,15 +96,15 @@ def equilibria(
     try:
         wanted = np.asarray(lengths, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"lengths: {lengths!r}; accepted: {robot.m} finite numbers > 0 [m]") from None
+        raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}") from None
     if wanted.shape != (robot.m,) or not (np.isfinite(wanted) & (wanted > 0)).all():
-        raise InputError(f"lengths: {lengths!r}; accepted: {robot.m} finite numbers > 0 [m]")
+        raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}")
     if robot.weight == 0:
-        raise InputError(f"gravity: robot {robot.name!r} has none; accepted: a gravity that is not zero")
+        raise InputError(f"gravity must not be zero, got none for robot {robot.name!r}")
     dynamics = Dynamics(robot)
     carriers = robot.carrier_home if carrier_pose is None else carrier_pose
     if dynamics.cable_lengths(robot.home, carriers).ndim != 1:  # checks shape and values too
-        raise InputError(f"carrier_pose: has shape {np.shape(carriers)}; accepted: {robot.carrier_home.shape}")
+        raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {np.shape(carriers)}")
     carriers = np.asarray(carriers, dtype=float)
     solver = _energy_program(robot, dynamics, carriers)
     found: list[Equilibrium] = []

@@ -55,7 +55,7 @@ def test_constant():
 
 
 def test_wrong_winds_are_named():
-    with pytest.raises(InputError, match=r"mean: .*no horizontal part"):
+    with pytest.raises(InputError, match=r"mean must be .* with a horizontal part"):
         air.dryden(TIMES, [0, 0, 1])
     with pytest.raises(InputError, match="times: must rise in equal steps"):
         air.dryden(TIMES**2, [1, 0, 0])
@@ -84,7 +84,7 @@ def test_dryden_at_small_steps_and_slow_winds():
     ],
 )
 def test_wrong_arguments_of_dryden_are_named(arguments, field):
-    with pytest.raises(InputError, match=f"^{field}: "):
+    with pytest.raises(InputError, match=f"^{field}"):
         air.dryden(**{"times": TIMES, "mean": (1, 0, 0), **arguments})
 
 
@@ -97,5 +97,5 @@ def test_wrong_arguments_of_the_others_are_named():
         (air.trapezoid, (TIMES, (1, 2, 3), (0, 0.5, 1, 2)), "corners"),
         (air.trapezoid, (TIMES, (1, 2, 3), (0, 0.2, 0.5, 1), -1), "noise"),
     ):
-        with pytest.raises(InputError, match=f"^{field}: "):
+        with pytest.raises(InputError, match=f"^{field}"):
             function(*arguments)

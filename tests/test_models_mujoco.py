@@ -187,7 +187,7 @@ def test_forward_accelerations(name):
 def test_what_mujoco_cannot_express_is_one_line():
     robot = load("nist-robocrane")
     cable = robot.cables[0].model_copy(update={"pulley": Pulley(radius=0.05)})
-    with pytest.raises(InputError, match=r"cables\[0\]\.pulley: MuJoCo's tendons have no swivelling pulleys"):
+    with pytest.raises(InputError, match=r"cables\[0\]\.pulley must be null, because MuJoCo's tendons have none"):
         to_mjcf(robot.model_copy(update={"cables": (cable, *robot.cables[1:])}))
 
 

@@ -128,19 +128,19 @@ def driving_force(
     elements = checks.count("elements", elements, 1)
     pose = checks.array("pose", pose, (None, 6))
     if pose.ndim != 2:
-        raise InputError(f"pose: has shape {pose.shape}; accepted: (N, 6), one row per instant")
+        raise InputError(f"pose must have the shape (N, 6), one row per instant, got {pose.shape}")
     instants = len(pose)
     vibration = _series("vibration", vibration, instants)
     base = robot.carrier_home[0] if carrier_pose is None else carrier_pose
     base = _series("carrier_pose", base, instants)
     if winding not in ("paid out", "printed"):
-        raise InputError(f"winding: is {winding!r}; accepted: 'paid out', 'printed'")
+        raise InputError(f"winding must be 'paid out' or 'printed', got {winding!r}")
     pretension = _pretension(pretension, (instants, robot.m))
 
     dynamics = Dynamics(robot).relative
     w = dynamics.required_wrench(pose, velocity, acceleration, base, carrier_velocity, carrier_acceleration, wind)
     if w.shape != (instants, 6):
-        raise InputError(f"the arguments broadcast to {w.shape[:-1]} instants; accepted: {instants}, as pose has")
+        raise InputError(f"all arguments must have {instants} instants like pose, got {w.shape[:-1]}")
     A = dynamics.wrench_matrix(pose)
 
     arms = robot.attachments @ rotations(pose[:, 3:]).transpose(0, 2, 1)  # R b, (N, m, 3), in {A}
@@ -160,11 +160,11 @@ def driving_force(
 def _cable_constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     for index, cable in enumerate(robot.cables):
         if cable.pulley is not None:
-            raise InputError(f"cables[{index}].pulley: is there; accepted: point anchors, as the procedure has them")
+            raise InputError(f"cables[{index}].pulley must be left out, because the procedure has point anchors")
         if cable.stiffness is None:
-            raise InputError(f"cables[{index}].stiffness: is missing, dT_K needs it; accepted: E A > 0 [N]")
+            raise InputError(f"cables[{index}].stiffness must be E A > 0 [N] for dT_K, got none")
         if cable.damping is None:
-            raise InputError(f"cables[{index}].damping: is missing, dT_C needs it; accepted: C >= 0 [N s/m]")
+            raise InputError(f"cables[{index}].damping must be C >= 0 [N s/m] for dT_C, got none")
     return (
         np.array([cable.stiffness for cable in robot.cables]),
         np.array([cable.damping for cable in robot.cables]),
@@ -174,7 +174,7 @@ def _cable_constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 def _series(name: str, value: Any, instants: int) -> np.ndarray:
     array = checks.array(name, value, (6,))
     if array.shape not in ((6,), (1, 6), (instants, 6)):
-        raise InputError(f"{name}: has shape {array.shape}; accepted: ({instants}, 6), as pose has, or (6,)")
+        raise InputError(f"{name} must have the shape ({instants}, 6) like pose, or (6,), got {array.shape}")
     return np.broadcast_to(array, (instants, 6))
 
 
@@ -182,9 +182,11 @@ def _pretension(value: Any, shape: tuple[int, int]) -> np.ndarray:
     try:
         array = np.broadcast_to(np.asarray(value, dtype=float), shape)
     except (TypeError, ValueError):
-        raise InputError(f"pretension: {value!r} does not broadcast to {shape}; accepted: [N], one or each") from None
+        raise InputError(
+            f"pretension must be one number [N] or an array that broadcasts to {shape}, got {value!r}"
+        ) from None
     if not (array >= 0).all():
-        raise InputError(f"pretension: has {array.min():g} in it; accepted: numbers >= 0")
+        raise InputError(f"pretension must have numbers >= 0, got {array.min():g}")
     return array
 
 

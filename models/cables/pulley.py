@@ -77,7 +77,7 @@ def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -
     """
     radii = checks.array("radius", radius, ()).ravel()
     if not (radii >= 0).all():
-        raise InputError(f"radius: has {radii.min():g} in it; accepted: numbers >= 0")
+        raise InputError(f"radius must have numbers >= 0, got {radii.min():g}")
     columns = []
     for i, r in enumerate(np.broadcast_to(radii, attachment.shape[1])):
         place = _point_anchor if r == 0 else _over_sheave

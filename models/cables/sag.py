@@ -83,7 +83,7 @@ class SaggingCable:
         """Points of the cable [m], (..., k, 3), at these fractions (k,) of its unstrained length from the start."""
         share = checks.array("fractions", fractions, (None,))
         if share.ndim != 1 or not ((share >= 0) & (share <= 1)).all():
-            raise InputError(f"fractions: {fractions!r}; accepted: a list of numbers from 0 to 1")
+            raise InputError(f"fractions must be a list of numbers from 0 to 1, got {fractions!r}")
         unit = (self.weight * self.length)[..., None]
         middle = (self.V_m / unit[..., 0])[..., None] + (share - 1) / 2
         x, z = _reach(self.H[..., None] / unit, middle, share, unit / self.stiffness)
@@ -139,14 +139,16 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     try:
         batch = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], length.shape)
     except ValueError:
-        told = f"start {start.shape}, end {end.shape}, length {length.shape}"
-        raise InputError(f"leading dimensions do not broadcast: {told}; accepted: equal ones, or 1") from None
+        shapes = f"start {start.shape}, end {end.shape}, length {length.shape}"
+        raise InputError(f"leading dimensions must broadcast, got {shapes}") from None
     start, length = np.broadcast_to(start, (*batch, 3)), np.broadcast_to(length, batch)
     if not (length > 0).all():
-        raise InputError(f"length: has {length.min():g} in it; accepted: numbers > 0")
+        raise InputError(f"length must have numbers > 0, got {length.min():g}")
     span = np.broadcast_to(end, (*batch, 3)) - start
     if np.isinf(stiffness) and not (np.linalg.norm(span, axis=-1) < length).all():
-        raise InputError("length: is not above the distance of the ends; accepted: longer, or a finite stiffness")
+        raise InputError(
+            "length must be above the distance of the ends if the stiffness is infinite, got a shorter one"
+        )
 
     z = span @ upward
     level = span - z[..., None] * upward
