@@ -195,7 +195,7 @@ def test_what_mujoco_would_refuse_is_refused_with_a_reason():
     robot = load("multi-quadrotor-3")
     data = robot.model_dump(mode="json")
     data["carriers"][0]["name"] = data["cables"][0]["carrier"] = "platform"
-    with pytest.raises(InputError, match=r"carriers\[0\]\.name: 'platform'"):
+    with pytest.raises(InputError, match=r"carriers\[0\]\.name must not be 'platform'"):
         to_mjcf(Robot.model_validate(data))
     data["carriers"][0]["name"] = data["cables"][0]["carrier"] = "anchor1"
     mujoco.MjModel.from_xml_string(to_mjcf(Robot.model_validate(data)))
