@@ -3,9 +3,9 @@
     python -m towline.benchmarks.workspace [--places 400000] [--runs 5] [--programs all]
 
 The first table has static equilibrium (the bounded problem itself) and the other conditions, of robots with six and
-eight cables, at random poses among their anchors, all of which differ. The second asks for wrench closure at the 14 823
+eight cables, at random poses among their anchors, all of which differ. The second has wrench closure at the 14 823
 poses of CASPR's paper, which reports 89 s to 455 s in MATLAB for its methods, and counts by a linear program, pose by
-pose (HiGHS), where it is asked to. Times are medians of several runs after one that is not counted, by the clock on the
+pose (HiGHS), if that is requested. Times are medians of several runs after one that is not counted, by the clock on the
 wall and by the time that the process had.
 """
 

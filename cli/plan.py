@@ -42,7 +42,7 @@ def plan(
         typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files."),
     ] = False,
 ) -> None:
-    """Plan a motion that keeps every tension inside its limits, or say why there is none."""
+    """Plan a motion that keeps every tension inside its limits, or report why none exists."""
     from ..figures.animation import check_film
     from ..models import load
     from ..ocp import plan as plan_motion

@@ -1,4 +1,4 @@
-"""What a person sees while a solver works: attempt, iteration, objective and infeasibility, live on standard error."""
+"""Show progress while a solver works: attempt, iteration, objective and infeasibility, live on standard error."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Watch:
     Attributes
     ----------
     rows
-        All that was told: (iteration, objective, infeasibility).
+        All rows received: (iteration, objective, infeasibility).
     attempt
         Counts the runs of the solver: another one begins where the iteration falls back.
     """
@@ -39,7 +39,7 @@ class Watch:
         self._update(told=told)
 
     def now(self, what: str) -> None:
-        """Say what is done next, without iterations."""
+        """Show the next step, without iterations."""
         self._update(description=what, told="")
 
     def _update(self, **shown: Any) -> None:
@@ -56,9 +56,9 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
     what
         What is being done.
     quiet
-        Show nothing, whoever watches: standard output is for a program (`--json`).
+        Show nothing, because standard output is for a program (`--json`).
     console
-        Where to; None: standard error.
+        Where to print; default: standard error.
     """
     # Rich takes longer to load than a short plan to compute.
     if quiet or (console is None and not sys.stderr.isatty()):

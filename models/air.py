@@ -133,7 +133,7 @@ def _across(step: float, noise: np.ndarray) -> np.ndarray:
 
 
 def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int | None, least: float = -np.inf) -> np.ndarray:
-    """`count` finite numbers (None: any), at least `least`."""
+    """`count` finite numbers (None for any number), at least `least`."""
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""A robot's functions as C code that needs nothing but a C compiler, for a controller's own processor."""
+"""A robot's functions as C code that needs only a C compiler, for a controller's own processor."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class CasprImport:
-    """A robot, and what the folder says beyond it.
+    """A robot, and what else the folder contains.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> 
     folder
         The folder of one robot.
     cable_set
-        Id of the set of cables; None: the file's default_cable_set.
+        Id of the set of cables; default: the file's default_cable_set.
 
     Raises
     ------

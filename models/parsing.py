@@ -45,7 +45,7 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
     try:
         text = read_bytes(path, "a YAML file").decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not text (byte {error.start} is not UTF-8); accepted: a YAML file") from None
+        raise InputError(f"{path}: is not text (byte {error.start} is not UTF-8); it must be a YAML file") from None
     return parse_yaml(text, model, where=str(path))
 
 
@@ -66,7 +66,7 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be read ({reason}); accepted: the path of a readable file") from None
+        raise InputError(f"{path}: cannot be read ({reason}); it must be a readable file") from None
 
 
 def parse_yaml(text: str, model: type[Model], where: str) -> Model:
@@ -78,7 +78,7 @@ def parse_yaml(text: str, model: type[Model], where: str) -> Model:
             warnings.simplefilter("ignore")  # ruamel warns of what YAML 1.1 would have made of a number
             data = reader.load(text)
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
-        raise InputError(f"{where}: is not YAML ({_problem(error)}); accepted: a plain YAML mapping") from None
+        raise InputError(f"{where}: is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
         raise InputError(f"{where}: must hold a mapping with {_keys(_schema(model))}, got {brief(data)}")
     return validate(data, model, where)
@@ -163,7 +163,7 @@ def _without_branches(details: list[Any]) -> list[Any]:
     """Return pydantic's complaints with one for each choice of types instead of one for each type.
 
     It names the types in the place. A mapping is meant for the type that takes one, and so is a list; of a plain value
-    all types say what they would have.
+    all types report what they accept.
     """
     details = [detail | {"msg": _plainly(detail["msg"])} for detail in details]
     result: list[Any] = []

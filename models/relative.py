@@ -33,7 +33,7 @@ def relative_inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, accel
     Parameters
     ----------
     pose, velocity, acceleration
-        (6, 1) each: of the platform frame relative to {A}, and its time derivatives as seen in {A}.
+        (6, 1) each: of the platform frame relative to {A}, and its time derivatives expressed in {A}.
     """
     angles, rates = pose[3:6], velocity[3:6]
     R = rotation(angles)
@@ -58,7 +58,7 @@ def base_disturbance(
     Parameters
     ----------
     pose, velocity
-        (6, 1) each: of the platform frame relative to {A}, as seen in {A}.
+        (6, 1) each: of the platform frame relative to {A}, expressed in {A}.
     carrier_pose, carrier_velocity, carrier_acceleration
         (6, 1) each: of {A} in {G} and its time derivatives.
     """

@@ -4,7 +4,7 @@
     moment : I alpha + omega x I omega         I = R I_b R^T, omega = R Omega, alpha = R (dP dTheta + P ddTheta)
 
 about the CoM, whose place in the platform frame is c. Source: paper F, Eqs. 24 and 29; paper C,
-Eq. 4, which lacks the gyroscopic term, and Eq. 12, which takes ddTheta for the angular acceleration.
+Eq. 4, which omits the gyroscopic term, and Eq. 12, which takes ddTheta for the angular acceleration.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A robot as data: one platform, the carriers that hold its cables, and the cables. Nothing but checks is computed.
+"""A robot as data: one platform, the carriers that hold its cables, and the cables. Only checks are computed.
 
 SI units throughout: metres, kilograms, seconds, newtons, radians. {G} is the global frame (gravity says which way is
 down), the platform frame sits on the platform, a carrier frame on each carrier. Poses are (x, y, z, roll, pitch, yaw)

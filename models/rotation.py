@@ -2,7 +2,7 @@
 
     R = Rz(yaw) Ry(pitch) Rx(roll)        from the turned frame into the fixed one
     Omega = P(roll, pitch) dTheta         body rate in the turned frame, Theta = (roll, pitch, yaw)
-    alpha = dP dTheta + P ddTheta         its derivative (paper F, Eq. 31 lacks the P)
+    alpha = dP dTheta + P ddTheta         its derivative (paper F, Eq. 31 omits P)
 
 Source: paper F, Eqs. 1, 27, 28, 31 as corrected.
 """

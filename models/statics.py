@@ -77,7 +77,7 @@ def equilibria(
     lengths
         One length > 0 for each cable [m].
     carrier_pose
-        (c, 6) in {G}; None: at home.
+        (c, 6) in {G}; default: at home.
     starts
         How many starting poses are tried: home, and random ones below and about it.
 

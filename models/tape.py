@@ -100,7 +100,7 @@ def translate(function: ca.Function) -> str:
     tape = _scalar(function)
     if tape.n_instructions() > LONGEST:
         raise InputError(
-            f"{function.name()}: has {tape.n_instructions()} instructions; accepted: at most {LONGEST} for a kernel"
+            f"{function.name()}: has {tape.n_instructions()} instructions, but a kernel has at most {LONGEST}"
         )
     work: dict[int, str] = {}  # what each slot of the work vector holds now
     variables: dict[str, str] = {}  # of each expression on the tape

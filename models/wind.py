@@ -1,6 +1,6 @@
 """The aerodynamic wrench of paper F on the platform.
 
-    F_x = 1/2 rho C_d S V_x |V_x|,  F_y likewise,  F_z = 1/2 rho C_l S (V_x^2 + V_y^2),  no moment about the CoM
+    F_x = 1/2 rho C_d S V_x |V_x|,  F_y alike,  F_z = 1/2 rho C_l S (V_x^2 + V_y^2),  no moment about the CoM
 
 V is the air's velocity relative to the platform's CoM, along the axes of {G}. Source: paper F, Eq. 25, which has V_x^2
 for V_x |V_x| and so never pushes backwards; that form is kept under `form: printed`.

@@ -92,7 +92,7 @@ def spans(A: np.ndarray) -> np.ndarray:
 
 
 def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
-    """Return rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None: all of R^n."""
+    """Return rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None for all of R^n."""
     full = spans(columns)
     found: list[tuple[np.ndarray, np.ndarray | None]] = [(np.flatnonzero(full), None)] if full.any() else []
     flat = np.flatnonzero(~full)

@@ -55,7 +55,7 @@ class Kernels:
     solve_packed, solve_rows :
         See `kernels.single` and `kernels.wide`.
     rows_at_once :
-        How many rows `solve_rows` takes together; threads share multiples of it. None: threads gain nothing.
+        How many rows `solve_rows` takes together; threads share multiples of it. None if threads gain nothing.
     """
 
     def __init__(

@@ -4,7 +4,7 @@ $$
 s = Q^T b + N^T \lambda, \qquad lower \le s \le upper, \qquad \lambda \in R^{m - rank}
 $$
 
-An interval for m - rank = 1, a polygon for 2 (Mikelsons et al. 2008; Lamaury and Gouttefarde 2013, who walk along the
+An interval for m - rank = 1, a polygon for 2 (Mikelsons et al. 2008; Lamaury and Gouttefarde 2013, which walk along the
 lines from corner to corner; with at most some tens of lines NumPy meets all of them pairwise in less time than Python
 walks once), a polytope beyond, from Qhull.
 """

@@ -73,7 +73,7 @@ class Method(ABC):
         return []
 
     def attempt(self, problem: TensionProblem) -> tuple[Status, NDArray[np.float64] | None] | None:
-        """Answer at once, or return None: then `propose` is called and judged.
+        """Answer at once, or return None; then `propose` is called and judged.
 
         What is returned here is not judged again. Tensions, (m,) [N], are inside the limits and give w within
         `TensionProblem.tolerance`; "infeasible" and "singular" rest on a direction that proves it by several times as

@@ -96,12 +96,12 @@ class Domain:
 
     @cached_property
     def attitude_varies(self) -> bool:
-        """Whether the attitude varies."""
+        """Return whether the attitude varies."""
         return bool((self.high - self.low)[3:6].max() > THINNEST)
 
     @cached_property
     def carriers_vary(self) -> bool:
-        """Whether the positions of carriers vary."""
+        """Return whether the positions of carriers vary."""
         return bool((self.high - self.low)[6 : 6 + 3 * len(self.robot.carriers)].max() > THINNEST)
 
     @property

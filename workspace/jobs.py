@@ -60,7 +60,7 @@ class Job:
     known
         Of each chunk: the packed flags where they are known already, else None.
     units
-        Points of the unit cube (n, d) of each chunk; None: the sampler's.
+        Points of the unit cube (n, d) of each chunk; default: the sampler's.
     keep
         Whether the samples are returned and not only their counts.
     """

@@ -36,7 +36,7 @@ class Totals:
 
     @property
     def keeps_more(self) -> bool:
-        """Whether more samples can be kept."""
+        """Return whether more samples can be kept."""
         return self._left > 0
 
     def add(self, result: JobResult) -> None:

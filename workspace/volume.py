@@ -1,7 +1,7 @@
 """The volume of a workspace with its confidence interval.
 
 Of n independent samples, uniform in a box of volume V, k lie in the workspace: k is binomial with p = v / V, and the
-interval of p is that of Clopper and Pearson, which covers at least as often as its level says.
+interval of p is that of Clopper and Pearson, which covers at least as often as its level states.
 """
 
 from __future__ import annotations

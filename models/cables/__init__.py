@@ -1,6 +1,6 @@
 """What a cable is beside a straight line: elastic, cut into elements, heavy, sagging, or led over a pulley.
 
-`driving_force` is not imported here: it needs the dynamics of a robot, which in turn may need the pulleys of this room.
+`driving_force` is not imported here: it needs the dynamics of a robot, which may need these pulleys.
 """
 
 from .element_chain import ElementChain

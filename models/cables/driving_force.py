@@ -97,7 +97,7 @@ def driving_force(
     robot
         With one carrier, point anchors, and stiffness and damping for every cable.
     pose, velocity, acceleration
-        Of the platform frame relative to {A}, as seen in {A}, (N, 6).
+        Of the platform frame relative to {A}, expressed in {A}, (N, 6).
     vibration
         (dx_B, dTheta): small displacement of the platform frame's origin [m] and small turn [rad], in {G}, (N, 6).
         Each row is what one time step adds to the steady pose, as the paper has it: dT_C divides it by `time_step`.
@@ -106,9 +106,9 @@ def driving_force(
     elements
         N of the paper: elements of each cable.
     carrier_pose, carrier_velocity, carrier_acceleration
-        Of {A} in {G}, (N, 6); None: at home and at rest.
+        Of {A} in {G}, (N, 6); default: at home and at rest.
     wind
-        Velocity of the air in {G} [m/s], (N, 3) or (3,); None: no air at all.
+        Velocity of the air in {G} [m/s], (N, 3) or (3,); default: no air.
     pretension
         What each cable carries when the slack switch looks at its elements [N], broadcast to (N, m). 0 is the paper's
         rule, by which dT_K is never negative; `inf` keeps every cable taut.
