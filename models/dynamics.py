@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Any, overload
 
@@ -16,6 +17,7 @@ from .arrays import Array, Symbol
 from .batch import arrays, call, is_symbolic
 from .cables.pulley import Exit
 from .files import as_robot
+from .functions import Functions
 from .relative_dynamics import RelativeDynamics
 from .robot import QuadrotorCarrier, Robot
 
@@ -55,7 +57,11 @@ class Dynamics:
 
     def __init__(self, robot: Robot | str | os.PathLike[str]):
         self.robot = as_robot(robot)
-        self.functions: dict[str, ca.Function] = _world_functions(self.robot)
+        self.functions: Mapping[str, ca.Function] = _world_functions(self.robot)
+
+    def __reduce__(self) -> tuple[type[Dynamics], tuple[Robot]]:
+        """Pickle the robot alone: its functions are built again."""
+        return Dynamics, (self.robot,)
 
     @overload
     def wrench_matrix(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
@@ -536,20 +542,39 @@ def _run(robot: Robot, pose: ca.SX, carriers: ca.SX) -> Exit:
     return kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii)
 
 
-def _world_functions(robot: Robot) -> dict[str, ca.Function]:
+def _world_functions(robot: Robot) -> Functions:
     names = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
     motion = _symbols(robot, names)
     pose, velocity, acceleration, carriers = motion[:4]
-    (tensions,) = _symbols(robot, ["tensions"])
-    run = _run(robot, pose, carriers)
-    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, run.directions)
-    w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
-    forward_acceleration = forward.platform_acceleration(robot, pose, velocity, A @ tensions)
-    place, state = [pose, carriers], [pose, velocity, tensions, carriers]
-    place_names, state_names = ["pose", "carrier_pose"], ["pose", "velocity", "tensions", "carrier_pose"]
-    return {
-        "wrench_matrix": ca.Function("wrench_matrix", place, [A], place_names, ["A"]),
-        "cable_lengths": ca.Function("cable_lengths", place, [run.lengths], place_names, ["lengths"]),
-        "required_wrench": ca.Function("required_wrench", motion, [w], names, ["w"]),
-        "acceleration": ca.Function("acceleration", state, [forward_acceleration], state_names, ["acceleration"]),
-    }
+    place = [pose, carriers], ["pose", "carrier_pose"]
+
+    def matrix() -> ca.SX:
+        directions = _run(robot, pose, carriers).directions
+        return kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, directions)
+
+    def wrench_matrix() -> ca.Function:
+        return ca.Function("wrench_matrix", place[0], [matrix()], place[1], ["A"])
+
+    def cable_lengths() -> ca.Function:
+        return ca.Function("cable_lengths", place[0], [_run(robot, pose, carriers).lengths], place[1], ["lengths"])
+
+    def required_wrench() -> ca.Function:
+        w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
+        return ca.Function("required_wrench", motion, [w], names, ["w"])
+
+    def forward_acceleration() -> ca.Function:
+        (tensions,) = _symbols(robot, ["tensions"])
+        result = forward.platform_acceleration(robot, pose, velocity, matrix() @ tensions)
+        state_names = ["pose", "velocity", "tensions", "carrier_pose"]
+        return ca.Function(
+            "acceleration", [pose, velocity, tensions, carriers], [result], state_names, ["acceleration"]
+        )
+
+    return Functions(
+        {
+            "wrench_matrix": wrench_matrix,
+            "cable_lengths": cable_lengths,
+            "required_wrench": required_wrench,
+            "acceleration": forward_acceleration,
+        }
+    )
