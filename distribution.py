@@ -93,7 +93,7 @@ def pose_problem(
     short = np.flatnonzero(~(dynamics.cable_lengths(pose, carrier_pose) > COINCIDENT))
     if short.size:
         raise InputError(
-            f"pose: must leave every cable a length, but anchor and attachment of cable {short[0] + 1} coincide there"
+            f"pose must leave every cable a length, got one at which the ends of cable {short[0] + 1} coincide"
         )
     A = dynamics.wrench_matrix(pose, carrier_pose)
     carriers = (carrier_pose, carrier_velocity, carrier_acceleration)

@@ -35,7 +35,7 @@ from .parsing import brief, read_bytes, validate
 from .robot import COORDINATES, LARGEST, Cable, Coordinate, Platform, Robot, inertia_matrix
 from .rotation import rotation
 
-# What each joint's q moves, in the order of q; both spatial ones turn freely and write the angles in their own way.
+# What each joint's q moves, in the order of q; both spatial ones turn freely; each writes the angles in its own form.
 JOINTS: dict[str, tuple[Coordinate, ...]] = {
     "SPATIAL_EULER_XYZ": COORDINATES,
     "SPATIAL_QUATERNION": COORDINATES,
@@ -88,8 +88,8 @@ def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> 
     Raises
     ------
     InputError
-        If a file is missing or wrong, or the robot is none that towline can express: one line that names the file and
-        the element.
+        If a file is missing or wrong, or towline cannot express the robot: one line that names the file and the
+        element.
     """
     place = Path(folder)
     notes = Counter[str]()
@@ -101,25 +101,25 @@ def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> 
     chosen, ids = _choose(cables, cable_set)
     wires = [_cable(node, com, notes) for node in chosen.children()]
     if not wires:
-        raise chosen.wrong("has no cables", "at least one")
+        raise chosen.wrong("have at least one cable", "none")
     default = cables.element.get("default_cable_set")
-    told = [text if count == 1 else f"{text} ({count} times)" for text, count in notes.items()]
+    remarks = [text if count == 1 else f"{text} ({count} times)" for text, count in notes.items()]
     source = (
         f"Imported from the CASPR folder {brief(name)}, link {brief(link.element.get('name', ''))}, cable set "
         f"{brief(chosen.attribute('id'))}: geometry, mass, inertia and tension limits. Home is q_initial."
     )
     data = {
         "name": _name(name if chosen.attribute("id") == default else f"{name}-{chosen.attribute('id')}"),
-        "source": " ".join([source, *(f"Note: {note}." for note in told)]),
+        "source": " ".join([source, *(f"Note: {note}." for note in remarks)]),
         "platform": platform,
         "carriers": [{"name": "frame", "kind": "ground"}],
         "cables": wires,
     }
-    return CasprImport(validate(data, Robot, chosen.where), chosen.attribute("id"), tuple(ids), told)
+    return CasprImport(validate(data, Robot, chosen.where), chosen.attribute("id"), tuple(ids), remarks)
 
 
 class _Parser(DefusedXMLParser):
-    """Refuses entities, and every DOCTYPE but one that only names a DTD beside the file, as CASPR's files do."""
+    """A parser that refuses entities and every DOCTYPE, except one that only names a DTD beside the file."""
 
     def __init__(self):
         # The tree builder written in C: Python's own walks a deep tree by recursion.
@@ -139,56 +139,56 @@ class _Node:
     element: Element
     where: str
 
-    def wrong(self, what: str, accepted: str) -> InputError:
-        return InputError(f"{self.where}: {what}; accepted: {accepted}")
+    def wrong(self, accepted: str, got: str, part: str = "") -> InputError:
+        return InputError(f"{self.where}{part and f': {part}'} must {accepted}, got {got}")
 
     def children(self, tag: str | None = None) -> list[_Node]:
         return [_Node(child, f"{self.where}{_label(child)}") for child in self.element if tag in (None, child.tag)]
 
     def find(self, tag: str) -> _Node | None:
-        """The child `tag`, of which there may be one or none."""
-        found = self.children(tag)
-        if len(found) > 1:
-            raise self.wrong(f"has {len(found)} elements {tag}", "one")
-        return found[0] if found else None
+        """Return the only child `tag`, or None if there is none."""
+        children = self.children(tag)
+        if len(children) > 1:
+            raise self.wrong(f"have one element {tag}", str(len(children)))
+        return children[0] if children else None
 
     def child(self, tag: str) -> _Node:
-        found = self.find(tag)
-        if found is None:
-            raise self.wrong(f"{tag} is missing", f"an element {tag}")
-        return found
+        child = self.find(tag)
+        if child is None:
+            raise self.wrong(f"have an element {tag}", "none")
+        return child
 
     def attribute(self, name: str) -> str:
         value = self.element.get(name)
         if value is None:
-            raise self.wrong(f"the attribute {name} is missing", f'{name}="..."')
+            raise self.wrong(f"have the attribute {name}", "none")
         return value
 
     def numbers(self, count: int, attribute: str | None = None) -> list[float]:
-        """The element's text, or one of its attributes, as `count` finite numbers."""
+        """Return the element's text, or one of its attributes, as `count` finite numbers."""
         text = self.attribute(attribute) if attribute else self.element.text or ""
         words = text.split()
         values = [float(word) if NUMBER.fullmatch(word) else math.nan for word in words]
         if len(values) != count or not all(map(math.isfinite, values)):
-            what = f"{attribute} is {brief(text)}" if attribute else f"is {brief(text.strip())}"
-            raise self.wrong(what, "one finite number" if count == 1 else f"{count} finite numbers")
+            accepted = "be one finite number" if count == 1 else f"be {count} finite numbers"
+            raise self.wrong(accepted, brief(text.strip()), attribute or "")
         return values
 
 
 def _label(element: Element) -> str:
-    """Its tag, and its name, id or number if it has one."""
+    """Return the element's tag, and its name, id or number if it has one."""
     called = next((element.get(key) for key in ("name", "id", "num") if element.get(key)), None)
     return f": {brief(element.tag)[1:-1]}" + (f" {brief(called)}" if called else "")
 
 
 def _file(folder: Path, ending: str) -> Path:
     if not folder.is_dir():
-        raise InputError(f"{folder}: is no folder; accepted: a folder with one *_bodies.xml and one *_cables.xml")
-    found = sorted(folder.glob(f"*{ending}"))
-    if len(found) != 1:
-        names = ", ".join(path.name for path in found) or "none"
-        raise InputError(f"{folder}: there must be one file *{ending}, found {names}; accepted: a CASPR robot folder")
-    return found[0]
+        raise InputError(f"{folder} must be a folder with one *_bodies.xml and one *_cables.xml, got no folder")
+    files = sorted(folder.glob(f"*{ending}"))
+    if len(files) != 1:
+        names = ", ".join(path.name for path in files) or "none"
+        raise InputError(f"{folder} must be a CASPR robot folder with one file *{ending}, got {names}")
+    return files[0]
 
 
 def _read(file: Path, root: str, notes: Counter[str]) -> _Node:
@@ -199,21 +199,22 @@ def _read(file: Path, root: str, notes: Counter[str]) -> _Node:
         element: Any = parser.close()
     except DefusedXmlException:
         raise InputError(
-            f"{file}: has a DTD or entities of its own; accepted: plain XML, with at most a DOCTYPE that names a file"
+            f"{file} must be plain XML, with at most a DOCTYPE that names a file, got a DTD or entities of its own"
         ) from None
     except ParseError as error:
-        raise InputError(f"{file}: is not XML ({brief(str(error))[1:-1]}); accepted: a CASPR {root} file") from None
+        reason = brief(str(error))[1:-1]
+        raise InputError(f"{file} must be a CASPR {root} file, got text that is not XML ({reason})") from None
     except (LookupError, ValueError):  # encodings that Python or expat do not know
-        raise InputError(f"{file}: is not XML (its encoding is unknown); accepted: UTF-8") from None
+        raise InputError(f"{file} must be XML in UTF-8, got an unknown encoding") from None
     if element.tag != root:
-        raise InputError(f"{file}: its root is {brief(element.tag)}; accepted: {root}")
+        raise InputError(f"{file} must have the root element {root}, got {brief(element.tag)}")
     for holder in _with_stray_text(element):
         notes[f"{file.name}: text beside the elements of {brief(holder)[1:-1]} is left out"] += 1
     return _Node(element, str(file))
 
 
 def _with_stray_text(root: Element) -> Iterator[str]:
-    """Tags of the elements that hold text beside other elements."""
+    """Yield the tags of the elements that hold text beside other elements."""
     for element in root.iter():
         text = [element.text or ""] if len(element) else []
         if any(part.strip() for part in (*text, *(child.tail or "" for child in element))):
@@ -224,20 +225,20 @@ def _only_link(bodies: _Node) -> _Node:
     links = bodies.child("links").children()
     for link in links:
         if link.element.tag != "link_rigid":
-            raise link.wrong("is no link that towline knows", "link_rigid")
+            raise link.wrong("be a link_rigid", brief(link.element.tag))
     if len(links) != 1:
-        raise bodies.wrong(f"there are {len(links)} links", "one: towline's robots have one platform")
+        raise bodies.wrong("have one link, because towline's robots have one platform", str(len(links)))
     return links[0]
 
 
 def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
-    """The link as a platform in its joint's frame, and its centre of mass there [m]."""
+    """Return the link as a platform in its joint's frame, and its centre of mass there [m]."""
     joint, physical = link.child("joint"), link.child("physical")
     kind = joint.attribute("type")
     if kind not in JOINTS:
-        raise joint.wrong(f"type {brief(kind)} is no free body", ", ".join(JOINTS))
+        raise joint.wrong(f"be one of {', '.join(JOINTS)}", brief(kind), "type")
     if joint.element.get("actuated") == "true":
-        raise joint.wrong("has a motor of its own", "a joint that only the cables move")
+        raise joint.wrong("be a joint that only the cables move", "one with a motor")
     mass = physical.child("mass").numbers(1)[0]
     com = np.array(physical.child("com_location").numbers(3))
     if joint.element.get("q_min") or joint.element.get("q_max"):
@@ -255,11 +256,11 @@ def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
 
 
 def _inertia(node: _Node, mass: float, com: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the centre of mass [kg m^2]."""
+    """Return (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the centre of mass [kg m^2]."""
     xx, yy, zz, xy, xz, yz = (node.child(name).numbers(1)[0] for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"))
     reference = node.attribute("ref")
     if reference not in ("com", "joint"):
-        raise node.wrong(f"ref is {brief(reference)}", "com, joint")
+        raise node.wrong("be com or joint", brief(reference), "ref")
     matrix = inertia_matrix((xx, yy, zz, xy, xz, yz))
     if reference == "joint":
         matrix = matrix - mass * (com @ com * np.eye(3) - np.outer(com, com))
@@ -268,10 +269,10 @@ def _inertia(node: _Node, mass: float, com: np.ndarray) -> tuple[float, float, f
 
 
 def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
-    """q_initial as a pose in {G} [m, rad]."""
+    """Return q_initial as a pose in {G} [m, rad]."""
     parent = link.child("parent")
     if parent.child("num").numbers(1) != [0.0]:
-        raise parent.child("num").wrong("is not the ground", "0")
+        raise parent.child("num").wrong("be 0, the ground", brief(parent.child("num").element.text or ""))
     pose = np.zeros(6)
     pose[:3] = parent.child("location").numbers(3)
     dof = JOINTS[kind]
@@ -285,16 +286,16 @@ def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
 
 
 def _from_xyz(angles: np.ndarray) -> np.ndarray:
-    """R = Rx Ry Rz of three angles [rad], (3, 3)."""
+    """Return R = Rx Ry Rz of three angles [rad], (3, 3)."""
     x, y, z = (rotation(ca.DM(np.diag(angles)[i])).full() for i in range(3))
     return x @ y @ z
 
 
 def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> np.ndarray:
-    """R of (e0, e1, e2, e3), e0 the real part, (3, 3)."""
+    """Return R of the quaternion (e0, e1, e2, e3) with the real part e0, (3, 3)."""
     norm = np.linalg.norm(quaternion)
     if not 0.999 < norm < 1.001:
-        raise joint.wrong(f"the quaternion of q_initial has norm {norm:g}", "a norm of 1")
+        raise joint.wrong("have a quaternion of norm 1", f"a norm of {norm:g}", "q_initial")
     w, *v = quaternion / norm
     x, y, z = v
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -302,34 +303,34 @@ def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> np.ndarray:
 
 
 def _angles(R: np.ndarray) -> np.ndarray:
-    """(roll, pitch, yaw) of R = Rz Ry Rx [rad], also at pitch = +-90 degrees, where any roll will do."""
+    """Return (roll, pitch, yaw) of R = Rz Ry Rx [rad], also at pitch = +-90 degrees, where any roll is valid."""
     roll = math.atan2(R[2, 1], R[2, 2])
     level = R @ rotation(ca.DM([roll, 0, 0])).full().T  # Rz Ry
     pitch, yaw = math.atan2(-level[2, 0], level[2, 2]), math.atan2(-level[0, 1], level[1, 1])
     return np.array([roll, pitch, yaw]) + 0.0  # -0 would only puzzle a reader
 
 
-def _choose(cables: _Node, wanted: str | None) -> tuple[_Node, list[str]]:
-    """The set of cables, and the ids of all."""
+def _choose(cables: _Node, requested: str | None) -> tuple[_Node, list[str]]:
+    """Return the set of cables to import, and the ids of all sets."""
     sets = cables.children("cable_set")
     ids = [node.attribute("id") for node in sets]
-    known = ", ".join(brief(name)[1:-1] for name in ids) or "none, the file has no cable_set"
-    chosen = wanted or cables.element.get("default_cable_set") or (ids[0] if len(ids) == 1 else "")
+    known = ", ".join(brief(name)[1:-1] for name in ids) or "no set, because the file has none"
+    chosen = requested or cables.element.get("default_cable_set") or (ids[0] if len(ids) == 1 else "")
     if not chosen:
-        raise cables.wrong("default_cable_set is missing", f"a cable set out of {known}")
+        raise cables.wrong(f"be one of {known}", "none", "default_cable_set")
     if ids.count(chosen) != 1:
-        what = "there twice" if chosen in ids else "not there"
-        raise cables.wrong(f"the cable set {brief(chosen)} is {what}", f"one of {known}")
+        got = f"{brief(chosen)}, which is there twice" if chosen in ids else brief(chosen)
+        raise cables.wrong(f"be one of {known}", got, "cable set")
     return sets[ids.index(chosen)], ids
 
 
 def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
     kind = node.element.tag
     if kind not in CABLES:
-        raise node.wrong("is no cable that towline knows", ", ".join(CABLES))
+        raise node.wrong(f"be one of {', '.join(CABLES)}", brief(kind))
     reference = node.attribute("attachment_reference")
     if reference not in ("com", "joint"):
-        raise node.wrong(f"attachment_reference is {brief(reference)}", "com, joint")
+        raise node.wrong("be com or joint", brief(reference), "attachment_reference")
     properties = node.child("properties")
     lower = properties.find("force_min")
     if lower is None:
@@ -355,18 +356,18 @@ def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
 
 
 def _ends(node: _Node, origin: np.ndarray, notes: Counter[str]) -> dict[str, Any]:
-    """Anchor, attachment and pulley of a cable; its locations on the link are relative to `origin`."""
+    """Return anchor, attachment and pulley of a cable; its locations on the link are relative to `origin`."""
     points = node.child("attachments").children()
     if points and points[-1].element.tag == "attachment" and _link(points[-1]) == 0:
         points.reverse()
     links = [_link(point) for point in points]
     if len(points) < 2 or links != [0] * (len(points) - 1) + [1]:
-        way = ", ".join(str(number) for number in links[:9]) or "none"
-        raise node.wrong(f"runs over links {way}", "from the ground, link 0, straight to link 1")
+        numbers = ", ".join(str(number) for number in links[:9]) or "none"
+        raise node.wrong("run from the ground, link 0, straight to link 1", f"the links {numbers}")
     anchor, attachment = points[-2], points[-1]
     if len(points) > 2:
         if node.element.tag != "cable_ideal":
-            raise node.wrong("stretches between points on the ground", "an elastic cable from one anchor to link 1")
+            raise node.wrong("run from one anchor to link 1 if it is elastic", "several points on the ground")
         notes["points on the ground before the last one are left out, they add a constant length"] += 1
     ends: dict[str, Any] = {"attachment": (np.array(attachment.child("location").numbers(3)) + origin).tolist()}
     if anchor.element.tag == "attachment":
@@ -379,18 +380,18 @@ def _ends(node: _Node, origin: np.ndarray, notes: Counter[str]) -> dict[str, Any
 
 
 def _link(point: _Node) -> int:
-    """Number of the link that a point sits on, 0 for the ground."""
+    """Return the number of the link that a point sits on, 0 for the ground."""
     if point.element.tag == "base_rotating_pulley":
         return 0
     if point.element.tag != "attachment":
-        raise point.wrong("is no attachment that towline knows", "attachment, base_rotating_pulley")
+        raise point.wrong("be an attachment or a base_rotating_pulley", brief(point.element.tag))
     number = point.child("link").numbers(1)[0]
     if not number.is_integer():
-        raise point.child("link").wrong(f"is {number:g}", "0 or 1")
+        raise point.child("link").wrong("be 0 or 1", f"{number:g}")
     return int(number)
 
 
 def _name(text: str) -> str:
-    """The text as a robot's name: lower case, words joined by hyphens."""
+    """Return the text as a robot's name: lower case, words joined by hyphens."""
     words = re.findall(r"[a-z0-9.]+", text.lower())
     return "-".join(words).lstrip(".")[:64].rstrip("-.") or "caspr-robot"

@@ -3,7 +3,7 @@
     carrier of kind   is in MuJoCo
     ground            sites of the world
     prescribed        a mocap body: set data.mocap_pos and data.mocap_quat
-    mobile            a mocap body, likewise
+    mobile            a mocap body, set in the same fields
     quadrotor         a free body with a thrust motor along its z axis and three torque motors
 
 The motor of a cable takes its tension [N] as control, inside its limits; positive pulls. The platform has a free joint,
@@ -25,7 +25,7 @@ SMALLEST_INERTIA = 1e-14  # [kg m^2], just above what MuJoCo refuses
 
 
 def to_mjcf(robot: Robot) -> str:
-    """The MJCF text of `robot`, with bodies, sites, tendons and motors named after its parts.
+    """Return the MJCF text of `robot`, with bodies, sites, tendons and motors named after its parts.
 
     Names: body "platform", a body for each moving carrier with its name, sites "anchor1" and "attachment1", tendon and
     motor "cable1", and so on; motors "NAME thrust", "NAME torque x".
@@ -33,8 +33,8 @@ def to_mjcf(robot: Robot) -> str:
     Raises
     ------
     InputError
-        If the robot has what MuJoCo's tendons cannot express: pulleys, or a turned home of a platform that has not all
-        six coordinates.
+        If MuJoCo cannot express the robot: it has pulleys, an impossible inertia, a carrier named "platform", or a
+        rotated home of a platform with fewer than six coordinates.
     """
     _check(robot)
     root = ET.Element("mujoco", model=robot.name)
@@ -70,8 +70,8 @@ def _check(robot: Robot) -> None:
         moments = np.linalg.eigvalsh(inertia)
         if moments[2] > moments[0] + moments[1] + 1e-12 or moments[0] < SMALLEST_INERTIA:
             raise InputError(
-                f"{name}.inertia: principal moments {moments.round(12).tolist()} kg m^2; accepted by MuJoCo: "
-                f"none above the sum of the others, none below {SMALLEST_INERTIA:g}"
+                f"{name}.inertia must have principal moments of at least {SMALLEST_INERTIA:g} kg m^2, none above "
+                f"the sum of the others, for MuJoCo, got {moments.round(12).tolist()}"
             )
     if len(robot.platform.dof) < 6 and any(robot.home[3:]):
         raise InputError(f"platform.home must be level unless all six coordinates move, got {robot.home.tolist()}")
@@ -137,7 +137,7 @@ def _add_inertia(body: ET.Element, com: Iterable[float], mass: float, inertia: I
 
 
 def _euler(pose: Iterable[float]) -> str:
-    """Angles in the order in which they turn: yaw, pitch, roll."""
+    """Return angles in the order in which they turn the body: yaw, pitch, roll."""
     return _text(list(pose)[:2:-1])
 
 

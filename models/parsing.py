@@ -45,22 +45,20 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
     try:
         text = read_bytes(path, "a YAML file").decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not text (byte {error.start} is not UTF-8); it must be a YAML file") from None
+        raise InputError(f"{path} must be a YAML file in UTF-8, got another text (byte {error.start})") from None
     return parse_yaml(text, model, where=str(path))
 
 
 def read_bytes(path: Path, what: str) -> bytes:
-    """The content of `path`, which ought to be `what`. Raises `InputError` if it cannot be read or is too large."""
+    """Return the content of `path`; raise InputError that it must be `what` if it cannot be read or is too large."""
     try:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():
-            raise InputError(f"{path}: is a device or a pipe; accepted: {what}")
+            raise InputError(f"{path} must be {what}, got a device or a pipe")
         with path.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
             size = max(len(content), path.stat().st_size)
-            raise InputError(
-                f"{path}: the file has {size / 1e6:.1f} MB; accepted: {what} of at most {LARGEST_FILE / 1e6:g} MB"
-            )
+            raise InputError(f"{path} must be {what} of at most {LARGEST_FILE / 1e6:g} MB, got {size / 1e6:.1f} MB")
         return content
     except InputError:
         raise
@@ -70,7 +68,7 @@ def read_bytes(path: Path, what: str) -> bytes:
 
 
 def parse_yaml(text: str, model: type[Model], where: str) -> Model:
-    """Check YAML text as a `model`; `where` names it in errors. Raises `InputError` in one line."""
+    """Check YAML text as a `model`, or raise InputError in one line; `where` names the text in it."""
     reader = YAML(typ="safe", pure=True)
     reader.Composer = _PlainComposer
     try:
@@ -85,7 +83,7 @@ def parse_yaml(text: str, model: type[Model], where: str) -> Model:
 
 
 def validate(data: dict[str, Any], model: type[Model], where: str) -> Model:
-    """Check a mapping as a `model`; `where` names it in errors. Raises `InputError` in one line."""
+    """Check a mapping as a `model`, or raise InputError in one line; `where` names the mapping in it."""
     try:
         return model.__pydantic_validator__.validate_python(data)
     except ValidationError as error:

@@ -68,7 +68,7 @@ _NAMES = {getattr(ca, name): name.removeprefix("OP_") for name in dir(ca) if nam
 
 
 def dense(function: ca.Function) -> ca.Function:
-    """The same Function, of the same names, whose inputs and outputs have an element wherever they have a place."""
+    """Return the Function with dense inputs and outputs, under the same names."""
     sparsities = [function.sparsity_in(i) for i in range(function.n_in())]
     sparsities += [function.sparsity_out(i) for i in range(function.n_out())]
     if all(sparsity.is_dense() for sparsity in sparsities):
@@ -80,12 +80,12 @@ def dense(function: ca.Function) -> ca.Function:
 
 
 def translate(function: ca.Function) -> str:
-    """Python source of `kernel(start, stop, x0, x1, ..., y0, y1, ...)`: the rows start to stop of a batch.
+    """Return Python source of `kernel(start, stop, x0, x1, ..., y0, y1, ...)`, for rows start to stop of a batch.
 
     Parameters
     ----------
     function
-        With dense inputs and outputs, see `dense`. An MX Function is expanded first.
+        A Function with dense inputs and outputs, as from `dense`. An MX Function is expanded first.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def translate(function: ca.Function) -> str:
     tape = _scalar(function)
     if tape.n_instructions() > LONGEST:
         raise InputError(
-            f"{function.name()}: has {tape.n_instructions()} instructions, but a kernel has at most {LONGEST}"
+            f"{function.name()} must have at most {LONGEST} instructions for a kernel, got {tape.n_instructions()}"
         )
     work: dict[int, str] = {}  # what each slot of the work vector holds now
     variables: dict[str, str] = {}  # of each expression on the tape
@@ -121,7 +121,7 @@ def translate(function: ca.Function) -> str:
             expression = _OPERATIONS[operation].format(*(work[i] for i in inputs))
         else:
             raise InputError(
-                f"{function.name()}: has the operation {operation}; accepted in a kernel: {', '.join(_OPERATIONS)}"
+                f"{function.name()} must have only the operations {', '.join(_OPERATIONS)}, got {operation}"
             )
         work[outputs[0]] = variables.setdefault(expression, f"v{len(variables)}")
     arguments = [f"x{i}" for i in range(tape.n_in())] + [f"y{i}" for i in range(tape.n_out())]
@@ -138,7 +138,7 @@ def _scalar(function: ca.Function) -> ca.Function:
     try:
         return function.expand()
     except RuntimeError:
-        raise InputError(f"{function.name()}: cannot be expanded; accepted for a kernel: SX operations") from None
+        raise InputError(f"{function.name()} must have only SX operations, got one that cannot be expanded") from None
 
 
 def _literal(value: float) -> str:

@@ -200,5 +200,5 @@ def test_what_mujoco_would_refuse_is_refused_with_a_reason():
     data["carriers"][0]["name"] = data["cables"][0]["carrier"] = "anchor1"
     mujoco.MjModel.from_xml_string(to_mjcf(Robot.model_validate(data)))
     platform = robot.platform.model_copy(update={"inertia": (1.0, 1.0, 3.0, 0.0, 0.0, 0.0)})
-    with pytest.raises(InputError, match=r"platform\.inertia: .*none above the sum of the others"):
+    with pytest.raises(InputError, match=r"platform\.inertia must have .* none above the sum of the others"):
         to_mjcf(robot.model_copy(update={"platform": platform}))
