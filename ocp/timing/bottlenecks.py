@@ -1,4 +1,4 @@
-"""What keeps a time law from being faster, stretch by stretch: `bottlenecks`.
+"""Find what keeps a time law from being faster, stretch by stretch: `bottlenecks`.
 
 Along the fastest law some limit is always reached: a speed, a carrier's acceleration, or tensions, where the needed
 wrench lies on a facet of the available wrench set and the cables across that facet are at their limits.
@@ -42,48 +42,50 @@ class Bottleneck(NamedTuple):
     limit: str
 
     def describe(self) -> str:
-        """One line for a person."""
+        """Return one line for a person."""
         return f"s = {self.start:.3f} to {self.end:.3f}, {self.seconds:.3f} s: {self.limit}"
 
     def to_dict(self) -> dict[str, Any]:
-        """{"from", "to", "seconds" [s], "limit"} for JSON."""
+        """Return {"from", "to", "seconds" [s], "limit"} for JSON."""
         return {"from": self.start, "to": self.end, "seconds": self.seconds, "limit": self.limit}
 
 
 def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: float, path: TimedPath) -> list[Bottleneck]:
-    """The stretches of a time law along a parametrised, tensions `margin` [N] inside their limits."""
+    """Return the stretches of a time law along a path, with tensions `margin` [N] inside their limits."""
     edges = np.linspace(0.0, path.times[-1], LOOKS + 1)
     s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
     platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
-    paces = parametrised.paces(platform, carriers, limits)
-    names, values = [*paces.names], [*paces.values.T]
+    speeds = parametrised.relative_speeds(platform, carriers, limits)
+    names, values = [*speeds.names], [*speeds.values.T]
     for index, most in limits.carrier_acceleration.items():
         names.append(f"acceleration of {parametrised.robot.carriers[index].name}")
         values.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most)
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)
     w = parametrised.dynamics.required_wrench(*platform, wind=parametrised.wind)
     low, high = parametrised.robot.t_min + margin, parametrised.robot.t_max - margin
-    told = []
+    reached_limits = []
     for k in range(LOOKS):
         fastest = int(np.argmax([value[k] for value in values]))
         reached = values[fastest][k] >= REACHED
-        told.append(names[fastest] if reached else _tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high)))
-    at, found, first = path.law(edges)[0], [], 0
-    for limit, run in groupby(told):
+        reached_limits.append(
+            names[fastest] if reached else _tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high))
+        )
+    at, stretches, first = path.law(edges)[0], [], 0
+    for limit, run in groupby(reached_limits):
         after = first + len(list(run))
-        found.append(Bottleneck(float(at[first]), float(at[after]), float(edges[after] - edges[first]), limit))
+        stretches.append(Bottleneck(float(at[first]), float(at[after]), float(edges[after] - edges[first]), limit))
         first = after
-    return found
+    return stretches
 
 
 def _tensions(problem: TensionProblem) -> str:
-    """Which cables are at which limit on the facet nearest to the needed wrench."""
+    """Return which cables are at which limit on the facet nearest to the needed wrench."""
     pull = capacity_margin(problem).direction @ problem.A
     size = np.abs(pull).max(initial=0.0)
     at = {"t_min": np.flatnonzero(pull < -PULLS * size), "t_max": np.flatnonzero(pull > PULLS * size)}
-    said = [
+    cables_at_limits = [
         f"{name} in cable{'s' * (cables.size > 1)} {', '.join(str(cable + 1) for cable in cables)}"
         for name, cables in at.items()
         if cables.size
     ]
-    return "; ".join(said) or "tensions"
+    return "; ".join(cables_at_limits) or "tensions"

@@ -1,4 +1,4 @@
-"""A robot along given paths of platform and carriers that share one parameter s: what the motion needs and may do.
+"""Describe a robot along paths of platform and carriers that share one parameter s: its wrenches and its limits.
 
 The wrench of a motion s(t) along the path is
 
@@ -11,7 +11,6 @@ only through the wrench matrix, so their motion along s enters A(s) and, if the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -23,7 +22,6 @@ from ...errors import InputError
 from ...models import Dynamics, Robot
 from ...models.batch import call
 from ...models.robot import COORDINATES, MobileCarrier
-from ..tasks.carrier_paths import by_index
 from ..tasks.path import CirclePath, Curve, Motion, RestPath
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
@@ -35,7 +33,7 @@ LOOKS = 2001  # points at which the geometry is checked
 
 @dataclass(frozen=True)
 class PathLimits:
-    """What beside the tensions is limited; infinite: not."""
+    """The limits beside those of the tensions; infinity stands for no limit."""
 
     speed: float  # of the platform [m/s]
     cable_speed: np.ndarray  # (m,) [m/s]
@@ -43,8 +41,8 @@ class PathLimits:
     carrier_acceleration: dict[int, float]  # [m/s^2]
 
 
-class Paces(NamedTuple):
-    """How fast the parts of a motion go beside their limits of speed: names, and (n, k) in parts of each limit."""
+class RelativeSpeeds(NamedTuple):
+    """The speeds of the parts of a motion: names, and values (n, k) in parts of their limits."""
 
     names: list[str]
     values: np.ndarray
@@ -59,7 +57,7 @@ class Wrench(NamedTuple):
 
 
 class ParametrisedPath:
-    """A robot, the path of its platform, and those of its carriers, by one s from 0 to 1.
+    """A robot, the path of its platform and those of its carriers, parametrised by one s from 0 to 1.
 
     Parameters
     ----------
@@ -68,49 +66,48 @@ class ParametrisedPath:
     path
         Of the platform, in {G} or in the frame of the only carrier.
     carriers
-        Paths in {G} by name; the others stay at home.
+        Paths in {G} by the index of the carrier; the others stay at home.
     until
-        When circles end by their own time [s]; None: after one turn.
+        When circles end by their own time [s]; default: after one turn.
     wind
-        None: no air; zeros: still air.
+        Zeros for still air; default: no air.
 
     Raises
     ------
     InputError
-        If they do not fit one another.
+        If robot and paths do not fit one another.
     """
 
     def __init__(
         self,
         robot: Robot,
         path: Curve,
-        carriers: Mapping[str, Curve],
+        carriers: dict[int, Curve],
         until: float | None = None,
         wind: np.ndarray | None = None,
     ):
-        self.robot, self.path, self.wind, self._until = robot, path, wind, until
+        self.robot, self.path, self.carriers, self.wind, self._until = robot, path, carriers, wind, until
         self.dynamics = Dynamics(robot)
         self.relative = self._frame()
-        self.carriers = by_index(robot, carriers, "time_along: carriers")
         for carrier in robot.carriers:
             if carrier.kind == "quadrotor":
                 raise InputError(
-                    f"time_along: robot {robot.name!r} hangs from {carrier.name!r} of kind quadrotor, whose thrust no "
-                    "given path tells; accepted: carriers of kind ground, prescribed, mobile"
+                    "robot must have carriers of kind ground, prescribed or mobile to time a path, got "
+                    f"{robot.name!r} with {carrier.name!r} of kind quadrotor, whose thrust a path does not determine"
                 )
         self._check_geometry()
 
     @property
     def moving(self) -> list[int]:
-        """Indices of the carriers that move along s."""
+        """Return the indices of the carriers that move along s."""
         return [index for index, path in self.carriers.items() if not isinstance(path, RestPath)]
 
     def until(self, path: Curve) -> float | None:
-        """When `path` ends by its own time, if that is not for itself to say [s]."""
+        """Return when a circle ends by its own time [s]; None for other paths, whose end is their own."""
         return self._until if isinstance(path, CirclePath) else None
 
     def at(self, s: np.ndarray) -> tuple[Motion, Motion]:
-        """Platform (n, 6) and carriers (n, c, 6) in {G} and their derivatives by s."""
+        """Return the poses of platform (n, 6) and carriers (n, c, 6) in {G} and their derivatives by s."""
         platform = self.path.by_fraction(s, self.until(self.path))
         each = []
         for index, home in enumerate(self.robot.carrier_home):
@@ -124,7 +121,7 @@ class ParametrisedPath:
         return platform, Motion(*(np.stack(parts, axis=1) for parts in zip(*each, strict=True)))
 
     def wrench(self, platform: Motion) -> Wrench:
-        """What the motion needs, from derivatives by s."""
+        """Return the wrench that the motion needs, from derivatives by s."""
         pose, first, second = platform
         still = np.zeros_like(pose)
 
@@ -135,27 +132,27 @@ class ParametrisedPath:
         return Wrench(needed(still, first) - c, needed(first, second) - c, c)
 
     def speed_limit(self, platform: Motion, carriers: Motion, limits: PathLimits) -> np.ndarray:
-        """The largest ds/dt that the limits of speed leave, (n,) [1/s]."""
+        """Return the largest ds/dt that the limits of speed allow, (n,) [1/s]."""
         with np.errstate(divide="ignore"):
-            return 1.0 / self.paces(platform, carriers, limits).values.max(axis=1)
+            return 1.0 / self.relative_speeds(platform, carriers, limits).values.max(axis=1)
 
-    def paces(self, platform: Motion, carriers: Motion, limits: PathLimits) -> Paces:
-        """The speeds of a motion, by s or by time, beside their limits."""
-        found = {"platform speed": np.linalg.norm(platform.velocity[:, :3], axis=1) / limits.speed}
+    def relative_speeds(self, platform: Motion, carriers: Motion, limits: PathLimits) -> RelativeSpeeds:
+        """Return the speeds of a motion, by s or by time, in parts of their limits."""
+        speeds = {"platform speed": np.linalg.norm(platform.velocity[:, :3], axis=1) / limits.speed}
         if np.isfinite(limits.cable_speed).any():
-            of_cables = np.abs(self.cable_pace(platform, carriers)) / limits.cable_speed
-            found |= {f"speed of cable {i + 1}": pace for i, pace in enumerate(of_cables.T)}
-        for index, speed in limits.carrier_speed.items():
-            pace = np.linalg.norm(carriers.velocity[:, index, :3], axis=1) / speed
-            found[f"speed of {self.robot.carriers[index].name}"] = pace
-        return Paces(list(found), np.stack(list(found.values()), axis=1))
+            of_cables = np.abs(self.length_rates(platform, carriers)) / limits.cable_speed
+            speeds |= {f"speed of cable {i + 1}": values for i, values in enumerate(of_cables.T)}
+        for index, limit in limits.carrier_speed.items():
+            speed = np.linalg.norm(carriers.velocity[:, index, :3], axis=1)
+            speeds[f"speed of {self.robot.carriers[index].name}"] = speed / limit
+        return RelativeSpeeds(list(speeds), np.stack(list(speeds.values()), axis=1))
 
     def carrier_rows(self, carriers: Motion, limits: PathLimits) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Limits of the carriers' accelerations as a u + b x + c <= 0, (n, SIDES) each, in parts of the limit.
+        """Return the limits of the carriers' accelerations as a u + b x + c <= 0, (n, SIDES) each, relative.
 
         |P' u + P'' x| lies in the plane of P' and P''; a polygon inside the circle there stands for it.
         """
-        found = []
+        rows = []
         angle = np.arange(SIDES) * 2 * np.pi / SIDES
         around = np.stack([np.cos(angle), np.sin(angle)])  # (2, SIDES)
         for index, most in limits.carrier_acceleration.items():
@@ -164,19 +161,19 @@ class ParametrisedPath:
             pair = np.stack([carriers.velocity[:, index, :3], carriers.acceleration[:, index, :3]], axis=2)
             R = np.asarray(np.linalg.qr(pair, mode="r"))  # (n, 2, 2)
             a, b = (R[:, :, k] @ around / most for k in (0, 1))
-            found.append((a, b, np.full_like(a, -np.cos(np.pi / SIDES))))
-        return found
+            rows.append((a, b, np.full_like(a, -np.cos(np.pi / SIDES))))
+        return rows
 
-    def cable_pace(self, platform: Motion, carriers: Motion) -> np.ndarray:
-        """Derivative of the cable lengths by s, (n, m) [m]; with derivatives by time, their speed [m/s]."""
+    def length_rates(self, platform: Motion, carriers: Motion) -> np.ndarray:
+        """Return the derivatives of the cable lengths by s, (n, m) [m], or for derivatives by time by time [m/s]."""
         arguments = {
             "pose": platform.pose,
             "carrier_pose": carriers.pose,
             "velocity": platform.velocity,
             "carrier_velocity": carriers.velocity,
         }
-        pace = call(self._length_rate, arguments)["rate"]
-        return pace.reshape(len(platform.pose), self.robot.m)
+        rates = call(self._length_rate, arguments)["rate"]
+        return rates.reshape(len(platform.pose), self.robot.m)
 
     @cached_property
     def _length_rate(self) -> ca.Function:
@@ -190,48 +187,50 @@ class ParametrisedPath:
     def _frame(self) -> bool:
         only = self.robot.carriers[0].name if len(self.robot.carriers) == 1 else None
         if self.path.frame not in ("world", only):
-            accepted = "world" if only is None else f"world, {only}"
-            raise InputError(f"time_along: path.frame: {self.path.frame!r} is unknown; accepted: {accepted}")
+            accepted = "world" if only is None else f"world or {only}"
+            raise InputError(f"path.frame must be {accepted}, got {self.path.frame!r}")
         return self.path.frame != "world"
 
     def _check_geometry(self) -> None:
         robot, s = self.robot, np.linspace(0, 1, LOOKS)
         platform, carriers = self.at(s)
-        self._check_pace(s, platform, carriers)
+        self._check_that_it_moves(s, platform, carriers)
         lengths = self.dynamics.cable_lengths(platform.pose, carriers.pose)
-        _refuse(s, ~(lengths > 1e-9).all(axis=1), "anchor and attachment of a cable coincide", "paths that keep apart")
+        must = "path must give every cable a length"
+        _refuse(s, ~(lengths > 1e-9).all(axis=1), must, "coincident anchor and attachment")
         off = np.abs(platform.pose - robot.home) > SAME
         for i in np.flatnonzero(robot.dof_mask == 0):
-            _refuse(s, off[:, i], f"{COORDINATES[i]} leaves home, but the platform cannot move so", "paths at home")
+            must = f"path must keep {COORDINATES[i]} at its home value, since platform.dof is without it"
+            _refuse(s, off[:, i], must, "another value")
         if robot.fixed_lengths is not None:
             longer = np.abs(lengths - robot.fixed_lengths).max(axis=1) > LENGTH_TOLERANCE
-            _refuse(s, longer, "a cable leaves the length that the drive keeps", "paths that keep it")
+            _refuse(s, longer, "path must keep the cable lengths that the drive fixes", "another length")
         for index, carrier in enumerate(robot.carriers):
             if not isinstance(carrier, MobileCarrier):
                 continue
-            pose = carriers.pose[:, index]
+            pose, name = carriers.pose[:, index], carrier.name
             low, high = np.array(carrier.reach.min), np.array(carrier.reach.max)
             outside = np.maximum(low - pose[:, :3], pose[:, :3] - high).max(axis=1) > SAME
-            _refuse(s, outside, f"carrier {carrier.name!r} leaves its reach box", "paths inside")
+            _refuse(s, outside, f"base must keep carrier {name!r} inside its reach box", "a position outside")
             turned = np.abs(pose[:, 3:] - carrier.home[3:]).max(axis=1) > SAME
-            _refuse(s, turned, f"carrier {carrier.name!r} turns, but a mobile one keeps its attitude", "its attitude")
+            _refuse(s, turned, f"base must keep mobile carrier {name!r} in its home attitude", "another attitude")
             moved = np.abs(pose[:, :3] - pose[0, :3]).max(axis=1) > SAME
             if robot.drive == "variable-length":
-                _refuse(
-                    s, moved, f"carrier {carrier.name!r} moves, but the drive is variable-length", "carriers at rest"
-                )
+                must = f"base must keep carrier {name!r} at rest, since the robot's drive is variable-length"
+                _refuse(s, moved, must, "a motion")
 
-    def _check_pace(self, s: np.ndarray, platform: Motion, carriers: Motion) -> None:
-        """Where nothing moves with s, no time law can make it move."""
+    def _check_that_it_moves(self, s: np.ndarray, platform: Motion, carriers: Motion) -> None:
+        """Refuse a path along which platform and carriers rest somewhere: no time law could make them move there."""
         in_metres = 1.0 / self.robot.wrench_scale
-        pace = np.sqrt(
+        speed = np.sqrt(
             np.square(platform.velocity * in_metres).sum(axis=1)
             + np.square(carriers.velocity * in_metres).sum(axis=(1, 2))
         )
-        still = pace <= max(STILL * pace.max(), SAME)
-        _refuse(s, still, "nothing moves there", "paths that rest nowhere, as uniform lines, circles and waypoints")
+        still = speed <= max(STILL * speed.max(), SAME)
+        _refuse(s, still, "path must move platform or carriers everywhere, as lines, circles and waypoints do", "rest")
 
 
-def _refuse(s: np.ndarray, bad: np.ndarray, what: str, accepted: str) -> None:
+def _refuse(s: np.ndarray, bad: np.ndarray, must: str, got: str) -> None:
+    """Raise InputError of what must be and what is at the first `bad` s, if there is one."""
     if bad.any():
-        raise InputError(f"time_along: path: at s = {s[np.argmax(bad)]:.4g} {what}; accepted: {accepted}")
+        raise InputError(f"{must}, got {got} at s = {s[np.argmax(bad)]:.4g}")

@@ -1,4 +1,4 @@
-"""Limits of a motion along a path as half-planes in its phase plane, and the proof where they leave nothing.
+"""Describe the limits of a motion along a path as half-planes in its phase plane, and prove where they exclude all.
 
 With u = d2s/dt2 and x = (ds/dt)^2 the needed wrench is a u + b x + c (`parametrised_path`), so each facet of the
 available wrench set (`solvers.available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
@@ -22,16 +22,16 @@ FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables li
 
 @dataclass(frozen=True)
 class PhasePlane:
-    """All that a motion along the parametrised has to keep, at N places of it.
+    """The limits of a motion along a path, at N places of it.
 
     Wrenches are those of the coordinates that can move, moments over `Robot.length`, all in newtons.
 
     Attributes
     ----------
     wrench, available
-        What the motion needs, (N, n) each, and the facets of what the cables can give.
+        The wrench that the motion needs, (N, n) each, and the facets of the available wrench set.
     x_max
-        What the limits of speed leave, (N,) [1/s^2].
+        The largest x that the limits of speed allow, (N,) [1/s^2].
     carrier_rows
         Limits of the carriers' accelerations, a u + b x + c <= 0 with (N, k) each.
     """
@@ -42,9 +42,10 @@ class PhasePlane:
     carrier_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
     def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """All limits but x_max as a u + b x + c <= 0, (N, K) each: tensions in parts of the weight, others of theirs.
+        """Return all limits but x_max as a u + b x + c <= 0, (N, K) each, without units.
 
-        The last row is 1 <= 0 where even rest needs a wrench beside the span of the cables.
+        Rows of tensions are in parts of the weight, the others in parts of their limits. The last row is 1 <= 0 where
+        even rest needs a wrench outside the span of the cables.
         """
         a, b, c = self.tension_rows(weight)
         beside = np.einsum("nij,nj->ni", self.available.outside, self.wrench.c - self.available.offset)
@@ -55,11 +56,11 @@ class PhasePlane:
         return a, b, c
 
     def rests_at_ends(self, weight: float) -> bool:
-        """Whether the platform can rest at the first and the last place."""
+        """Return whether the platform can rest at the first and the last place."""
         return bool((self.rows(weight)[2][[0, -1]] <= 0).all())
 
     def tension_rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The facets' half-planes alone: first those of `available.high`, then those of `available.low`."""
+        """Return the facets' half-planes alone: first those of `available.high`, then those of `available.low`."""
         normals, low, high = self.available.normals, self.available.low, self.available.high
         a, b, c = ((normals @ part[:, :, None])[..., 0] / weight for part in self.wrench)
         return np.hstack([a, -a]), np.hstack([b, -b]), np.hstack([c - high / weight, low / weight - c])
@@ -67,14 +68,14 @@ class PhasePlane:
 
 @dataclass(frozen=True)
 class Proof:
-    """That at one place no allowed speed and acceleration along the path has tensions inside their limits.
+    """A proof that at one place of the path no allowed speed and acceleration has tensions inside their limits.
 
     Attributes
     ----------
     s
-        Where.
+        The place.
     problem
-        That of the speed and acceleration which come nearest.
+        The tension problem of the speed and acceleration that come nearest.
     certificate
         Of the problem. Along its direction every other allowed speed and acceleration misses at least as much.
     """
@@ -87,7 +88,7 @@ class Proof:
 def phase_plane(
     parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, shrink: float = 0.0
 ) -> PhasePlane:
-    """The limits at the places s, (N,), tensions `margin` [N] inside theirs, the others lowered by a share `shrink`.
+    """Return the limits at the places s (N,): tensions less `margin` [N], the others reduced by the share `shrink`.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def phase_plane(
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     wrench = Wrench(*(part[:, rows] * scale for part in parametrised.wrench(platform)))
     middle = (robot.t_min + robot.t_max) / 2
-    # The distance that the audit asks for must not turn a cable's only tension into none.
+    # The distance that the audit requires must not turn a cable's only tension into none.
     available = facets(A, np.minimum(robot.t_min + margin, middle), np.maximum(robot.t_max - margin, middle))
     _check_span(s, wrench, available)
     x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
@@ -110,7 +111,7 @@ def phase_plane(
 
 
 def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:
-    """Proofs for the places among s, (N,), at which nothing is allowed.
+    """Return proofs for the places among s, (N,), at which no speed and acceleration is allowed.
 
     At the first and the last that is rest, which lasts, so that the platform does not accelerate there either.
     """
@@ -120,11 +121,11 @@ def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, ma
     platform, carriers = parametrised.at(s)
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)
     whole = parametrised.wrench(platform)
-    at_rest = plane.rows(weight)[2][:, -1] > 0  # beside the span of the cables whatever the speed
+    at_rest = plane.rows(weight)[2][:, -1] > 0  # outside the span of the cables whatever the speed
     at_rest[[0, -1]] = True
     rows = plane.tension_rows(weight)
     in_rows = robot.dof_mask * robot.wrench_scale
-    found = []
+    proven = []
     for k in np.flatnonzero(at_rest | (rows[2] > 0).any(axis=1)):  # at the others the platform can rest
         if at_rest[k]:
             problem = wrench_problem(parametrised.robot, A[k], whole.c[k], low, high)
@@ -138,14 +139,14 @@ def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, ma
             direction[robot.dof_mask > 0] = weights @ np.concatenate([normals, -normals])
             certificate = certificate_along(problem, direction * in_rows)
         if certificate is not None:
-            found.append(Proof(float(s[k]), problem, certificate))
-    return found
+            proven.append(Proof(float(s[k]), problem, certificate))
+    return proven
 
 
 def _nearest(a: np.ndarray, b: np.ndarray, c: np.ndarray, x_max: float) -> tuple[tuple[float, float], np.ndarray]:
-    """The u and x in [0, x_max] that break a u + b x + c <= 0 least, and the multipliers of the rows, (K,).
+    """Return the u and x in [0, x_max] that violate a u + b x + c <= 0 least, and the multipliers of the rows, (K,).
 
-    The multipliers add up to one. Weighed by them the rows become one that no allowed u and x breaks less (duality).
+    The multipliers add up to one. Weighted by them the rows become one that no allowed u and x violates less (duality).
     """
     from scipy.optimize import linprog
 
@@ -160,7 +161,7 @@ def _nearest(a: np.ndarray, b: np.ndarray, c: np.ndarray, x_max: float) -> tuple
 
 
 def _check_span(s: np.ndarray, wrench: Wrench, available: Facets) -> None:
-    """Refuse paths along which motion itself needs wrenches outside the span of the cables."""
+    """Refuse a path along which the motion itself needs wrenches outside the span of the cables."""
     if not available.outside.any():
         return
     for part in (wrench.a, wrench.b):
@@ -171,6 +172,6 @@ def _check_span(s: np.ndarray, wrench: Wrench, available: Facets) -> None:
             n = part.shape[1]
             rank = n - round(float(np.trace(available.outside[at])))
             raise InputError(
-                f"time_along: path: at s = {s[at]:.4g} the wrench matrix has rank {rank} of {n} and the motion needs "
-                "a wrench outside its span; accepted: paths along which it never does"
+                f"path must need only wrenches in the span of the cables, got one outside at s = {s[at]:.4g}, where "
+                f"the wrench matrix has rank {rank} of {n}"
             )

@@ -1,9 +1,10 @@
-"""`time_along`: the fastest time law along a given path that keeps every tension inside its limits.
+"""Find the fastest time law along a given path that keeps every tension inside its limits: `time_along`.
 
 Along a path only s(t) is left to choose. The available wrench set at each s (`solvers.available_wrench`) and the wrench
 that the motion needs (`parametrised_path`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds
 the fastest law inside all of them (`toppra_law`). It is called feasible only after an audit every millisecond with the
-exact tension solver; what it misses between the grid points a finer grid and a little distance from the limits correct.
+exact tension solver; violations between the grid points are removed by a finer grid and by a little distance from the
+limits.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from ...models.files import as_robot
 from ...models.parsing import to_yaml
 from ...models.robot import MobileCarrier
 from ...solvers import Certificate, TensionProblem, certify, solve_batch
+from ...text import quantity
 from ...writing import whole_file
 from ..status import MotionStatus
+from ..tasks.carrier_paths import by_index
 from ..tasks.path import AnyPath, CirclePath, Curve, LinePath, Motion, RestPath, SamplePath, TimedPath, WaypointPath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from ..tasks.task import FreeBase, GivenBase, HoldBase, Task, read_task
@@ -37,12 +40,12 @@ from .phase_plane import phase_plane, proofs
 
 KNOWN_LIMITS = ("platform_speed", "cable_speed", "carrier_speed", "carrier_acceleration")
 TOLERANCE = 1e-6  # [N], as the audit of plans has it
-LIMIT_TOLERANCE = 1e-6  # relative, of the other limits, likewise
+LIMIT_TOLERANCE = 1e-6  # relative, of the other limits, as the audit of plans has it
 ATTEMPTS = 8
 MOST_INTERVALS = 6400
-FINER_TRIES = 2  # after a grid on which no law was found
+FINER_TRIES = 2  # after a grid on which the search ended without a law
 RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
-COARSE = 1e-4  # of the weight or of a limit: what misses more needs a finer grid, what misses less some distance
+COARSE = 1e-4  # of the weight or of a limit: a larger violation needs a finer grid, a smaller one some distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +56,12 @@ class Timing:
     ----------
     status
         See `MotionStatus`. Infeasible: at `at` no tensions inside their limits give the wrench that the path needs,
-        whatever the speed and acceleration; at the ends, for the platform to rest there. Not found: every place of the
+        whatever the speed and acceleration; at the ends, for the platform to rest there. Not-found: every place of the
         grid allows some speed, but no law joins them, or none that passes the audit.
     parametrised
         The robot and the geometry that was timed.
     limits
-        What beside the tensions was limited.
+        The limits beside those of the tensions.
     margin
         How far every tension stays inside its limits [N].
     s
@@ -68,7 +71,7 @@ class Timing:
     sdd
         d2s/dt2, constant on each interval of the grid, (n - 1,) [1/s^2]; nan if not feasible.
     violation
-        The largest missing wrench that the audit saw [N], moments over `Robot.length`; nan without a law.
+        The largest missing wrench in the audit [N], moments over `Robot.length`; nan without a law.
     at
         If not feasible: s of the certificate, or where the search ended.
     certificate
@@ -95,17 +98,17 @@ class Timing:
 
     @property
     def feasible(self) -> bool:
-        """Whether there is a law and its audit saw no violation."""
+        """Return whether there is a law whose audit reports no violation."""
         return self.status is MotionStatus.FEASIBLE
 
     @property
     def duration(self) -> float | None:
-        """How long the motion takes [s]; None if there is none."""
+        """Return how long the motion takes [s]; None if there is none."""
         return self.path.natural_duration if self.feasible else None
 
     @property
     def path(self) -> TimedPath:
-        """The platform's path with its time law, for a task.
+        """Return the platform's path with its time law, for a task.
 
         Raises
         ------
@@ -115,7 +118,7 @@ class Timing:
         return self.timed(self.parametrised.path)
 
     def task(self, name: str = "timed") -> Task:
-        """A task with this `name` that fixes this motion of platform and carriers: `plan` audits it.
+        """Return a task with this `name` that fixes this motion of platform and carriers, for `plan` to audit.
 
         Raises
         ------
@@ -134,7 +137,7 @@ class Timing:
         return Task(name=name, path=self.path, base=base, margin=self.margin, wind=wind)
 
     def motion(self, times: np.ndarray) -> tuple[Motion, Motion]:
-        """Platform, (n, 6) each, and carriers, (n, c, 6) each, in {G} at `times` [s] (n,).
+        """Return the motion of platform, (n, 6) each, and carriers, (n, c, 6) each, in {G} at `times` [s] (n,).
 
         Raises
         ------
@@ -147,14 +150,14 @@ class Timing:
 
     @cached_property
     def bottlenecks(self) -> list[Bottleneck]:
-        """The stretches of the path on which one limit is what keeps the motion from being faster, in order.
+        """Return the stretches of the path on each of which one limit keeps the motion from being faster, in order.
 
-        Empty without a law.
+        The list is empty without a law.
         """
         return bottlenecks(self.parametrised, self.limits, self.margin, self.path) if self.feasible else []
 
     def summary(self) -> dict[str, Any]:
-        """What `towline time --json` prints, ready for JSON; what does not exist is None."""
+        """Return what `towline time --json` prints, ready for JSON; what does not exist is None."""
         return {
             "feasible": self.feasible,
             "status": self.status.value,
@@ -181,19 +184,22 @@ class Timing:
         return path
 
     def report(self) -> str:
-        """What a person wants to know first, as text."""
+        """Return status, duration and bottlenecks, or the certificate, as text."""
         head = f"{self.parametrised.robot.name}: timing {self.status.value.upper()}"
         if self.feasible:
-            lines = [head, f"  {self.duration:.6g} s, audit: worst violation {self.violation:.3g} N"]
+            lines = [
+                head,
+                f"  {quantity(self.duration, 's', 6)}, audit: worst violation {quantity(self.violation, 'N', 3)}",
+            ]
             lines += ["  What is at its limit, and for how long"]
             return "\n".join(lines + [f"    {each.describe()}" for each in self.bottlenecks])
-        told = [head, f"  at s = {self.at:.4g}"]
+        lines = [head, f"  at s = {self.at:.4g}"]
         if self.certificate is not None:
-            told += [f"  {line}" for line in self.certificate.describe().splitlines()]
-        return "\n".join(told)
+            lines += [f"  {line}" for line in self.certificate.describe().splitlines()]
+        return "\n".join(lines)
 
     def timed(self, path: Curve) -> TimedPath:
-        """A path of the parametrised, the platform's or a carrier's, with the time law.
+        """Return a path of the platform or of a carrier with the time law.
 
         Raises
         ------
@@ -201,7 +207,7 @@ class Timing:
             If there is no law.
         """
         if np.isnan(self.sd).any():
-            raise InputError(f"timing: is {self.status.value} and has no motion; accepted: a feasible one")
+            raise InputError(f"timing must be feasible to have a motion, got status {self.status.value!r}")
         law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
         return TimedPath(kind="timed", frame=path.frame, along=path, until=self.parametrised.until(path), **law)
 
@@ -214,7 +220,7 @@ def time_along(
 ) -> Timing:
     """Find the fastest motion along a task's path, from rest to lasting rest, with every tension inside its limits.
 
-    Only the geometry of the path counts: lines and waypoints are taken as uniform, so that they rest nowhere; samples
+    Only the geometry of the path matters: lines and waypoints are taken as uniform, so that they rest nowhere; samples
     are waypoints unless carriers move with them. Circles end after the task's duration by their own rate, or after one
     turn; any other duration is ignored. Carriers rest or follow given paths, walked with the same s as the platform's.
 
@@ -247,10 +253,10 @@ def time_along(
         If toppra is not installed; the message contains the command that installs it.
     """
     robot, task = as_robot(robot), read_task(task)
-    grid = whole_number("time_along: grid", grid, 10, MOST_INTERVALS)
+    grid = whole_number("grid", grid, 10, MOST_INTERVALS)
     _check(robot, task)
-    paths = {} if isinstance(task.base, FreeBase) else _carrier_paths(task.base)
-    moving = {name: _curve(its, alone=False) for name, its in paths.items()}
+    paths = _carrier_paths(robot, task)
+    moving = {index: _curve(its, alone=False) for index, its in paths.items()}
     until = task.duration if isinstance(task.path, CirclePath) and isinstance(task.duration, float) else None
     still_air = None if task.wind is None else np.zeros(3)
     parametrised = ParametrisedPath(robot, _curve(task.path, alone=not moving), moving, until, still_air)
@@ -273,7 +279,7 @@ def _check(robot: Robot, task: Task) -> None:
     for name in type(task.limits).model_fields:
         if name not in (*KNOWN_LIMITS, "soft") and getattr(task.limits, name):
             raise InputError(
-                f"{where}: limits.{name} cannot be kept by a time law; accepted: {', '.join(KNOWN_LIMITS)}"
+                f"{where}: limits.{name} must be left out to time a path; a time law keeps {', '.join(KNOWN_LIMITS)}"
             )
     if task.limits.soft:
         raise InputError(f"{where}: limits.soft must be left out to time a path, whose limits are all hard")
@@ -284,20 +290,24 @@ def _check(robot: Robot, task: Task) -> None:
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:
             raise InputError(
-                f"{where}: margin must be at most {(high - low) / 2:g} N, half of what the limits of cable {index + 1} "
-                f"are apart, {low:g} N and {high:g} N, got {task.margin:g} N"
+                f"{where}: margin must be at most {(high - low) / 2:g} N, half the range of cable {index + 1} "
+                f"({low:g} N to {high:g} N), got {task.margin:g} N"
             )
 
 
-def _carrier_paths(base: HoldBase | GivenBase) -> dict[str, AnyPath]:
-    """Return the paths of the carriers by name; the others stay at home."""
+def _carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
+    """Return the paths of the carriers by index; the others stay at home."""
+    base, where = task.base, f"task {task.name!r}"
+    if isinstance(base, FreeBase):
+        return {}
     if isinstance(base, GivenBase):
-        return base.paths
-    return {name: RestPath(kind="rest", pose=pose) for name, pose in base.poses.items()}
+        return by_index(robot, base.paths, f"{where}: base.paths")
+    poses: dict[str, AnyPath] = {name: RestPath(kind="rest", pose=pose) for name, pose in base.poses.items()}
+    return by_index(robot, poses, f"{where}: base.poses")
 
 
 def _curve(path: AnyPath, *, alone: bool) -> Curve:
-    """The geometry of a path: it rests nowhere, unless the path itself does."""
+    """Return the geometry of a path, which rests nowhere unless the path itself does."""
     if isinstance(path, TimedPath):
         return path.along
     if isinstance(path, LinePath | WaypointPath):
@@ -321,11 +331,12 @@ def _limits(parametrised: ParametrisedPath, limits: TaskLimits) -> PathLimits:
 
 
 def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, intervals: int) -> Timing:
-    """Solve, audit, and where the audit objects do so again on a finer grid or with more distance from the limits."""
+    """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
     fastest, Rows = _toppra()
     weight = parametrised.robot.force_scale
     reserve, shrink, failures = RESERVE * weight, 0.0, 0
-    found = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0)
+    grid = np.linspace(0, 1, intervals + 1)
+    timing = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, grid, at=0.0)
     for _ in range(ATTEMPTS):
         s = np.linspace(0, 1, intervals + 1)
         plane = phase_plane(parametrised, limits, s, margin + reserve, shrink)
@@ -333,49 +344,56 @@ def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, i
         if failures == 0 and (law.x is None or not plane.rests_at_ends(weight)):
             proven = proofs(parametrised, limits, s, margin)
             if proven:
-                worst = max(proven, key=lambda proof: proof.certificate.shortfall)
-                told = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
-                blocked = np.array([proof.s for proof in proven])
-                return _without_law(MotionStatus.INFEASIBLE, parametrised, limits, margin, s, blocked=blocked, **told)
+                worst = max(proven, key=lambda each: each.certificate.shortfall)
+                proof = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
+                blocked = np.array([each.s for each in proven])
+                return _without_law(MotionStatus.INFEASIBLE, parametrised, limits, margin, s, blocked=blocked, **proof)
         if law.unlimited:
             raise InputError(
-                "time_along: nothing limits the speed along this path; accepted: a path on which the platform's "
-                "motion takes tension, or limits of speed"
+                f"limits must bound the speed along this path, by one of {', '.join(KNOWN_LIMITS)}, since its tensions "
+                "do not, got none that does"
             )
         if law.x is None:
-            found = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, s, at=float(s[law.stuck or 0]))
+            timing = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, s, at=float(s[law.stuck or 0]))
             failures += 1
             if failures > FINER_TRIES:
-                return found
+                return timing
             intervals = min(2 * intervals, MOST_INTERVALS)
             continue
         sd, sdd = np.sqrt(law.x), np.diff(law.x) / (2 * np.diff(s))
-        found = Timing(MotionStatus.FEASIBLE, parametrised, limits, margin, s, sd, sdd)
-        missing, excess, at = _audit(found, limits)
+        timing = Timing(MotionStatus.FEASIBLE, parametrised, limits, margin, s, sd, sdd)
+        missing, excess, at = _audit(timing, limits)
         if missing <= TOLERANCE and excess <= LIMIT_TOLERANCE:
-            return replace(found, violation=missing)
-        found = replace(found, status=MotionStatus.NOT_FOUND, violation=missing, at=at)
+            return replace(timing, violation=missing)
+        timing = replace(timing, status=MotionStatus.NOT_FOUND, violation=missing, at=at)
         if missing > COARSE * weight or excess > COARSE:
             intervals = min(2 * intervals, MOST_INTERVALS)
         reserve += 2 * missing if missing > TOLERANCE else 0.0
         shrink += 2 * excess if excess > LIMIT_TOLERANCE else 0.0
-    return found
+    return timing
 
 
 def _without_law(
-    status: MotionStatus, parametrised: ParametrisedPath, limits: PathLimits, margin: float, s: np.ndarray, **told: Any
+    status: MotionStatus,
+    parametrised: ParametrisedPath,
+    limits: PathLimits,
+    margin: float,
+    s: np.ndarray,
+    **details: Any,
 ) -> Timing:
-    return Timing(status, parametrised, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **told)
+    return Timing(
+        status, parametrised, limits, margin, s, np.full(len(s), np.nan), np.full(len(s) - 1, np.nan), **details
+    )
 
 
 def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
-    """The largest missing wrench [N], the largest relative excess of another limit, and s of the worse of the two."""
+    """Return the largest missing wrench [N], the largest relative excess of another limit, and s of the worse one."""
     parametrised, robot, path = timing.parametrised, timing.parametrised.robot, timing.path
     duration = float(path.times[-1])
     if duration * AUDIT_RATE > MOST_SAMPLES:
         raise InputError(
-            f"time_along: the motion takes {duration:g} s; accepted: limits that allow {MOST_SAMPLES / AUDIT_RATE:g} "
-            f"s, since the audit looks {AUDIT_RATE:g} times a second"
+            f"limits must allow a motion of at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the audit evaluates "
+            f"{AUDIT_RATE:g} instants per second, got one of {duration:g} s"
         )
     times = np.linspace(0, duration, max(int(np.ceil(duration * AUDIT_RATE)), LEAST_INTERVALS) + 1)
     s, sd, sdd = path.law(times)
@@ -391,10 +409,10 @@ def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
         proof = certify(wrench_problem(parametrised.robot, A[k], w[k], low, high))
         # Neither available nor proven not to be: so near to the boundary that rounding decides.
         missing[k] = 0.0 if proof is None else proof.shortfall
-    paces = [np.abs(sd) / parametrised.speed_limit(*by_s, limits) - 1.0]
+    excesses = [np.abs(sd) / parametrised.speed_limit(*by_s, limits) - 1.0]
     for index, most in limits.carrier_acceleration.items():
-        paces.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most - 1.0)
-    excess = np.max(paces, axis=0)
+        excesses.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most - 1.0)
+    excess = np.max(excesses, axis=0)
     worst = int(missing.argmax() if missing.max() > TOLERANCE else excess.argmax())
     return float(missing.max()), float(excess.max()), float(s[worst])
 

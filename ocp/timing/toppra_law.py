@@ -1,4 +1,4 @@
-"""The fastest time law under half-spaces in (d2s/dt2, (ds/dt)^2), by toppra. This file alone imports that package.
+"""Find the fastest time law under half-planes in (d2s/dt2, (ds/dt)^2), by toppra. Only this file imports toppra.
 
 With u = d2s/dt2 and x = (ds/dt)^2, which changes by 2 u ds, the fastest law is a sequence of linear programs in two
 variables: backwards, which x can still come to rest at the end; forwards, the largest u. Between two grid points u is
@@ -22,8 +22,8 @@ from typing_extensions import override
 
 STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
-ROUNDING = 1e-12  # of a row along u: less is none
-FARTHEST = 1e9  # u and x in toppra's units; a limit beyond is none
+ROUNDING = 1e-12  # of a row along u: less is zero
+FARTHEST = 1e9  # u and x in toppra's units; a limit beyond does not count
 
 
 class Rows(NamedTuple):
@@ -36,15 +36,15 @@ class Rows(NamedTuple):
 
 
 class Law(NamedTuple):
-    """What came of it: x at the grid points, or the index of the last one from which the end cannot be reached."""
+    """The fastest law: x at the grid points, or the index of the last one from which the end cannot be reached."""
 
     x: np.ndarray | None
     stuck: int | None
     unlimited: bool = False
 
 
-class _Limits(LinearConstraint):
-    """Rows and bounds as they are, in toppra's canonical form."""
+class _HalfPlanes(LinearConstraint):
+    """Half-planes a u + b x + c <= 0 and bounds of x, as a constraint of toppra."""
 
     def __init__(self, rows: Rows):
         super().__init__()
@@ -60,7 +60,7 @@ class _Limits(LinearConstraint):
 
 
 class _Interval(AbstractGeometricPath):
-    """From 0 to an end: the rows know the geometry, toppra asks for no more."""
+    """The interval from 0 to an end, as a path of toppra, which needs no more: the rows contain the geometry."""
 
     def __init__(self, end: float):
         self._end = end
@@ -81,7 +81,7 @@ class _Interval(AbstractGeometricPath):
 
 
 def fastest(s: np.ndarray, rows: Rows) -> Law:
-    """The largest x at every s, (N,) rising from 0, from rest to rest."""
+    """Return the largest x at every s, (N,) rising from 0, of a motion from rest to rest."""
     # Measured in this unit of length, u and x are numbers that toppra's absolute tolerances suit.
     steepest = float(np.abs(rows.a).max(initial=0.0))
     unit = steepest / STEEPNESS if steepest > ROUNDING else 1.0
@@ -90,9 +90,9 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
         return Law(None, int(np.argmax(never)))
     grid = s * unit
     with _silence():
-        algorithm = TOPPRA([_Limits(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
-        found: Any = algorithm.compute_parameterization(0.0, 0.0, return_data=True)  # of three or four, its hints say
-    _, speeds, _, reach = found
+        algorithm = TOPPRA([_HalfPlanes(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
+        result: Any = algorithm.compute_parameterization(0.0, 0.0, return_data=True)  # hints: three or four values
+    _, speeds, _, reach = result
     if speeds is None:
         lost = np.flatnonzero(np.isnan(reach).any(axis=1))
         return Law(None, int(lost[-1]) if lost.size else 0)
@@ -103,7 +103,7 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
 
 
 def _normalised(rows: Rows) -> tuple[Any, Rows]:
-    """Where a limit cannot hold, (N,), and rows of length one: toppra takes two short ones for parallel."""
+    """Return where a limit cannot hold, (N,), and rows of length one: toppra takes two short ones for parallel."""
     size = np.hypot(rows.a, rows.b)
     idle = size * FARTHEST <= np.abs(rows.c)
     per_size = 1.0 / np.where(idle, 1.0, size)
@@ -114,7 +114,7 @@ def _normalised(rows: Rows) -> tuple[Any, Rows]:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Keep toppra from warning of what is an answer here."""
+    """Keep toppra from logging warnings about laws that do not exist, which is a normal result here."""
     logger = logging.getLogger("toppra")
     before = logger.level
     logger.setLevel(logging.CRITICAL)
