@@ -90,7 +90,9 @@ def solve_problem(
     P, q, G, _, A, b, lb, ub = problem.unpack_as_dense()
     weights = np.diagonal(P)
     if G is not None or A is None or b is None or (np.diag(weights) != P).any() or not (weights > 0).all():
-        raise InputError("problem: accepted: a diagonal P with positive entries, equations A x = b, limits, no G")
+        raise InputError(
+            "problem must have a positive diagonal P, equations A x = b and no G, got another form"
+        )
     lower = np.full(q.size, -np.inf) if lb is None else lb
     upper = np.full(q.size, np.inf) if ub is None else ub
     solution = qpsolvers.Solution(problem)
@@ -180,7 +182,7 @@ def as_qp(problem: TensionProblem) -> dict[str, Any]:
     limits = np.abs(np.concatenate([problem.t_min, problem.t_max]))
     unit = float(limits[np.isfinite(limits)].max(initial=0.0))
     if unit == 0.0:
-        raise InputError("problem: has no finite limit other than 0; accepted: limits that give a unit")
+        raise InputError("problem must have a finite limit other than 0, which gives the unit, got none")
     rows = np.flatnonzero(problem.scaled_A.any(axis=1) | (problem.scaled_w != 0.0))
     relative = problem.weights / problem.weights.min()  # a gradient error is then no more than such a tension error
     return {

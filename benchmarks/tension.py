@@ -116,11 +116,11 @@ def run(
     """
     for name, value, least in (("count", count, 1), ("repeats", repeats, 1)):
         if value < least:
-            raise InputError(f"{name}: is {value}; accepted: an integer from {least}")
+            raise InputError(f"{name} must be a whole number from {least}, got {value}")
     if not m or not all(1 <= cables <= 16 for cables in m):
-        raise InputError(f"m: is {list(m)}; accepted: numbers of cables from 1 to 16")
+        raise InputError(f"m must be numbers of cables from 1 to 16, got {list(m)}")
     if not limit > 0:
-        raise InputError(f"limit: is {limit:g}; accepted: a number > 0 [s]")
+        raise InputError(f"limit must be a number > 0 [s], got {limit:g}")
     names = [(kind, cables) for cables in m for kind in KINDS]
     rows: list[Row] = []
     for done, (kind, cables) in enumerate(names):

@@ -113,5 +113,5 @@ def _optimum(qp: dict[str, Any]) -> Array:
         (x - upper).max(),
     )
     if not wrong < 1e-10:
-        raise SolverError(f"benchmark: the reference is off by {wrong:.1e}; accepted: below 1e-10")
+        raise SolverError(f"the reference of the benchmark must be exact to 1e-10, got an error of {wrong:.1e}")
     return x

@@ -1,12 +1,11 @@
-"""Places a second, from pose to the answer, on one core; and CASPR's wrench closure of IPAnema 2.
+"""Measure places per second on one core, from pose to answer, and CASPR's wrench closure of IPAnema 2.
 
     python -m towline.benchmarks.workspace [--places 400000] [--runs 5] [--programs all]
 
 The first table has static equilibrium (the bounded problem itself) and the other conditions, of robots with six and
 eight cables, at random poses among their anchors, all of which differ. The second has wrench closure at the 14 823
 poses of CASPR's paper, which reports 89 s to 455 s in MATLAB for its methods, and counts by a linear program, pose by
-pose (HiGHS), if that is requested. Times are medians of several runs after one that is not counted, by the clock on the
-wall and by the time that the process had.
+pose (HiGHS), on request. Times are medians of several runs, after one that is not counted: wall time and process time.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--places", type=int, default=400_000)
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--programs", default="97", help="every how manieth pose a linear program checks, or all")
+    parser.add_argument("--programs", default="97", help="a linear program checks every N-th pose; or all")
     options = parser.parse_args()
     print(machine())
     report_throughput(options.places, options.runs)
@@ -48,7 +47,7 @@ def main() -> None:
 
 
 def report_throughput(count: int, runs: int) -> None:
-    """Places a second of some conditions."""
+    """Print the places per second of some conditions."""
     conditions: list[tuple[str, Condition, int]] = [
         ("static equilibrium", StaticEquilibrium(), count),
         ("wrench closure", WrenchClosure(), count),
@@ -72,7 +71,7 @@ def report_throughput(count: int, runs: int) -> None:
 
 
 def report_closure(runs: int, every: int) -> None:
-    """CASPR's 14 823 poses, and a linear program at every so manieth of them."""
+    """Print the result for CASPR's 14 823 poses, and that of a linear program at every `every`-th of them."""
     robot, poses = load("ipanema-2"), caspr_poses()
     places = Places.at_home(robot, poses)
     held, wall, own = timed(robot, WrenchClosure(), places, runs)
@@ -88,7 +87,7 @@ def report_closure(runs: int, every: int) -> None:
 
 
 def random_places(robot: Robot, count: int) -> Places:
-    """Poses uniform in the box of anchors and home, turned by up to 0.1 rad."""
+    """Return poses uniform in the box of anchors and home, turned by up to 0.1 rad."""
     rng = np.random.default_rng(1)
     corners = np.vstack([robot.home_anchors, robot.home[:3]])
     poses = robot.home + rng.uniform(-0.1, 0.1, (count, 6))
@@ -97,7 +96,7 @@ def random_places(robot: Robot, count: int) -> Places:
 
 
 def caspr_poses() -> np.ndarray:
-    """XYZ Euler 30, -30, 5 degrees; X -4 to 4 m and Y -3 to 3 m by 0.1 m, Z 2, 3, 4 m: (14823, 6)."""
+    """Return poses (14823, 6): XYZ Euler 30, -30, 5 degrees; X -4 to 4 m and Y -3 to 3 m by 0.1 m, Z 2, 3, 4 m."""
     axes = np.linspace(-4, 4, 81), np.linspace(-3, 3, 61), np.array([2.0, 3.0, 4.0])
     poses = np.zeros((81 * 61 * 3, 6))
     poses[:, :3] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -106,9 +105,9 @@ def caspr_poses() -> np.ndarray:
 
 
 def closed_by_program(A: np.ndarray) -> bool:
-    """Whether balanced tensions of sum 1 exist that are all positive, and A has full row rank."""
+    """Return whether balanced tensions of sum 1 exist that are all positive, and A has full row rank."""
     n, m = A.shape
-    found = linprog(
+    result = linprog(
         np.r_[np.zeros(m), -1.0],  # the least tension, as large as it can be
         A_ub=np.hstack([-np.eye(m), np.ones((m, 1))]),
         b_ub=np.zeros(m),
@@ -117,11 +116,11 @@ def closed_by_program(A: np.ndarray) -> bool:
         bounds=[(None, None)] * (m + 1),
         method="highs",
     )
-    return bool(found.status == 0 and -found.fun > 1e-9 and np.linalg.matrix_rank(A) == n)
+    return bool(result.status == 0 and -result.fun > 1e-9 and np.linalg.matrix_rank(A) == n)
 
 
 def timed(robot: Robot, condition: Condition, places: Places, runs: int) -> tuple[np.ndarray, float, float]:
-    """The answers, and medians of wall time and process time [s]."""
+    """Return the answers, and medians of wall time and process time [s]."""
     held, wall, own = condition.holds(robot, places), [], []
     for _ in range(runs):
         start, before = time.perf_counter(), time.process_time()

@@ -13,7 +13,7 @@ from ..errors import InputError
 
 
 def constant(times: np.ndarray, velocity: Sequence[float]) -> np.ndarray:
-    """The same wind at all times, (n, 3) [m/s]."""
+    """Return the same wind at all times, (n, 3) [m/s]."""
     return np.tile(_numbers("velocity", velocity, 3), (len(_numbers("times", times, None)), 1))
 
 
@@ -24,7 +24,7 @@ def trapezoid(
     noise: float = 0.5,
     seed: int = 0,
 ) -> np.ndarray:
-    """Paper F's gust, (n, 3) [m/s]: rising, steady, falling, with Gaussian noise cut at +- `noise`.
+    """Compute paper F's gust, (n, 3) [m/s]: rising, steady, falling, with Gaussian noise cut at +- `noise`.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ def trapezoid(
     peak
         The steady wind [m/s]: (5, 6, 2) in paper F, section VI.
     corners
-        Where in [0, 1] of the time the wind begins to rise, is steady, begins to fall, is gone: not given in the
-        paper, assumed.
+        Fractions of the time, in [0, 1], at which the wind begins to rise, is steady, begins to fall and is zero. They
+        are assumed: the paper does not give them.
     noise
         Half-width of the noise [m/s]; its standard deviation is a third of it, so that few samples are cut.
     """
@@ -57,9 +57,9 @@ def dryden(
     scale: Sequence[float] = (200.0, 200.0, 50.0),
     seed: int = 0,
 ) -> np.ndarray:
-    """Dryden turbulence about a mean wind, (n, 3) [m/s], for a body that rests in it.
+    """Compute Dryden turbulence about a mean wind, (n, 3) [m/s], for a body that rests in it.
 
-    White noise through the forming filters of MIL-F-8785C, sampled exactly, stationary from the first sample on:
+    White noise passes the forming filters of MIL-F-8785C, sampled exactly, stationary from the first sample on:
 
         along the mean wind  sigma sqrt(2 T) / (1 + T s),   across it  sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2
 
@@ -88,7 +88,7 @@ def dryden(
         raise InputError(f"mean must be a wind [m/s] with a horizontal part, got {tuple(mean)!r}")
     steps = np.diff(times)
     if len(steps) and not (steps.min() > 0 and np.ptp(steps) < 1e-6 * steps.mean()):
-        raise InputError("times: must rise in equal steps")
+        raise InputError("times must rise in equal steps, got unequal ones")
     rng = np.random.default_rng(seed)
     gusts = np.empty((len(times), 3))
     for axis in range(3):
@@ -101,7 +101,7 @@ def dryden(
 
 
 def _along(step: float, noise: np.ndarray) -> np.ndarray:
-    """Unit white noise through sqrt(2) / (1 + s), sampled every `step`, of variance one: an exact recursion."""
+    """Filter unit white noise by sqrt(2) / (1 + s), sampled every `step`, to variance one, by an exact recursion."""
     keep, kick = float(np.exp(-step)), np.sqrt(-np.expm1(-2 * step))
     values = np.empty(len(noise) - 1)
     x = float(noise[0, 0])
@@ -112,10 +112,10 @@ def _along(step: float, noise: np.ndarray) -> np.ndarray:
 
 
 def _across(step: float, noise: np.ndarray) -> np.ndarray:
-    """Unit white noise through (1 + sqrt(3) s) / (1 + s)^2, sampled every `step`, of variance one.
+    """Filter unit white noise by (1 + sqrt(3) s) / (1 + s)^2, sampled every `step`, to variance one.
 
     The state (x, dx) of dx' = -x - 2 dx + noise answers a unit impulse with e^-s (s, 1 - s). Its covariance after a
-    step is the integral of that with itself, by quadrature: as a difference of large numbers rounding would eat it.
+    step is the integral of that with itself, by quadrature: rounding would ruin a difference of large numbers.
     """
     h = min(step, 40.0)
     nodes, weights = np.polynomial.legendre.leggauss(40)
@@ -133,7 +133,7 @@ def _across(step: float, noise: np.ndarray) -> np.ndarray:
 
 
 def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int | None, least: float = -np.inf) -> np.ndarray:
-    """`count` finite numbers (None for any number), at least `least`."""
+    """Return `count` finite numbers (None for any number), each at least `least`, or raise InputError."""
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):

@@ -191,7 +191,7 @@ class _Buffers:
 
     def __init__(self, function: ca.Function, count: int, sizes_in: list[Any], sizes_out: list[Any]):
         self._name = function.name()
-        buffer: Any  # CasADi's type hints ask for a size beside a memoryview, CasADi itself refuses it
+        buffer: Any  # CasADi's type hints require a size beside a memoryview, CasADi itself refuses it
         buffer, self._evaluate = function.buffer()
         self._failed = buffer.ret
         # One row of a map after the other, each column by column.

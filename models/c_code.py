@@ -9,7 +9,7 @@ from .robot import Robot
 
 
 def to_c(robot: Robot) -> str:
-    """C text with `wrench_matrix`, `cable_lengths`, `required_wrench` and `acceleration` of `robot`.
+    """Return C text with `wrench_matrix`, `cable_lengths`, `required_wrench` and `acceleration` of `robot`.
 
     Each is `int NAME(const double** arg, double** res, ...)` in CasADi's calling convention, with `NAME_n_in`,
     `NAME_name_in`, `NAME_sparsity_in` and so on beside it; matrices are stored by columns. Units as in `Dynamics`.

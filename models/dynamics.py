@@ -24,7 +24,7 @@ from .robot import QuadrotorCarrier, Robot
 
 def dynamics_of(robot: Robot) -> Dynamics:
     """Return the `Dynamics` of a robot, kept for the next call."""
-    key: Any = robot  # frozen, so it has a hash, which a type checker does not see
+    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
     return _dynamics_of(key)
 
 

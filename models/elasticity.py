@@ -25,7 +25,7 @@ from .rotation import Matrix, rotation
 
 
 def tension_stiffness(robot: Robot, pose: Matrix, anchor_points: Matrix, axes: Matrix, tensions: Matrix) -> Matrix:
-    """K_t, (6, 6), in {G} about the CoM [N/m, N, N m]: what constant tensions make of a displacement."""
+    """Return K_t, the stiffness at constant tensions, (6, 6), in {G} about the CoM [N/m, N, N m]."""
     delta = ca.SX.sym("delta", 6)
     symbols = [
         ca.SX.sym("pose", 6),
@@ -36,7 +36,7 @@ def tension_stiffness(robot: Robot, pose: Matrix, anchor_points: Matrix, axes: M
     R = rotation(symbols[0][3:6])
     com = symbols[0][0:3] + R @ ca.DM(robot.platform.com)
     arms = R @ ca.DM((robot.attachments - np.array(robot.platform.com)).T)
-    turned = arms + ca.skew(delta[3:6]) @ arms  # to first order, which is all that a derivative at zero sees
+    turned = arms + ca.skew(delta[3:6]) @ arms  # to first order, which suffices for a derivative at zero
     moved = ca.repmat(com + delta[0:3], 1, robot.m) + turned
     directions = exit_points(symbols[1], symbols[2], robot.pulley_radii, moved).directions
     forces = directions * ca.repmat(symbols[3].T, 3, 1)
@@ -47,7 +47,7 @@ def tension_stiffness(robot: Robot, pose: Matrix, anchor_points: Matrix, axes: M
 
 
 def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) -> Matrix:
-    """Sum of k_i a_i a_i^T, (6, 6), in {G} about the CoM [N/m, N, N m], of the cables that pull."""
+    """Sum k_i a_i a_i^T, (6, 6), in {G} about the CoM [N/m, N, N m], over the cables that pull."""
     EA = ca.DM([cable.stiffness or np.inf for cable in robot.cables])
     k = axial_stiffness(EA, unstrained_length(lengths, tensions, EA))
     k = ca.if_else(tensions > 0, k, 0)  # a slack cable has no stiffness
@@ -55,7 +55,7 @@ def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) 
 
 
 def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
-    """blockdiag(m, I) about the CoM in {G}, (6, 6) [kg, kg m^2]."""
+    """Return blockdiag(m, I) about the CoM in {G}, (6, 6) [kg, kg m^2]."""
     R = rotation(ca.DM(pose)[3:6]).full()
     M = np.zeros((6, 6))
     M[:3, :3] = robot.platform.mass * np.eye(3)
@@ -64,7 +64,7 @@ def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
 
 
 def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Natural frequencies [Hz], ascending, and their modes (6, k) as twists, of motions in the span of `free` (6, k).
+    """Return natural frequencies [Hz], ascending, and modes (6, k) as twists, of motions in the span of `free` (6, k).
 
     An unstable motion has a negative frequency: minus the rate of growth over 2 pi.
     """

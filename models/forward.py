@@ -23,7 +23,7 @@ from .rotation import Matrix, inverse_rate_matrix, rate_matrix, rate_matrix_deri
 
 
 def mass_matrix(robot: Robot, pose: Matrix) -> Matrix:
-    """M(q), (6, 6): the wrench about the CoM in {G} that each coordinate's acceleration needs [kg, kg m, kg m^2]."""
+    """Return M(q), (6, 6): the wrench about the CoM in {G} for each coordinate's acceleration [kg, kg m, kg m^2]."""
     R = rotation(pose[3:6])
     offset = R @ ca.DM(robot.platform.com)
     turning = R @ rate_matrix(pose[3:6])  # alpha = turning ddTheta + ...
@@ -34,7 +34,7 @@ def mass_matrix(robot: Robot, pose: Matrix) -> Matrix:
 
 
 def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: Matrix) -> Matrix:
-    """ddq, (6, 1), of the platform under `wrench` (6, 1), the force and moment about the CoM in {G} beside gravity.
+    """Return ddq, (6, 1), of the platform under gravity and `wrench` (6, 1): force and moment about the CoM in {G}.
 
     Coordinates that are not in `platform.dof` do not accelerate.
     """
@@ -56,7 +56,7 @@ def quadrotor_acceleration(
     torque: Matrix,
     pull: Matrix,
 ) -> Matrix:
-    """ddq, (6, 1), of a quadrotor carrier.
+    """Return ddq, (6, 1), of a quadrotor carrier.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def quadrotor_acceleration(
 
 
 def pull_on_carrier(robot: Robot, index: int, run: Exit, carrier_pose: Matrix, tensions: Matrix) -> Matrix:
-    """What the cables of carrier `index` do to it, (6, 1): force in {G} [N], moment about its frame in its axes [N m].
+    """Return the pull of its cables on carrier `index`, (6, 1): force in {G} [N], moment in its own axes [N m].
 
     Parameters
     ----------

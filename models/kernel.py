@@ -47,17 +47,17 @@ def compile_kernel(source: str, n_in: int, n_out: int) -> Kernel:
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept: `$TOWLINE_CACHE`, else `towline` in the user's cache folder."""
+    """Return the folder of compiled kernels: `$TOWLINE_CACHE`, else `towline` in the user's cache folder."""
     if place := os.environ.get("TOWLINE_CACHE"):
         return Path(place)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "towline"
 
 
 def _compile(source: str, n_in: int, n_out: int, file: Path | None = None) -> Kernel:
-    """Compile, through Numba's cache beside `file` if one is given."""
+    """Compile the kernel, by Numba's cache beside `file` if one is given."""
     import numba
 
-    # Numba imports the module that a function says it is from when it loads it.
+    # When Numba loads a function it imports the module named in it.
     space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np}
     exec(compile(source, str(file or "<kernel>"), "exec"), space)
     given = numba.types.Array(numba.float64, 3, "A", readonly=True)
@@ -87,7 +87,7 @@ def _from_disk(source: str, n_in: int, n_out: int) -> Kernel | None:
 
 
 def _key(source: str) -> str:
-    """What decides on the machine code: the source, the compilers and the processor."""
+    """Return the hash of everything that decides on the machine code: source, compilers and processor."""
     import llvmlite.binding
     import numba
 

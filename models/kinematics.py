@@ -24,7 +24,7 @@ def transform(pose: Matrix, points: np.ndarray) -> Matrix:
 
 
 def anchors(points: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
-    """A_i in {G}, (3, m), in [m], of `points` (m, 3) in the frames of their carriers at `carrier_pose` (c, 6)."""
+    """Place anchors `points` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), in {G}: (3, m) [m]."""
     columns = []
     for point, carrier in zip(points, carrier_of_cable, strict=True):
         columns.append(transform(carrier_pose[int(carrier), :].T, point[None]))
@@ -32,7 +32,7 @@ def anchors(points: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matr
 
 
 def axes(directions: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
-    """Swivel axes in {G}, (3, m), of `directions` (m, 3) in the frames of their carriers at `carrier_pose` (c, 6)."""
+    """Turn axes `directions` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), into {G}: (3, m) [-]."""
     columns = []
     for direction, carrier in zip(directions, carrier_of_cable, strict=True):
         columns.append(rotation(carrier_pose[int(carrier), 3:6].T) @ ca.DM(direction))
@@ -42,12 +42,12 @@ def axes(directions: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Mat
 def cables(
     attachments: np.ndarray, pose: Matrix, anchor_points: Matrix, axis_directions: Matrix, radii: np.ndarray
 ) -> Exit:
-    """How the cables run, in the frame that `pose` (6, 1), anchors (3, m) and axes (3, m) are given in; see `Exit`."""
+    """Return the `Exit` of the cables, in the frame of `pose` (6, 1), anchors (3, m) and axes (3, m)."""
     return exit_points(anchor_points, axis_directions, radii, transform(pose, attachments))
 
 
 def wrench_matrix(attachments: np.ndarray, com: np.ndarray, pose: Matrix, directions: Matrix) -> Matrix:
-    """A, (6, m): force [N per N] and moment about the CoM [N m per N] of each cable, in the frame of `pose`."""
+    """Return A, (6, m): force [N per N] and moment about the CoM [N m per N] of each cable, in the frame of `pose`."""
     arms = rotation(pose[3:6]) @ ca.DM((attachments - com).T)  # (3, m)
     moments = [ca.cross(arms[:, i], directions[:, i]) for i in range(len(attachments))]
     return ca.vertcat(directions, ca.horzcat(*moments))

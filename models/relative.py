@@ -28,7 +28,7 @@ from .rotation import (
 
 
 def relative_inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, acceleration: Matrix) -> Matrix:
-    """M_B ddX_b + F_B, (6, 1), in {A}: what the relative motion alone needs, neither gravity nor carrier in it.
+    """Return M_B ddX_b + F_B, (6, 1), in {A}: the wrench for the relative motion, without gravity and carrier.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def base_disturbance(
     carrier_velocity: Matrix,
     carrier_acceleration: Matrix,
 ) -> Matrix:
-    """D_B = (D_F, D_M), (6, 1), in {A} [N, N m]: the coupled quadrotor-disturbance term, weight included.
+    """Return D_B = (D_F, D_M), (6, 1), in {A} [N, N m]: the coupled quadrotor-disturbance term, weight included.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def motion_in_world(
     carrier_velocity: Matrix,
     carrier_acceleration: Matrix,
 ) -> tuple[Matrix, Matrix, Matrix]:
-    """Pose, velocity and acceleration in {G}, (6, 1) each, of a frame that moves relative to {A} as given.
+    """Return pose, velocity and acceleration in {G}, (6, 1) each, of a frame that moves relative to {A} as given.
 
     The Euler angles come out in the ranges of `rotation.angles_of`; their rates do not exist at pitch = +-90 degrees.
     """

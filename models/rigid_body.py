@@ -16,14 +16,14 @@ from .rotation import Matrix, body_acceleration, body_rate, rotation
 
 
 def com_velocity(robot: Robot, pose: Matrix, velocity: Matrix) -> Matrix:
-    """Velocity of the CoM, (3, 1), in {G} [m/s]."""
+    """Return the velocity of the CoM, (3, 1), in {G} [m/s]."""
     R = rotation(pose[3:6])
     omega = R @ body_rate(pose[3:6], velocity[3:6])
     return velocity[0:3] + ca.cross(omega, R @ ca.DM(robot.platform.com))
 
 
 def inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, acceleration: Matrix) -> Matrix:
-    """w, (6, 1): force [N] and moment about the CoM [N m] in {G} that the motion needs beside gravity, without wind.
+    """Return w, (6, 1): force [N] and moment about the CoM [N m] in {G} against inertia and gravity.
 
     Parameters
     ----------

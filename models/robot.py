@@ -1,8 +1,8 @@
 """A robot as data: one platform, the carriers that hold its cables, and the cables. Only checks are computed.
 
-SI units throughout: metres, kilograms, seconds, newtons, radians. {G} is the global frame (gravity says which way is
-down), the platform frame sits on the platform, a carrier frame on each carrier. Poses are (x, y, z, roll, pitch, yaw)
-with R = Rz(yaw) Ry(pitch) Rx(roll).
+SI units throughout: metres, kilograms, seconds, newtons, radians. {G} is the global frame (down is where
+gravity points), the platform frame sits on the platform, a carrier frame on each carrier. Poses are (x, y, z, roll,
+pitch, yaw) with R = Rz(yaw) Ry(pitch) Rx(roll).
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ Matrix: TypeAlias = Any  # CasADi SX, MX or DM: what goes in comes out
 
 
 def rotation(angles: Matrix) -> Matrix:
-    """R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def rotation(angles: Matrix) -> Matrix:
 
 
 def rate_matrix(angles: Matrix) -> Matrix:
-    """P, (3, 3): body rate Omega = P dTheta. Singular at pitch = +-90 degrees."""
+    """Return P, (3, 3): body rate Omega = P dTheta. Singular at pitch = +-90 degrees."""
     roll, pitch, _ = ca.vertsplit(angles)
     sr, cr = ca.sin(roll), ca.cos(roll)
     sp, cp = ca.sin(pitch), ca.cos(pitch)
@@ -44,7 +44,7 @@ def rate_matrix(angles: Matrix) -> Matrix:
 
 
 def rate_matrix_derivative(angles: Matrix, rates: Matrix) -> Matrix:
-    """Time derivative of P, (3, 3), at the Euler rates dTheta in [rad/s]."""
+    """Return the time derivative of P, (3, 3), at the Euler rates dTheta in [rad/s]."""
     roll, pitch, _ = ca.vertsplit(angles)
     d_roll, d_pitch, _ = ca.vertsplit(rates)
     sr, cr = ca.sin(roll), ca.cos(roll)
@@ -57,17 +57,17 @@ def rate_matrix_derivative(angles: Matrix, rates: Matrix) -> Matrix:
 
 
 def body_rate(angles: Matrix, rates: Matrix) -> Matrix:
-    """Omega = P dTheta, (3, 1), in the turned frame [rad/s]."""
+    """Return Omega = P dTheta, (3, 1), in the turned frame [rad/s]."""
     return rate_matrix(angles) @ rates
 
 
 def body_acceleration(angles: Matrix, rates: Matrix, accelerations: Matrix) -> Matrix:
-    """Alpha = dP dTheta + P ddTheta, (3, 1), in the turned frame [rad/s^2]."""
+    """Return alpha = dP dTheta + P ddTheta, (3, 1), in the turned frame [rad/s^2]."""
     return rate_matrix_derivative(angles, rates) @ rates + rate_matrix(angles) @ accelerations
 
 
 def inverse_rate_matrix(angles: Matrix) -> Matrix:
-    """P^-1, (3, 3): dTheta = P^-1 Omega. Infinite at pitch = +-90 degrees."""
+    """Return P^-1, (3, 3): dTheta = P^-1 Omega. Infinite at pitch = +-90 degrees."""
     roll, pitch, _ = ca.vertsplit(angles)
     sr, cr = ca.sin(roll), ca.cos(roll)
     tp, cp = ca.tan(pitch), ca.cos(pitch)
@@ -75,7 +75,7 @@ def inverse_rate_matrix(angles: Matrix) -> Matrix:
 
 
 def angles_of(R: Matrix) -> Matrix:
-    """(roll, pitch, yaw) of R, (3, 1), in [rad]: pitch in [-90, 90] degrees, roll and yaw in (-180, 180]."""
+    """Return (roll, pitch, yaw) of R, (3, 1), in [rad]: pitch in [-90, 90] degrees, roll and yaw in (-180, 180]."""
     return ca.vertcat(
         ca.atan2(R[2, 1], R[2, 2]),
         ca.atan2(-R[2, 0], ca.sqrt(R[2, 1] ** 2 + R[2, 2] ** 2)),

@@ -59,7 +59,7 @@ class Equilibrium:
 
     @property
     def slack(self) -> np.ndarray:
-        """Indices of cables that do not pull."""
+        """Return the indices of cables that do not pull."""
         return np.flatnonzero(self.tensions < 1e-6 * max(self.tensions.max(initial=0.0), 1e-12))
 
 
@@ -70,7 +70,7 @@ def equilibria(
     starts: int = 24,
     seed: int = 0,
 ) -> list[Equilibrium]:
-    """Stable equilibrium poses for cables of `lengths` (m,) [m], lowest potential energy first.
+    """Return stable equilibrium poses for cables of `lengths` (m,) [m], lowest potential energy first.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def equilibria(
     carrier_pose
         (c, 6) in {G}; default: at home.
     starts
-        How many starting poses are tried: home, and random ones below and about it.
+        Number of starting poses to try: home, and random ones below and about it.
 
     Returns
     -------
@@ -94,10 +94,10 @@ def equilibria(
     robot = required("robot", robot, Robot)
     starts = whole_number("starts", starts, 1, 1_000_000)
     try:
-        wanted = np.asarray(lengths, dtype=float)
+        longest = np.asarray(lengths, dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}") from None
-    if wanted.shape != (robot.m,) or not (np.isfinite(wanted) & (wanted > 0)).all():
+    if longest.shape != (robot.m,) or not (np.isfinite(longest) & (longest > 0)).all():
         raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}")
     if robot.weight == 0:
         raise InputError(f"gravity must not be zero, got none for robot {robot.name!r}")
@@ -107,28 +107,28 @@ def equilibria(
         raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {np.shape(carriers)}")
     carriers = np.asarray(carriers, dtype=float)
     solver = _energy_program(robot, dynamics, carriers)
-    found: list[Equilibrium] = []
+    poses: list[Equilibrium] = []
     for start in _starts(robot, starts, seed):
-        candidate = _descend(robot, dynamics, solver, start, carriers, wanted)
-        if candidate is not None and not any(_same(robot, candidate, known) for known in found):
-            found.append(candidate)
-    return sorted(found, key=lambda equilibrium: equilibrium.energy)
+        candidate = _descend(robot, dynamics, solver, start, carriers, longest)
+        if candidate is not None and not any(_same(robot, candidate, known) for known in poses):
+            poses.append(candidate)
+    return sorted(poses, key=lambda equilibrium: equilibrium.energy)
 
 
 def _descend(
-    robot: Robot, dynamics: Dynamics, solver: ca.Function, start: np.ndarray, carriers: np.ndarray, wanted: np.ndarray
+    robot: Robot, dynamics: Dynamics, solver: ca.Function, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray
 ) -> Equilibrium | None:
-    """The rest pose that is found from `start`, or None; a saddle is left along its unstable motion."""
+    """Search for the rest pose from `start`, or return None; a saddle is left along its unstable motion."""
     rows = np.flatnonzero(robot.dof_mask)
     for _ in range(DESCENTS):
-        result = solver(x0=start[rows], lbg=-np.inf, ubg=wanted**2)
+        result = solver(x0=start[rows], lbg=-np.inf, ubg=longest**2)
         if not solver.stats()["success"]:
             return None
         pose = robot.home.copy()
         pose[rows] = result["x"].full().ravel()
         pose[3:] = np.arctan2(np.sin(pose[3:]), np.cos(pose[3:]))
         # The constraint is on l^2, whose gradient is 2 l times that of l.
-        tensions = np.maximum(result["lam_g"].full().ravel() * 2 * wanted, 0.0)
+        tensions = np.maximum(result["lam_g"].full().ravel() * 2 * longest, 0.0)
         candidate = _judge(robot, dynamics, pose, carriers, tensions)
         if candidate.residual > 1e-6 * robot.weight:
             return None
@@ -141,7 +141,7 @@ def _descend(
 
 
 def _unit(mode: np.ndarray, length: float) -> np.ndarray:
-    """A mode scaled so that it moves the platform by about its own size, at most by a radian."""
+    """Return a mode scaled so that it moves the platform by about its own size, at most by a radian."""
     return mode / max(np.linalg.norm(mode[:3]) / length, np.linalg.norm(mode[3:]))
 
 

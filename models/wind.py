@@ -17,7 +17,7 @@ from .rotation import Matrix
 
 
 def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matrix) -> Matrix:
-    """W_e, (6, 1): force [N] and moment about the CoM [N m] of the air on the platform, in {G}.
+    """Return W_e, (6, 1): force [N] and moment about the CoM [N m] of the air on the platform, in {G}.
 
     Parameters
     ----------

@@ -200,7 +200,7 @@ def test_who_hangs_or_breaks_is_out_and_the_others_go_on():
     [
         (["--count", "0"], "count: is 0"),
         (["--m", "8,x"], "--m must be numbers of cables from 1 to 16, separated by commas, got '8,x'"),
-        (["--m", "99"], "m: is [99]"),
+        (["--m", "99"], "m must be numbers of cables from 1 to 16, got [99]"),
     ],
 )
 def test_bench_refuses_in_one_line(arguments, told):

@@ -26,7 +26,7 @@ SINGULAR = 1e-9  # of the largest singular value of A: what is below counts as z
 
 @dataclass(frozen=True)
 class DrivingForce:
-    """What `driving_force` found, at N instants for m cables.
+    """The result of `driving_force`, at N instants for m cables.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class DrivingForce:
     lengths
         Distances from anchor to attachment without vibration [m], (N, m).
     T
-        Steady traction: what the motors give [N], (N, m). Nothing keeps it within limits or above zero.
+        Steady traction that the motors give [N], (N, m). It may be outside the limits or below zero.
     dT_C, dT_K
         Increments by damping and by elasticity [N], (N, m).
     residual
         Norm of A (T + dT) - w, moments over `Robot.length` [N], (N,): above rounding only where the cables cannot
-        give the wrench w in any way, because A is singular or there are fewer than six.
+        give the wrench w at all, because A is singular or there are fewer than six.
     rank
         Of A, (N,).
     """
@@ -55,17 +55,17 @@ class DrivingForce:
 
     @property
     def dT(self) -> np.ndarray:
-        """Increment by the vibration [N], (N, m)."""
+        """Return the increment by the vibration [N], (N, m)."""
         return self.dT_C + self.dT_K
 
     @property
     def total(self) -> np.ndarray:
-        """F = T + dT: what the platform feels [N], (N, m)."""
+        """Return F = T + dT, which acts on the platform [N], (N, m)."""
         return self.T + self.dT
 
     @property
     def ratio(self) -> np.ndarray:
-        """DT / T [-], (N, m): the paper's delta_SV. Large where T passes zero, nan or infinite where it is zero."""
+        """Return dT / T [-], (N, m), the paper's delta_SV; it is nan or infinite where T is zero."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return self.dT / self.T
 
@@ -86,11 +86,11 @@ def driving_force(
     pretension: Any = 0.0,
     winding: Literal["paid out", "printed"] = "paid out",
 ) -> DrivingForce:
-    """Steady traction and vibration increments of each cable at each instant, in one pass over arrays.
+    """Compute the steady traction and the vibration increments of each cable at each instant.
 
     With more than six cables T is the least-norm solution. Where A is singular, or the cables are fewer than the
     coordinates, T solves the equations in the least-squares sense (moments over `Robot.length`), least norm again, and
-    `residual` says what is missing; nothing is raised.
+    `residual` is the wrench that is missing; nothing is raised.
 
     Parameters
     ----------
@@ -110,8 +110,8 @@ def driving_force(
     wind
         Velocity of the air in {G} [m/s], (N, 3) or (3,); default: no air.
     pretension
-        What each cable carries when the slack switch looks at its elements [N], broadcast to (N, m). 0 is the paper's
-        rule, by which dT_K is never negative; `inf` keeps every cable taut.
+        Tension of each cable before the vibration, by which the slack switch decides [N], broadcast to (N, m). 0 is the
+        paper's rule, by which dT_K is never negative; `inf` keeps every cable taut.
     winding
         "paid out": the winch pays out what the steady motion takes, so that this adds nothing to dT_K. "printed": the
         paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every step (the
@@ -196,7 +196,7 @@ def _unwound(lengths: np.ndarray) -> np.ndarray:
 
 
 def _traction(robot: Robot, A: np.ndarray, w: np.ndarray, dT: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """T, (N, m), with |A (T + dT) - w|, (N,), and the rank of A, (N,), on the rows that can move."""
+    """Return T, (N, m), |A (T + dT) - w|, (N,), and the rank of A, (N,), on the rows that can move."""
     scale = robot.dof_mask * robot.wrench_scale
     A, w = A * scale[:, None], w * scale
     left = w - np.einsum("nij,nj->ni", A, dT)

@@ -16,7 +16,7 @@ Value = Any  # float, np.ndarray or a CasADi expression, in and out
 
 
 def tension(length: Value, rate: Value, unstrained: Value, stiffness: Value, damping: Value = 0.0) -> Value:
-    """T [N]: zero when slack, also where the damper outweighs the spring of a cable that is getting shorter.
+    """Return T [N]: zero when slack, also where the damper outweighs the spring of a shortening cable.
 
     Parameters
     ----------
@@ -34,10 +34,10 @@ def tension(length: Value, rate: Value, unstrained: Value, stiffness: Value, dam
 
 
 def unstrained_length(length: Value, tension: Value, stiffness: Value) -> Value:
-    """L0 [m] of the cable that, l = `length` [m] long and at rest, has T = `tension` [N]; E A = `stiffness` [N]."""
+    """Return L0 [m] of a cable at rest of l = `length` [m], T = `tension` [N] and E A = `stiffness` [N]."""
     return length / (1 + tension / stiffness)
 
 
 def axial_stiffness(stiffness: Value, unstrained: Value) -> Value:
-    """K = E A / L0 [N/m]: how much the tension of a taut cable grows with its length."""
+    """Return k = E A / L0 [N/m], by which the tension of a taut cable grows with its length."""
     return stiffness / unstrained

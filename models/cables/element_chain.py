@@ -76,30 +76,33 @@ class ElementChain:
 
     @property
     def length(self) -> float:
-        """L [m]."""
+        """Return the length l [m]."""
         return float(np.linalg.norm(self.attachment - self.anchor))
 
     @property
     def direction(self) -> np.ndarray:
-        """C, (3,): from the anchor to the attachment, opposite to u."""
+        """Return the unit vector c, (3,), from the anchor to the attachment, opposite to u."""
         return (self.attachment - self.anchor) / self.length
 
     def displacements(self, end: Any) -> np.ndarray:
-        """Displacement of each node [m], (n + 1, 3), in equilibrium, when node n is moved by `end` (3,) [m]."""
+        """Return the displacement of each node in equilibrium [m], (n + 1, 3), if node n moves by `end` (3,) [m]."""
         return np.arange(self.elements + 1)[:, None] / self.elements * checks.array("end", end, (3,))
 
     def elongations(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
-        """C . (dx_j - dx_{j-1}) + de of each element [m], (n,), for node displacements (n + 1, 3) [m]."""
+        """Return c . (dx_j - dx_{j-1}) + de of each element [m], (n,), for node displacements (n + 1, 3) [m]."""
         nodes = checks.array("displacements", displacements, (self.elements + 1, 3))
         return np.diff(nodes @ self.direction) + winding
 
     def taut(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
-        """sgn(j), (n,): 1.0 for the elements that pull, 0.0 for those that are slack."""
+        """Return sgn(j), (n,): 1.0 for the elements that pull, 0.0 for those that are slack."""
         carried = self.pretension + self._element_stiffness * self.elongations(displacements, winding)
         return (carried > 0).astype(float)
 
     def K_n(self, taut: Any = None) -> csr_array:
-        """Stiffness to node displacements [N/m], sparse, 3(n + 1) square, node by node; `taut` (n,): none slack."""
+        """Return the stiffness to node displacements [N/m], sparse, 3(n + 1) square, node by node.
+
+        `taut` (n,) is a result of the method `taut`; default: no element is slack.
+        """
         from scipy.sparse import csr_array, diags_array, kron
 
         switch = self._element_stiffness * self._switch(taut)
@@ -108,14 +111,14 @@ class ElementChain:
         return csr_array(kron(axial, np.outer(self.direction, self.direction)))
 
     def K_l(self, taut: Any = None) -> csr_array:
-        """Stiffness to the elements' own lengthening de [N/m], sparse, (3(n + 1), n); `taut` as in `K_n`."""
+        """Return the stiffness to the elements' own lengthening de [N/m], sparse, (3(n + 1), n); `taut` as in `K_n`."""
         from scipy.sparse import csr_array, diags_array, kron
 
         switch = self._element_stiffness * self._switch(taut)
         return csr_array(kron(self._steps().T @ diags_array(switch), self.direction[:, None]))
 
     def node_forces(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
-        """Increments of what has to hold each node [N], (n + 1, 3): K_n dX + K_l dE, slack elements carrying nothing.
+        """Return the increments of the forces that hold each node [N], (n + 1, 3): K_n dX + K_l dE.
 
         Parameters
         ----------
@@ -135,7 +138,7 @@ class ElementChain:
         return forces.reshape(-1, 3)
 
     def end_increment(self, end: Any, winding: float = 0.0) -> float:
-        """dT_K [N]: the increment at the attachment when it is moved by `end` (3,) [m]; positive pulls more."""
+        """Return dT_K [N], the increment at the attachment if it moves by `end` (3,) [m]; positive pulls more."""
         return float(self.node_forces(self.displacements(end), winding)[-1] @ self.direction)
 
     @property
@@ -146,7 +149,7 @@ class ElementChain:
         return np.ones(self.elements) if taut is None else checks.array("taut", taut, (self.elements,))
 
     def _steps(self) -> csr_array:
-        """(n, n + 1): from values at the nodes to their differences over the elements."""
+        """Return the matrix (n, n + 1) from values at the nodes to their differences over the elements."""
         from scipy.sparse import csr_array, eye_array
 
         n = self.elements
@@ -161,7 +164,7 @@ def elastic_increment(
     winding: np.ndarray | float = 0.0,
     pretension: np.ndarray | float = 0.0,
 ) -> np.ndarray:
-    """dT_K of many cables [N], (...): `ElementChain.end_increment` without the matrices.
+    """Return dT_K of many cables [N], (...): `ElementChain.end_increment` without the matrices.
 
     The attachment is node n, which the last element alone holds, and that one shares the elongation equally.
 
@@ -190,7 +193,7 @@ def elastic_increment(
 def damping_increment(
     vectors: np.ndarray, damping: np.ndarray, displacements: np.ndarray, time_step: float
 ) -> np.ndarray:
-    """dT_C = C (l(B + dB) - l(B)) / dt of many cables [N], (...).
+    """Return dT_C = C (l(B + dB) - l(B)) / dt of many cables [N], (...).
 
     Parameters
     ----------
@@ -211,7 +214,7 @@ def damping_increment(
 
 
 def attachment_displacements(arms: np.ndarray, vibration: np.ndarray) -> np.ndarray:
-    """DB = dx_B + [dTheta]x R b [m], (..., m, 3), for a small change of pose.
+    """Return dB = dx_B + [dTheta]x R b [m], (..., m, 3), for a small change of pose.
 
     Parameters
     ----------

@@ -69,26 +69,26 @@ class LumpedChain:
 
     @property
     def segment_length(self) -> float:
-        """E, unstrained [m]."""
+        """Return the unstrained length e of a segment [m]."""
         return self.length / self.segments
 
     @property
     def node_mass(self) -> float:
-        """Mass of an inner node [kg]."""
+        """Return the mass of an inner node [kg]."""
         return self.density * self.segment_length
 
     @property
     def end_mass(self) -> float:
-        """Mass at each end that belongs to what holds it [kg]."""
+        """Return the mass at each end, which moves with the body that holds the end [kg]."""
         return self.node_mass / 2
 
     @property
     def state_size(self) -> int:
-        """Length of the state: 6 (n - 1)."""
+        """Return the length of the state, 6 (n - 1)."""
         return 6 * (self.segments - 1)
 
     def straight(self, start: Any, end: Any) -> np.ndarray:
-        """State at rest with the nodes evenly on the line between the ends [m, m/s], (6 (n - 1),)."""
+        """Return the state at rest with the nodes evenly on the line between the ends [m, m/s], (6 (n - 1),)."""
         start, end = checks.array("start", start, (3,)), checks.array("end", end, (3,))
         share = np.arange(1, self.segments)[:, None] / self.segments
         positions = start + share * (end - start)
@@ -96,7 +96,7 @@ class LumpedChain:
 
     @cached_property
     def dynamics(self) -> ca.Function:
-        """The equation of motion as a CasADi Function.
+        """Return the equation of motion as a CasADi Function.
 
         Inputs: `state` (6 (n - 1),); `start`, `start_velocity`, `end`, `end_velocity` (3,) each, in {G} [m, m/s].
         Outputs: `dstate`, its time derivative; `start_force`, `end_force` (3,): what the cable pulls at its ends
@@ -118,7 +118,7 @@ class LumpedChain:
 
     @cached_property
     def energy(self) -> ca.Function:
-        """Kinetic, elastic and potential energy [J] as a CasADi Function, inputs as those of `dynamics`.
+        """Return kinetic, elastic and potential energy [J] as a CasADi Function with the inputs of `dynamics`.
 
         Outputs: `kinetic`, `elastic`, `potential` (zero at the origin of {G}), `total`, and `dissipation` [W], what the
         dampers take, never negative. A damper that has slackened its segment by outweighing its spring takes all that
@@ -145,7 +145,7 @@ class LumpedChain:
         return {"state": ca.SX.sym("state", self.state_size)} | {name: ca.SX.sym(name, 3) for name in ends}
 
     def _segments(self, inputs: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Positions and velocities of all nodes, (3, n + 1), tensions, (n, 1), and u_j, (3, n)."""
+        """Return positions and velocities of all nodes, (3, n + 1), tensions, (n, 1), and u_j, (3, n)."""
         half = self.state_size // 2
         inner = ca.reshape(inputs["state"][:half], 3, -1)
         inner_velocity = ca.reshape(inputs["state"][half:], 3, -1)
@@ -161,7 +161,7 @@ class LumpedChain:
         return positions, velocities, tensions, directions
 
     def _stretch(self, positions: ca.SX, velocities: ca.SX, directions: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Elongation l_j - e [m] and dl_j/dt [m/s] of each segment, (n, 1) each."""
+        """Return the elongation l_j - e [m] and dl_j/dt [m/s] of each segment, (n, 1) each."""
         along = ca.sum1(directions * (positions[:, 1:] - positions[:, :-1])).T
         rates = ca.sum1(directions * (velocities[:, 1:] - velocities[:, :-1])).T
         return along - self.segment_length, rates

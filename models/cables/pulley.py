@@ -16,8 +16,9 @@ From A to B the cable is l long, and dl/dB = t = -u: what the wrap gains or lose
 r = 0 it is a point anchor.
 
 Domain: B off the swivel axis and outside the sheave, D > r. Turned about the axis, the sheave sweeps a torus that
-touches the axis at A; inside it no cable is tangent, and everything is nan. On the axis the sheave does not know where
-to turn: point and direction are nan there, and close to it, below A, they jump when B passes to the other side.
+touches the axis at A; inside it no cable is tangent, and everything is nan. On the axis the sheave has no
+direction to turn to: point and direction are nan there, and close to it, below A, they jump when B passes to the other
+side.
 
 Source: the usual model of a swivel pulley, as in A. Pott, Cable-Driven Parallel Robots, Springer, 2018, derived anew;
 the second order by algorithmic differentiation.
@@ -47,7 +48,7 @@ class Exit(NamedTuple):
     lengths
         L, from the anchor over the sheave to the attachment [m], (m, 1).
     wraps
-        Theta, the angle of the sheave that it touches [rad], (m, 1), from 0 to 2 pi; of a point anchor, nothing: 0.
+        Theta, the angle of the sheave that it touches [rad], (m, 1), from 0 to 2 pi; 0 for a point anchor.
     """
 
     points: Matrix
@@ -57,7 +58,7 @@ class Exit(NamedTuple):
 
 
 def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -> Exit:
-    """Where m cables leave their pulleys, by CasADi SX, MX or DM in any frame that all arguments share.
+    """Compute where m cables leave their pulleys, for CasADi SX, MX or DM in any frame that all arguments share.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -
     axis
         K, in the sense in which the cable comes up, of unit length, (3, m).
     radius
-        R of each sheave [m], numbers, (m,); zero: a point anchor, whose axis is not looked at.
+        R of each sheave [m], numbers, (m,); zero: a point anchor, whose axis has no effect.
     attachment
         B [m], (3, m).
 
@@ -109,7 +110,7 @@ def _over_sheave(anchor: Matrix, axis: Matrix, radius: float, attachment: Matrix
 
 
 def pulley_motion(anchor: Any, axis: Any, radius: float) -> ca.Function:
-    """Length and direction of a cable over a pulley that rests, with their first and second time derivatives.
+    """Return length and direction of a cable over a pulley at rest, with their first and second time derivatives.
 
     Parameters
     ----------
@@ -143,14 +144,14 @@ def pulley_motion(anchor: Any, axis: Any, radius: float) -> ca.Function:
         for value in (quantity, *time_derivatives(quantity, *motion))
     ]
     names = ["attachment", "velocity", "acceleration"]
-    told = ["length", "d_length", "dd_length", "direction", "d_direction", "dd_direction"]
-    return ca.Function("pulley_motion", motion, outputs, names, told)
+    results = ["length", "d_length", "dd_length", "direction", "d_direction", "dd_direction"]
+    return ca.Function("pulley_motion", motion, outputs, names, results)
 
 
 def time_derivatives(
     value: Matrix, coordinates: Matrix, velocity: Matrix, acceleration: Matrix
 ) -> tuple[Matrix, Matrix]:
-    """First and second time derivative of an SX or MX column `value` of `coordinates` that move as given."""
+    """Return first and second time derivative of an SX or MX column `value` of `coordinates` that move as given."""
     first = ca.jtimes(value, coordinates, velocity)
     second = ca.jtimes(first, coordinates, velocity) + ca.jtimes(value, coordinates, acceleration)
     return first, second

@@ -46,7 +46,7 @@ class SaggingCable:
     H, V_m
         Horizontal tension and, amid the cable, vertical component of the tension towards the end [N], (...).
     start_force, end_force
-        What the cable pulls at what holds its ends [N], (..., 3). Their sum is its weight.
+        Forces of the cable on the bodies that hold its ends [N], (..., 3). Their sum is its weight.
     start_tension, end_tension
         Their norms [N], (...).
     iterations
@@ -80,7 +80,7 @@ class SaggingCable:
         return np.hypot(self.H, self._V(1.0))
 
     def points(self, fractions: Any) -> np.ndarray:
-        """Points of the cable [m], (..., k, 3), at these fractions (k,) of its unstrained length from the start."""
+        """Return the points at fractions (k,) of the unstrained length from the start [m], (..., k, 3)."""
         share = checks.array("fractions", fractions, (None,))
         if share.ndim != 1 or not ((share >= 0) & (share <= 1)).all():
             raise InputError(f"fractions must be a list of numbers from 0 to 1, got {fractions!r}")
@@ -91,11 +91,11 @@ class SaggingCable:
         return self.start[..., None, :] + x[..., None] * self.across[..., None, :] + z[..., None] * self.up
 
     def tension(self, fractions: Any) -> np.ndarray:
-        """Tension of the cable [N], (..., k), at these fractions (k,) of its unstrained length from the start."""
+        """Return the tension at fractions (k,) of the unstrained length from the start [N], (..., k)."""
         return np.hypot(self.H[..., None], self._V(checks.array("fractions", fractions, (None,))))
 
     def _V(self, share: Any) -> np.ndarray:
-        """Vertical component of the tension at fractions of the length, (...) or, for k of them, (..., k)."""
+        """Return the vertical component of the tension at one fraction of the length, (...), or at k, (..., k)."""
         step = np.asarray(share) - 0.5
         V_m, length = (self.V_m, self.length) if step.ndim == 0 else (self.V_m[..., None], self.length[..., None])
         return V_m + self.weight * length * step
@@ -110,7 +110,7 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     Parameters
     ----------
     start, end
-        Where the ends are held [m], (..., 3); for a robot's cable, its anchor and its attachment.
+        Positions of the ends [m], (..., 3); for a robot's cable, its anchor and its attachment.
     length
         Unstrained length L0 [m], (...).
     stiffness
@@ -146,9 +146,7 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
         raise InputError(f"length must have numbers > 0, got {length.min():g}")
     span = np.broadcast_to(end, (*batch, 3)) - start
     if np.isinf(stiffness) and not (np.linalg.norm(span, axis=-1) < length).all():
-        raise InputError(
-            "length must be above the distance of the ends if the stiffness is infinite, got a shorter one"
-        )
+        raise InputError("length must exceed the distance of the ends if the stiffness is infinite, got a shorter one")
 
     z = span @ upward
     level = span - z[..., None] * upward
@@ -163,7 +161,7 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
 
 
 def _reach(h: np.ndarray, v: np.ndarray, share: np.ndarray | float, softness: np.ndarray | float) -> tuple[Any, Any]:
-    """Span (x, z) of a piece that is `share` of a cable long and carries (h, v) in its middle, without dimensions."""
+    """Return the dimensionless span (x, z) of a piece, `share` of a cable, with the force (h, v) in its middle."""
     half = np.asarray(share) / 2
     T_1, T_2 = np.hypot(h, v - half), np.hypot(h, v + half)
     total = np.maximum(T_1 + T_2, np.finfo(float).tiny)
@@ -171,7 +169,7 @@ def _reach(h: np.ndarray, v: np.ndarray, share: np.ndarray | float, softness: np
 
 
 def _artanh(h: np.ndarray, v: np.ndarray, half: np.ndarray, T_1: np.ndarray, T_2: np.ndarray) -> np.ndarray:
-    """Artanh(q) of q = 2 half / (T_1 + T_2), exact also where q is nearly 1; 0 where it is infinite, at h = 0."""
+    """Return artanh(q) of q = 2 half / (T_1 + T_2), exact also for q near 1; 0 where it is infinite, at h = 0."""
     a, b = v - half, v + half
     with np.errstate(divide="ignore", invalid="ignore"):
         # T_1 + a and T_2 - b, whose sum is T_1 + T_2 - 2 half, each without cancellation
@@ -189,7 +187,7 @@ class _Problem:
     softness: np.ndarray
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """The forces, (k,) each, and the number of steps."""
+        """Return the forces, (k,) each, and the number of steps."""
         h, v = self._first_guess()
         open_ones = np.flatnonzero(self.x > 0)
         if not len(open_ones):
@@ -212,12 +210,12 @@ class _Problem:
         )
 
     def misses(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far beyond its place the end lies, (k,) each: the gradient of the energy."""
+        """Return the distances of the end beyond its place, (k,) each: the gradient of the energy."""
         x, z = _reach(h, v, 1.0, self.softness)
         return x - self.x, z - self.z
 
     def newton_step(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The step in h and v and the energy's slope along it, (k,) each."""
+        """Return the step in h and v and the energy's slope along it, (k,) each."""
         miss_x, miss_z = self.misses(h, v)
         c_xx, c_xz, c_zz = _compliance(h, v)
         c_xx, c_zz = c_xx + self.softness, c_zz + self.softness
@@ -229,7 +227,7 @@ class _Problem:
     def line_search(
         self, h: np.ndarray, v: np.ndarray, d_h: np.ndarray, d_v: np.ndarray, slope: np.ndarray
     ) -> np.ndarray:
-        """How much of each step to take, (k,): half as much while the energy rises steeply at its end, and h stays > 0.
+        """Return the share of each step to take, (k,): halved while the energy rises steeply at its end; h stays > 0.
 
         The energy is convex: while it still falls at the end of a step, the step was not too long.
         """
@@ -244,7 +242,7 @@ class _Problem:
         return taken
 
     def _first_guess(self) -> tuple[np.ndarray, np.ndarray]:
-        """H and v to start from, (k,): the catenary that does not stretch, or where that is too tight, a taut cable."""
+        """Return h and v to start from, (k,): of the catenary that does not stretch, or of a taut cable."""
         chord = np.hypot(self.x, self.z)
         spread = self.x > 0
         safe_x, safe_chord = np.where(spread, self.x, 1.0), np.where(spread, chord, 1.0)
@@ -269,7 +267,7 @@ class _Problem:
         return np.where(spread, h, 0.0), np.where(spread, v, self._vertical())
 
     def _vertical(self) -> np.ndarray:
-        """V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
+        """Return V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
         folded = self.z / (self.softness + 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             taut = np.sign(self.z) * (np.abs(self.z) - 1) / self.softness
@@ -277,7 +275,7 @@ class _Problem:
 
 
 def _compliance(h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Integrals of V^2 / T^3, -h V / T^3 and h^2 / T^3 over the cable, (k,) each: its give without stretching."""
+    """Return the integrals of V^2 / T^3, -h V / T^3 and h^2 / T^3 over the cable, (k,) each: its shape's compliance."""
     a, b = v - 0.5, v + 0.5
     T_1, T_2 = np.hypot(h, a), np.hypot(h, b)
     c_zz = b / T_2 - a / T_1
