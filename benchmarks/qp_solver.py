@@ -90,9 +90,7 @@ def solve_problem(
     P, q, G, _, A, b, lb, ub = problem.unpack_as_dense()
     weights = np.diagonal(P)
     if G is not None or A is None or b is None or (np.diag(weights) != P).any() or not (weights > 0).all():
-        raise InputError(
-            "problem must have a positive diagonal P, equations A x = b and no G, got another form"
-        )
+        raise InputError("problem must have a positive diagonal P, equations A x = b and no G, got another form")
     lower = np.full(q.size, -np.inf) if lb is None else lb
     upper = np.full(q.size, np.inf) if ub is None else ub
     solution = qpsolvers.Solution(problem)
