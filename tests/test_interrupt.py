@@ -29,6 +29,7 @@ try:
     plan(robot, "fast.yaml", lambda iteration, *_: print("iteration", iteration, flush=True))
 except KeyboardInterrupt:
     print("interrupted", flush=True)
+print("went on", flush=True)
 """
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
@@ -41,8 +42,14 @@ def folder(tmp_path):
     return tmp_path
 
 
+def heed_interrupts():
+    """Undo that a shell's background job, and so whatever it starts, ignores SIGINT."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def start(command, folder):
-    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=folder, preexec_fn=heed_interrupts, **pipes)
 
 
 @pytest.mark.parametrize("moment", ["ready", "iteration 1", "iteration 3"])
@@ -56,7 +63,9 @@ def test_an_interrupt_from_outside_ends_plan(folder, moment):
     process.send_signal(signal.SIGINT)
     assert any(line == "interrupted\n" for line in lines), process.stderr.read()
     assert time.perf_counter() - sent < PROMPT
-    assert process.wait(60) == 0  # what still computed has ended, and the script goes on
+    assert list(lines) == ["went on\n"]
+    # What still computed ends. If the interrupt hit the making of a dataclass, Python dies of it at its end all the same.
+    assert process.wait(60) in (0, -signal.SIGINT)
     assert process.stderr.read() == ""
 
 
