@@ -1,4 +1,4 @@
-"""Which durations a path leaves that is followed exactly and by its own time law: `durations`.
+"""Compute the durations in which a path can be followed exactly and by its own time law: `durations`.
 
 If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at each place of the path the wrench is
 
@@ -26,15 +26,15 @@ INDEPENDENT = 1e-3  # of the largest singular value, as the audit has it
 
 
 class Durations(NamedTuple):
-    """What is necessary for a duration T: shortest <= T <= longest.
+    """A necessary condition on a duration T: shortest <= T <= longest.
 
     Attributes
     ----------
     shortest, longest
-        [s]; infinite: rest is possible everywhere, any slow motion is. Without any duration shortest is infinite and
+        [s]; longest is infinite if rest is possible everywhere. If no duration is possible, shortest is infinite and
         longest zero.
     at
-        The place that decides, as a fraction of the duration: that of `shortest`, or where no duration is left.
+        The place that decides, as a fraction of the duration: that of `shortest`, or where no duration is possible.
     """
 
     shortest: float
@@ -43,19 +43,19 @@ class Durations(NamedTuple):
 
     @property
     def exist(self) -> bool:
-        """Whether any is left."""
+        """Return whether any duration is possible."""
         return self.shortest <= self.longest
 
     def leave(self, low: float, high: float) -> bool:
-        """Whether some duration from `low` to `high` [s] is left; doubtful ones are."""
+        """Return whether a duration from `low` to `high` [s] may be possible; doubtful ones may."""
         return max(self.shortest * (1 - SLACK), low) <= min(self.longest * (1 + SLACK), high)
 
 
 def durations(scenario: Scenario) -> Durations | None:
-    """The durations that `PLACES` places of the path leave; None where the question cannot be asked so.
+    """Return the durations that are possible at `PLACES` places of the path; None if this method does not apply.
 
-    That is: where anything but the duration is free, a path has times of its own, the drag changes with the speed
-    otherwise, or the cables have fewer independent columns than the platform has degrees of freedom.
+    It does not if anything but the duration is free, a path has times of its own, the drag depends on the speed
+    in another way, or the cables have fewer independent columns than the platform has degrees of freedom.
     """
     paths = [scenario.path, *scenario.carrier_paths.values()]
     if scenario.count or scenario.task.wind is not None or not all(path.stretches for path in paths):
@@ -76,11 +76,11 @@ def durations(scenario: Scenario) -> Durations | None:
     bounds = [bound / robot.force_scale for bound in scenario.bounds()]
     least, most, decisive = 0.0, FASTEST, 0
     for k in range(PLACES):
-        found = _interval(A[k], c[k], d[k], bounds, least, most)
-        if found is None:
+        interval = _interval(A[k], c[k], d[k], bounds, least, most)
+        if interval is None:
             return Durations(np.inf, 0.0, float(shares[k]))
-        decisive = k if found[1] < most else decisive
-        least, most = found
+        decisive = k if interval[1] < most else decisive
+        least, most = interval
     shortest = scenario.duration / np.sqrt(most)
     longest = np.inf if least <= SLACK else scenario.duration / np.sqrt(least)
     return Durations(float(shortest), float(longest), float(shares[decisive]))
@@ -89,16 +89,16 @@ def durations(scenario: Scenario) -> Durations | None:
 def _interval(
     A: np.ndarray, c: np.ndarray, d: np.ndarray, bounds: list[np.ndarray], least: float, most: float
 ) -> tuple[float, float] | None:
-    """Least and most X between the given ones with A t = c + d X and t between its bounds; None: there is none."""
+    """Return the least and largest X from `least` to `most` with A t = c + d X, t inside its bounds; or None."""
     from scipy.optimize import linprog
 
     ends = []
     for sign in (1.0, -1.0):
         cost = np.append(np.zeros(A.shape[1]), sign)
         box = [*zip(*bounds, strict=True), (least, most)]
-        found = linprog(cost, A_eq=np.column_stack([A, -d]), b_eq=c, bounds=box, method="highs")
-        if found.status == 2:  # infeasible
+        result = linprog(cost, A_eq=np.column_stack([A, -d]), b_eq=c, bounds=box, method="highs")
+        if result.status == 2:  # infeasible
             return None
-        # Whatever else HiGHS may say, it proves nothing.
-        ends.append(float(found.x[-1]) if found.success else (least if sign > 0 else most))
+        # Any other message of HiGHS proves nothing.
+        ends.append(float(result.x[-1]) if result.success else (least if sign > 0 else most))
     return ends[0], ends[1]

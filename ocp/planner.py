@@ -1,9 +1,9 @@
-"""`plan`: from a robot and a task to a motion inside the tension limits, or to the reason why there is none.
+"""Plan a motion inside the tension limits from a robot and a task, or give the reason why none exists: `plan`.
 
-The planner works in stages, and the first that has the answer gives it:
+The planner works in stages, and ends with the first that decides:
 
-1. rest along the path (`rest_margin`): where a motion that the task fixes rests, no duration helps;
-2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which of them are possible;
+1. rest along the path (`rest_margin`): where it is negative at an end with rest, no duration is possible;
+2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
 3. the nonlinear program (`program`), audited, and refined where the audit reports violations;
 4. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
    result.
@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..inputs import shown
 from ..models import Robot
 from ..models.files import as_robot
+from ..text import quantity
 from .audits.audit import certified_at_rest, other_tensions_may_pass
 from .cost import cost
 from .durations import Durations, durations
@@ -39,11 +40,11 @@ from .violation import relative_violation
 
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
-COARSE = 50  # steps: from four times as many on, the optimum of so few is found first
+COARSE = 50  # steps: from four times as many on, the program of so few is solved first
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
-NO_SLACK = 1e-6  # of the weight: a motion that misses less at its nodes is a start for another try
+NO_SLACK = 1e-6  # of the weight: a motion with less missing at its nodes is a start for another try
 LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
 LONGEST = 100.0  # times the requested duration: a longer one does not help
 
@@ -60,7 +61,7 @@ def plan(
     their limits. What the planner may choose it chooses by inverse-dynamics transcription and IPOPT
     (`program`). A plan is called feasible only by its audit on a dense grid (`audit`).
 
-    Where nothing but the duration is free, the time law along the path is too: the path's own law, stretched, competes
+    Where the duration alone is free, the time law along the path is too: the path's own law, stretched, competes
     with the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
 
     Parameters
@@ -73,15 +74,15 @@ def plan(
         Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
     start
         Where to start: a plan of the same robot for a similar task, a timing, or a path for the platform (or a mapping
-        with its keys) in the frame of the task's. None: the planner makes its own guess.
+        with its keys) in the frame of the task's path. Default: a guess of the planner's own.
 
     Returns
     -------
     Plan
-        With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves it
-        but its duration; or `not-found`, with the certificate at the worst time of the closest motion that was found,
-        or with the limits that it leaves. `Plan.stages` record the steps, `Plan.infeasible_spans` when tensions do not
-        exist, `Plan.relaxed` a feasible duration.
+        With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves
+        only its duration free; or `not-found`, with the certificate at the worst time of the closest motion known,
+        or with the limits that this exceeds. `Plan.stages` record the steps, `Plan.infeasible_spans` when tensions do
+        not exist, `Plan.relaxed` a feasible duration.
 
     Raises
     ------
@@ -134,9 +135,9 @@ def _climb(search: Search, start: Deviation | None) -> Plan:
     timed, own = _time_law(search) if scenario.count == 0 else (None, True)
     if timed is not None and not (own and timed.feasible):
         return timed
-    found = _free_motion(search, start)
-    if timed is None or (found.feasible and cost(found) <= cost(timed)):
-        return found
+    planned = _free_motion(search, start)
+    if timed is None or (planned.feasible and cost(planned) <= cost(timed)):
+        return planned
     return replace(timed, build_s=search.build_s, solve_s=search.solve_s)
 
 
@@ -176,7 +177,7 @@ def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relax
     if near < left.shortest or near > LONGEST * requested:
         return None
     longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
-    audit = search.audit_motion(longer, None, f"audit of {near:.4g} s")
+    audit = search.audit_motion(longer, None, f"audit of {quantity(near, 's')}")
     if not audit.passed:
         return None
     return Relaxed("duration", "s", requested, near, Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0))
@@ -186,9 +187,9 @@ def _message(left: Durations | None) -> str:
     if left is None:
         return ""
     if not left.exist:
-        return f"none by the path's own time law, as {100 * left.at:.3g} % along it shows"
-    upper = "" if left.longest == float("inf") else f", {left.longest:.4g} s and less"
-    return f"{left.shortest:.4g} s and more{upper}, by the path's own time law"
+        return f"none with the path's own time law, shown {quantity(100 * left.at, '%', 3)} along it"
+    upper = "" if left.longest == float("inf") else f", at most {quantity(left.longest, 's')}"
+    return f"at least {quantity(left.shortest, 's')}{upper}, with the path's own time law"
 
 
 def _rest_along_the_path(search: Search) -> Plan | None:
@@ -200,7 +201,7 @@ def _rest_along_the_path(search: Search) -> Plan | None:
     if search.scenario.count or span is None or margin.margin[[0, -1]].min() >= 0:
         return None
     slowest = search.scenario.lasting(span.max)
-    proven = certified_at_rest(slowest, search.audit_motion(slowest, None, f"audit of {span.max:.4g} s"))
+    proven = certified_at_rest(slowest, search.audit_motion(slowest, None, f"audit of {quantity(span.max, 's')}"))
     return None if proven is None else Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
@@ -229,7 +230,7 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
         return None, own
     # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
     slowest = scenario.lasting(span.max)
-    audit = search.audit_motion(slowest, None, f"audit of {span.max:.4g} s")
+    audit = search.audit_motion(slowest, None, f"audit of {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
     relaxed = _longer(search, slowest, left)

@@ -1,7 +1,7 @@
-"""The first stage: whether the platform can rest along the path, and how far inside the available wrench set it is.
+"""Compute the capacity margin of rest along the path, the planner's first stage.
 
-The capacity margin at rest costs little beside a nonlinear program and tells a lot: where it is negative the motion has
-to be quick, or the carriers elsewhere; where it is negative at an end that a fixed motion rests at, no duration helps.
+It takes little time beside a nonlinear program. Where it is negative, the platform cannot rest: it has to move, or the
+carriers have to be elsewhere. If it is negative at an end at which a fixed motion rests, no duration is possible.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..distribution import wrench_problem
 from ..solvers import capacity_margin
+from ..text import quantity
 from .nlp.guess import initial_guess
 from .tasks.scenario import Scenario
 
@@ -29,8 +30,8 @@ class RestMargin:
     times
         When the motion is there, (n,) [s].
     margin
-        Distance of rest's wrench from the boundary of what the cables can give inside their limits less the task's
-        margin, moments over `Robot.length`; negative: none give it, (n,) [N].
+        Distance of the wrench of rest from the boundary of the available wrench set, for tension limits less the
+        task's margin and moments over `Robot.length`; negative outside, (n,) [N].
     """
 
     times: np.ndarray  # (n,)
@@ -38,20 +39,20 @@ class RestMargin:
 
     @property
     def worst(self) -> int:
-        """Row of the smallest margin."""
+        """Return the row of the smallest margin."""
         return int(self.margin.argmin())
 
     def describe(self) -> str:
-        """One line for a person."""
+        """Return one line for a person."""
         least, at = self.margin[self.worst], self.times[self.worst]
         if least >= 0:
-            return f"possible everywhere, capacity margin {least:.4g} N and more (least at t = {at:.3f} s)"
+            return f"possible everywhere, capacity margin at least {quantity(least, 'N')} (at t = {at:.3f} s)"
         share = f"{(self.margin < 0).sum()} of {len(self.margin)} places"
-        return f"impossible at {share}, short by up to {-least:.4g} N (at t = {at:.3f} s)"
+        return f"impossible at {share}, short by up to {quantity(-least, 'N')} (at t = {at:.3f} s)"
 
 
 def rest_margin(scenario: Scenario) -> RestMargin:
-    """Margins of rest at `PLACES` places, both ends among them."""
+    """Return the margins of rest at `PLACES` places, both ends among them."""
     times = np.linspace(0.0, scenario.duration, PLACES)
     deviation = initial_guess(scenario, times) if scenario.count else None
     platform, carriers = scenario.motion(times, deviation)

@@ -1,4 +1,4 @@
-"""`Search`: one scenario's programs and audits, solved one after the other, and the record of them."""
+"""Solve one scenario's programs and audit the solutions, one after the other, and record them: `Search`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from operator import itemgetter
 
+from ..text import quantity
 from .audits.audit import Audit, audit
 from .nlp.program import build
 from .nlp.rows import Mesh
@@ -60,7 +61,7 @@ class Search:
         return mesh in self._solvers
 
     def solve(self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False) -> Outcome:
-        """Solve the program of `mesh` from `guess`; None: from its last solution, or from a guess of its own.
+        """Solve the program of `mesh` from `guess`; default: from its last solution, or else from a guess of its own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh.
         """
@@ -77,7 +78,7 @@ class Search:
             self.solve_s += time.perf_counter() - built
             stage.message = f"{outcome.message}, {outcome.iterations} iterations"
             if mesh.elastic:
-                stage.message += f", short by {outcome.slack:.3g} N"
+                stage.message += f", short by {quantity(outcome.slack, 'N', 3)}"
         return outcome
 
     def audit(self, outcome: Outcome) -> Audit:
@@ -114,7 +115,9 @@ def describe(audited: Audit) -> str:
     """Return the violations of an audit in short."""
     lines = []
     if audited.violation.max() > audited.tolerance:
-        lines.append(f"short by up to {audited.violation.max():.3g} N at t = {audited.times[audited.worst]:.3f} s")
+        short = quantity(audited.violation.max(), "N", 3)
+        lines.append(f"short by up to {short} at t = {audited.times[audited.worst]:.3f} s")
     if audited.excess:
-        lines.append(f"{len(audited.excess)} other limit{'s' * (len(audited.excess) > 1)} broken")
+        count = len(audited.excess)
+        lines.append(f"{count} other limit{'s' * (count > 1)} exceeded")
     return ", ".join(lines)

@@ -1,4 +1,4 @@
-"""Where a person lets the planner start: a plan, a timing or a path, as a deviation from the task's references."""
+"""Turn what a user lets the planner start from, a plan, a timing or a path, into a deviation from the references."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
+from ..inputs import shown
 from ..models.parsing import validate
 from ..models.robot import Part
 from .nlp.guess import initial_guess
@@ -26,12 +27,12 @@ class _Start(Part):
 
 
 def deviation_from(scenario: Scenario, start: Plan | Timing | AnyPath | dict[str, Any]) -> Deviation | None:
-    """What a start deviates by from the references of `scenario`; None: nothing, the task fixes the motion.
+    """Return the deviation of a start from the references of `scenario`; None if the task fixes the motion.
 
     Raises
     ------
     InputError
-        If it does not fit, or is none.
+        If the start is not one of the accepted types, or does not fit the scenario.
     """
     if isinstance(start, Plan):
         return _of_plan(scenario, start)
@@ -40,19 +41,19 @@ def deviation_from(scenario: Scenario, start: Plan | Timing | AnyPath | dict[str
     if isinstance(start, dict):
         start = validate({"start": start}, _Start, "plan").start
     if not isinstance(start, PathBase):
-        raise InputError(f"start: {start!r}; accepted: a Plan, a Timing, a path or a mapping with its keys")
+        raise InputError(f"start must be a Plan, a Timing, a path or a mapping with its keys, got {shown(start)}")
     return _along(scenario, start, {}, start.natural_duration or scenario.duration)
 
 
 def _of_plan(scenario: Scenario, start: Plan) -> Deviation | None:
-    """A plan's own deviation, stretched to this scenario's duration."""
+    """Return a plan's own deviation, stretched to this scenario's duration."""
     if start.deviation is None:
         return None
     theirs = start.deviation
     if start.scenario.owners() != scenario.owners() or theirs.tensions.shape[1] != scenario.robot.m:
         raise InputError(
-            f"start: is a plan of {start.scenario.robot.name!r} for {start.scenario.task.name!r} with other "
-            "coordinates free; accepted: one whose robot, tube and base leave the same coordinates free"
+            "start must be a plan whose robot, tube and base leave the same coordinates free, got one of "
+            f"{start.scenario.robot.name!r} for {start.scenario.task.name!r}"
         )
     return _lasting(scenario, theirs)
 
@@ -60,7 +61,7 @@ def _of_plan(scenario: Scenario, start: Plan) -> Deviation | None:
 def _of_timing(scenario: Scenario, start: Timing) -> Deviation | None:
     robot = start.parametrised.robot
     if robot.name != scenario.robot.name or robot.m != scenario.robot.m:
-        raise InputError(f"start: is a timing of robot {robot.name!r}; accepted: one of {scenario.robot.name!r}")
+        raise InputError(f"start must be a timing of robot {scenario.robot.name!r}, got one of {robot.name!r}")
     carriers: dict[int, AnyPath] = {
         index: start.timed(path) for index, path in start.parametrised.carriers.items() if _moves(path)
     }
@@ -72,19 +73,19 @@ def _moves(path: AnyPath) -> bool:
 
 
 def _along(scenario: Scenario, path: AnyPath, carriers: dict[int, AnyPath], seconds: float) -> Deviation | None:
-    """The platform on `path`, carriers on theirs or as the planner guesses about it."""
+    """Return the deviation of a platform on `path` and of carriers on theirs, or where the planner guesses them."""
     if path.frame != scenario.path.frame:
-        raise InputError(f"start: frame: {path.frame!r}; accepted: that of the task's path, {scenario.path.frame!r}")
+        raise InputError(f"start.frame must be {scenario.path.frame!r}, as that of the task's path, got {path.frame!r}")
     if scenario.count == 0:
         return None
     nodes = np.linspace(0.0, seconds, scenario.task.steps + 1)
     there = scenario.along(path, seconds)
     about = initial_guess(there, nodes)
     values = [part.copy() for part in (about.q, about.v, about.a)]
-    wanted, _ = there.references(nodes)
+    target, _ = there.references(nodes)
     mine, bases = scenario.lasting(seconds).references(nodes)
     for column, (owner, coordinate) in enumerate(scenario.owners()):
-        for value, at, reference in zip(values, wanted, mine, strict=True):
+        for value, at, reference in zip(values, target, mine, strict=True):
             if owner is None:
                 value[:, column] = (at - reference)[:, coordinate]
         if owner in carriers:
@@ -96,7 +97,7 @@ def _along(scenario: Scenario, path: AnyPath, carriers: dict[int, AnyPath], seco
 
 
 def _lasting(scenario: Scenario, theirs: Deviation) -> Deviation:
-    """Stretched to the scenario's duration; where that is open it starts from theirs, inside the range."""
+    """Return the deviation stretched to the scenario's duration, or if that is open, to its own inside the range."""
     seconds, span = scenario.duration, scenario.duration_range
     if span is not None:
         seconds = float(np.clip(theirs.nodes[-1], span.min, span.max))

@@ -1,4 +1,4 @@
-"""`MotionStatus`: the words for what a planned or timed motion is."""
+"""Name the possible results of planning or timing a motion: `MotionStatus`."""
 
 from enum import StrEnum
 
@@ -18,5 +18,5 @@ class MotionStatus(StrEnum):
     slowest motion, and `Plan.stages` state what excludes the others."""
 
     NOT_FOUND = "not-found"
-    """No motion without violation was found, and none is proven impossible. Certificate and `excess` are those of the
-    closest motion that was found."""
+    """The search ended without a motion that keeps every limit and without a proof that none exists. Certificate and
+    `excess` are those of the closest motion known."""

@@ -1,8 +1,8 @@
-"""The fastest time law along a task's path, as a stage of planning: `fastest`.
+"""Compute the fastest time law along a task's path, as a stage of planning: `fastest`.
 
-Where the path is followed exactly from rest to rest, `time_along` knows the least time of all time laws: what is
-shorter cannot be, and its law is a plan if it keeps the task's other limits too. Its minimum is that of a grid: it
-differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it counts as proven.
+Where the path is followed exactly from rest to rest, `time_along` computes the least time of all time laws: a shorter
+duration is impossible, and its law is a plan if it keeps the task's other limits too. Its minimum is that of a grid:
+it differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it is proven.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError, SolverError
+from ..text import quantity
 from .tasks.path import AnyPath, LinePath, RestPath, WaypointPath
 from .tasks.scenario import Scenario
 from .tasks.task import Tube
@@ -19,9 +20,9 @@ from .timing.timing import KNOWN_LIMITS, Timing, time_along
 __all__ = ["BOUND", "fastest"]
 
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
-PIECES = 400  # of a spline that is handed on as points: 1e-6 of its length off at most
+PIECES = 400  # of a spline that is given to `time_along` as points: 1e-6 of its length off at most
 LOOKS = 20_001
-ON_PATH = 2e-6  # of a path's length: how far the handed-on spline may be off
+ON_PATH = 2e-6  # of a path's length: how far that spline may be off
 
 
 def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
@@ -44,8 +45,8 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
     except (InputError, SolverError) as error:
         return None, f"not computed: {str(error).removeprefix('time_along: ')}"
     if timing.feasible:
-        return timing, f"the fastest law takes {timing.duration:.6g} s"
-    return timing, f"{timing.status.value}: at {100 * (timing.at or 0.0):.3g} % of the path"
+        return timing, f"the fastest law takes {quantity(timing.duration, 's', 6)}"
+    return timing, f"{timing.status.value} at {quantity(100 * (timing.at or 0.0), '%', 3)} of the path"
 
 
 def _curve(path: AnyPath) -> AnyPath | None:
@@ -61,16 +62,16 @@ def _through(path: WaypointPath) -> WaypointPath | None:
     """Return a natural spline through many points of a smooth path, densest at its ends; None if it deviates."""
     shares = np.linspace(0.0, 1.0, LOOKS)
     looks = path.by_fraction(shares).pose
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(looks, axis=0), axis=1))])
-    wanted = way[-1] * (1 - np.cos(np.pi * np.arange(PIECES + 1) / PIECES)) / 2
-    at = np.interp(wanted, way, shares)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(looks, axis=0), axis=1))])
+    targets = length[-1] * (1 - np.cos(np.pi * np.arange(PIECES + 1) / PIECES)) / 2
+    at = np.interp(targets, length, shares)
     at[[0, -1]] = 0.0, 1.0
     points = tuple((x, y, z, roll, pitch, yaw) for x, y, z, roll, pitch, yaw in path.by_fraction(at).pose.tolist())
     spline = WaypointPath(kind="waypoints", frame=path.frame, points=points, timing="uniform")
     # Between the points only the deviation across the path matters: the time law decides where along it.
-    between = (wanted[1:] + wanted[:-1]) / 2
-    wanted_pose, along, _ = path.by_fraction(np.interp(between, way, shares))
+    between = (targets[1:] + targets[:-1]) / 2
+    target, along, _ = path.by_fraction(np.interp(between, length, shares))
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    off = spline.by_fraction(between / way[-1]).pose - wanted_pose
+    off = spline.by_fraction(between / length[-1]).pose - target
     across = off - np.sum(off * along, axis=1, keepdims=True) * along
-    return spline if np.linalg.norm(across, axis=1).max() <= ON_PATH * way[-1] else None
+    return spline if np.linalg.norm(across, axis=1).max() <= ON_PATH * length[-1] else None
