@@ -110,7 +110,7 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     place, kind, value, context = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
     field, holder = _walk(place, _schema(model))
     key = str(place[-1]) if place else ""
-    field = _printable(field)
+    field = _printable(field, LONGEST_PART // 2)  # leaves enough of the line for what is wrong with it
     if kind == "extra_forbidden":
         return f"{field} is not a known key{_close(key, _known(holder))} (known keys: {_keys(holder)})"
     if kind == "missing":
@@ -220,10 +220,10 @@ def _problem(error: Exception) -> str:
     return f"{_printable(str(problem).splitlines()[0])}{place}"
 
 
-def _printable(text: str) -> str:
-    """Return one line that a terminal shows as it is: a file's own words may hold line breaks and escape sequences."""
+def _printable(text: str, longest: int = LONGEST_PART) -> str:
+    """Return one line that a terminal shows as it is: a file's keys may have line breaks and escape sequences."""
     shown = "".join(char if char.isprintable() else repr(char)[1:-1] for char in " ".join(text.splitlines()))
-    return shown if len(shown) <= LONGEST_PART else f"{shown[: LONGEST_PART - 3]}..."
+    return shown if len(shown) <= longest else f"{shown[: longest - 3]}..."
 
 
 def brief(value: Any) -> str:

@@ -86,7 +86,7 @@ def _check_positive_definite(inertia: Inertia) -> Inertia:
     smallest = float(np.linalg.eigvalsh(inertia_matrix(inertia))[0])
     if not smallest > 0:
         raise ValueError(
-            f"must be positive definite (all principal moments > 0 kg m^2), but the smallest moment is {smallest:g}"
+            f"must be positive definite (all principal moments > 0 kg m^2; the smallest moment is {smallest:g})"
         )
     return inertia
 
@@ -144,11 +144,12 @@ class Platform(Part):
     def _turns_with_inertia(self) -> Self:
         if self.inertia is None and any(name in self.dof for name in COORDINATES[3:]):
             raise ValueError(
-                "inertia is missing: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2]; only a dof without angles needs none"
+                "inertia must be (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2] unless dof has no angles, got none"
             )
         locked = [name for name in COORDINATES[3:] if name not in self.dof]
         if self.home and len(locked) < 3 and any(self.home[COORDINATES.index(name)] for name in locked):
-            raise ValueError(f"home must have 0 rad for {', '.join(locked)}, which cannot move")
+            angles = ", ".join(f"{self.home[COORDINATES.index(name)]:g}" for name in locked)
+            raise ValueError(f"home must have 0 rad for {', '.join(locked)}, which cannot move, got {angles}")
         return self
 
 
@@ -181,7 +182,7 @@ class Box(Part):
     def _ordered(self) -> Self:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if low > high:
-                raise ValueError(f"min must not exceed max, but along {axis} min is {low:g} and max is {high:g}")
+                raise ValueError(f"min must not exceed max, {high:g} m along {axis}, got {low:g} m")
         return self
 
 
@@ -197,7 +198,7 @@ class MobileCarrier(Carrier):
     def _home_in_reach(self) -> Self:
         for axis, low, at, high in zip("xyz", self.reach.min, self.home[:3], self.reach.max, strict=True):
             if not low <= at <= high:
-                raise ValueError(f"home must lie in reach, but along {axis} {at:g} is not in [{low:g}, {high:g}]")
+                raise ValueError(f"home must lie in reach, from {low:g} m to {high:g} m along {axis}, got {at:g} m")
         return self
 
 
@@ -222,9 +223,7 @@ class QuadrotorCarrier(Carrier):
     @model_validator(mode="after")
     def _thrusts_in_order(self) -> Self:
         if self.thrust_min >= self.thrust_max:
-            raise ValueError(
-                f"thrust_min must be below thrust_max, but they are {self.thrust_min:g} N and {self.thrust_max:g} N"
-            )
+            raise ValueError(f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N")
         return self
 
 
@@ -248,7 +247,7 @@ class Pulley(Part):
     @classmethod
     def _has_a_direction(cls, axis: Vector3) -> Vector3:
         if not np.linalg.norm(axis) > 0:
-            raise ValueError("must have a direction, the swivel axis cannot be zero")
+            raise ValueError("must be a direction other than zero")
         return axis
 
 
@@ -268,9 +267,7 @@ class Cable(Part):
     @model_validator(mode="after")
     def _limits_in_order(self) -> Self:
         if self.t_min > self.t_max:
-            raise ValueError(
-                f"t_min must not exceed t_max, but t_min is {self.t_min:g} N and t_max is {self.t_max:g} N"
-            )
+            raise ValueError(f"t_min must not exceed t_max, {self.t_max:g} N, got {self.t_min:g} N")
         return self
 
 
@@ -307,11 +304,11 @@ class Robot(Part):
         if self.drive == "fixed-length":
             for index, cable in enumerate(self.cables):
                 if cable.length is None:
-                    raise ValueError(f"cables[{index}].length is missing: with drive fixed-length, a number > 0 [m]")
+                    raise ValueError(f"cables[{index}].length must be a number > 0 [m] if the drive is fixed-length")
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(
-                f"cables[{shortest}] must have a length > 0 m at home, but its anchor and attachment coincide there"
+                f"cables[{shortest}] must have a length > 0 m at home, got an anchor and an attachment that coincide"
             )
         if self.pulley_radii.any():
             self._check_pulleys()
@@ -326,7 +323,8 @@ class Robot(Part):
         outside = (across > 1e-9) & (across**2 - 2 * across * self.pulley_radii + up**2 > 0)
         for index in np.flatnonzero((self.pulley_radii > 0) & ~outside):
             raise ValueError(
-                f"cables[{index}].pulley: the attachment must lie off the swivel axis and outside the sheave at home"
+                f"cables[{index}].attachment must lie off the swivel axis and outside the sheave of its pulley at "
+                f"home, got {self.cables[index].attachment}"
             )
 
     @property

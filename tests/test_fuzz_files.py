@@ -310,7 +310,7 @@ def test_mutated_caspr_files(seed, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("mass: 1.2", "mass: true", r"platform\.mass: .*a number, .*got True"),
+        ("mass: 1.2", "mass: true", r"platform\.mass must be a number, got True"),
         ("mass: 1.2", "mass: 1e308", r"platform\.mass must be less than or equal to \d+, got 1e\+308"),
         ("mass: 1.2", "mass: !!int", r"is not YAML \(has a YAML tag \(.*int,?\), line 4\)"),
         ("[0, 0, 2]", "!!set {0.1, 0, 2}", r"is not YAML \(has a YAML tag \(.*set\), line 8\)"),
@@ -319,7 +319,7 @@ def test_mutated_caspr_files(seed, tmp_path):
         (
             "[0, 0.1, 0]",
             "[0, 0.1, 1]",
-            r"cables\[0\]\.pulley: at home the attachment must lie off the swivel axis and out",
+            r"cables\[0\]\.attachment must lie off the swivel axis and outside the sheave of its pulley at home, got",
         ),
         ("a test", "&a [*a]", r"is not YAML \(has a YAML alias \(\*name\), line 2\)"),
     ],

@@ -309,5 +309,5 @@ def test_only_dof_whose_equations_are_the_wrench_rows():
     for dof in (["pitch"], ["x", "yaw"], ["roll", "pitch", "yaw"], ["x", "y", "z", "roll", "pitch"]):
         with pytest.raises(InputError, match=r"platform\.dof must be any of x, y, z; or"):
             hanging([([0, 0, 1], [0.1, 0, 0])], dof=dof)
-    with pytest.raises(InputError, match="home must have 0 rad for roll, yaw, which cannot move"):
+    with pytest.raises(InputError, match=r"home must have 0 rad for roll, yaw, which cannot move, got 0\.1, 0"):
         hanging([([0, 0, 1], [0.1, 0, 0])], dof=["x", "z", "pitch"], home=[0, 0, 0, 0.1, 0, 0])

@@ -435,7 +435,7 @@ def test_one_bad_pose_is_no_and_leaves_the_others_alone():
         ({"kind": "near"}, "condition.kind must be one of all, any"),
         ({}, "condition must be a mapping with a kind"),
         ({"kind": "margin", "above": "much"}, "above must be a number"),
-        ({"kind": "wrench-feasible"}, "box or vertices must be given"),
+        ({"kind": "wrench-feasible"}, "box or vertices must be given, and not both, got neither"),
         ({"kind": "lengths", "min": 2, "max": 1}, "min must not exceed max"),
         ({"kind": "all", "conditions": [{"kind": "margin", "abov": 1}]}, "abov is not a known key"),
         ({"kind": "wrench-with-tolerance", "tolerance": -1}, "tolerance"),

@@ -33,7 +33,7 @@ class Lengths(Condition):
         least, most = np.atleast_1d(self.min), np.atleast_1d(self.max)
         # If min and max have different numbers of cables, one of them does not fit the robot: `_holds` reports it.
         if (1 in (least.size, most.size) or least.size == most.size) and np.greater(least, most).any():
-            raise ValueError(f"min must not exceed max, but they are {self.min} m and {self.max} m")
+            raise ValueError(f"min must not exceed max, {self.max} m, got {self.min} m")
         return self
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:

@@ -38,12 +38,13 @@ class WrenchFeasible(Condition):
     @model_validator(mode="after")
     def _one_set(self) -> Self:
         if (self.box is None) == (self.vertices is None):
-            raise ValueError("box or vertices must be given, and not both")
+            got = "neither" if self.box is None else "both"
+            raise ValueError(f"box or vertices must be given, and not both, got {got}")
         if self.box is not None:
             for name, low, high in zip(("fx", "fy", "fz", "mx", "my", "mz"), *self.box, strict=True):
                 if low > high:
                     raise ValueError(
-                        f"box must have minima that do not exceed its maxima, but of {name} they are {low}, {high}"
+                        f"box must have minima that do not exceed its maxima, {high:g} for {name}, got {low:g}"
                     )
         return self
 
