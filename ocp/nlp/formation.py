@@ -1,10 +1,10 @@
-"""A first guess that keeps clear: how platform and carriers shift, turn and squeeze past what the task keeps them from.
+"""Guess a motion that avoids obstacles: how platform and carriers shift, turn and squeeze past them.
 
 A nonlinear program that starts inside a wall, or on its wrong side, stays there. So at each of many places along the
 path a few formations are tried: the platform `lateral` and `vertical` of its path and turned by `yaw`, its carriers
 with it and drawn together across the path by `squeeze`, at their distance from the platform. Dynamic programming picks
-the sequence that passes the task's distances by least, and among these a short and smooth one; finer tries about it
-follow. Statics does not count here, the program that starts from the guess sees to it.
+the sequence that violates the task's distances least, and among these a short and smooth one; finer tries about it
+follow. Statics is left to the program that starts from the guess.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ TRIES = (7, 3, 3, 5)  # of each of these, the first time
 TWO_SIDED = np.array([1.0, 1.0, 1.0, 0.0])  # squeeze is never negative
 REFINEMENTS = 3  # each with three tries of each, about the last, at half the distance
 MOST_SQUEEZE = 0.8
-ROOM = 0.05  # [m] that a guess stays farther away than it must
-PASSING = 1e3  # cost of a metre beyond a distance
-UNUSUAL = 1e-2  # cost of a formation as far from the usual as is tried
+CLEARANCE = 0.05  # [m] that a guess stays farther away than it must
+VIOLATION = 1e3  # cost of a metre of violation of a distance
+UNUSUAL = 1e-2  # cost of the formation farthest from the usual one
 AHEAD = 0.1  # of the path: where it begins to change
 
 
 @dataclass(frozen=True)
 class Formation:
-    """How the formation differs from that at home, along the path.
+    """The deviation of a formation from that at home, along the path.
 
     Attributes
     ----------
@@ -51,22 +51,22 @@ class Formation:
     shape: np.ndarray
 
     def motion(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Poses of the platform (n, 6) and of the carriers (n, c, 6) at `times` [s]."""
+        """Return the poses of the platform (n, 6) and of the carriers (n, c, 6) at `times` [s]."""
         at = times / self.scenario.duration
         shape = np.stack([np.interp(at, self.shares, column) for column in self.shape.T], axis=1)
         return _placed(self.scenario, _References.at(self.scenario, times), shape)
 
 
 def clear_formation(scenario: Scenario) -> Formation | None:
-    """The formation along the path that passes the task's distances by least; None if the usual one passes none.
+    """Return the formation along the path that violates the task's distances least.
 
-    None too where nothing of the formation is free to choose.
+    Return None if the usual one violates none, or if nothing of the formation is free.
     """
-    found = named_limits(scenario)
+    limits = named_limits(scenario)
     span = _span(scenario)
-    if scenario.relative or not any(limit.name in DISTANCES for limit in found.all) or not span.any():
+    if scenario.relative or not any(limit.name in DISTANCES for limit in limits.all) or not span.any():
         return None
-    beyond = _Distances(scenario, found)
+    beyond = _Distances(scenario, limits)
     shares = np.linspace(0.0, 1.0, PLACES // 2 + 1)
     references = _References.at(scenario, shares * scenario.duration)
     shape = np.zeros((len(shares), 4))
@@ -85,7 +85,7 @@ def clear_formation(scenario: Scenario) -> Formation | None:
 
 @dataclass(frozen=True)
 class _References:
-    """Where platform and carriers are without deviation, and which way is across the path."""
+    """The poses of platform and carriers without deviation, and the direction across the path."""
 
     platform: np.ndarray  # (n, 6)
     carriers: np.ndarray  # (n, c, 6)
@@ -98,28 +98,28 @@ class _References:
 
 
 def _across(platform: Motion) -> np.ndarray:
-    """The horizontal direction across the way that the platform goes; where it rests, as where it last moved."""
-    way = platform.velocity[:, :2]
-    speed = np.linalg.norm(way, axis=1)
+    """Return the horizontal direction across the platform's velocity; at rest, that of the nearest moving place."""
+    velocity = platform.velocity[:, :2]
+    speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed > 1e-3 * max(speed.max(), 1e-9))
     if not len(moving):
-        return np.tile([0.0, 1.0, 0.0], (len(way), 1))
-    nearest = moving[np.clip(np.searchsorted(moving, np.arange(len(way))), 0, len(moving) - 1)]
-    along = way[nearest] / speed[nearest, None]
-    # There and back is the same way: left stays left.
+        return np.tile([0.0, 1.0, 0.0], (len(velocity), 1))
+    nearest = moving[np.clip(np.searchsorted(moving, np.arange(len(velocity))), 0, len(moving) - 1)]
+    along = velocity[nearest] / speed[nearest, None]
+    # Left stays left where the motion turns back.
     same = np.where((along[1:] * along[:-1]).sum(axis=1) < 0, -1.0, 1.0)
     along[1:] *= np.cumprod(same)[:, None]
     return np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
 
 
 def _loose(scenario: Scenario) -> list[int]:
-    """Carriers that keep their places about the platform rather than in {G}."""
+    """Return the carriers that keep their places about the platform rather than in {G}."""
     free = {owner for owner, _ in scenario.owners() if owner is not None}
     return [i for i in free if scenario.robot.carriers[i].kind in ("prescribed", "quadrotor")]
 
 
 def _span(scenario: Scenario) -> np.ndarray:
-    """How far each of lateral, vertical, yaw and squeeze may go, (4,); zero: not free."""
+    """Return the largest lateral, vertical, yaw and squeeze, (4,); zero where not free."""
     tube, robot, loose = scenario.task.tube, scenario.robot, _loose(scenario)
     bodies = [robot.attachments, *(robot.carrier_home[[i], :3] - robot.home[:3] for i in loose)]
     size = float(np.linalg.norm(np.vstack(bodies), axis=1).max())
@@ -131,7 +131,7 @@ def _span(scenario: Scenario) -> np.ndarray:
 
 
 def _tried(shape: np.ndarray, span: np.ndarray, attempt: int) -> np.ndarray:
-    """Formations (k, tries, 4) to try about those of shape (k, 4): first all over the span, then near them."""
+    """Return formations (k, tries, 4) to try about those of `shape` (k, 4): first all over the span, then near them."""
     step = span * np.where(TWO_SIDED, 2.0, 1.0) / (np.array(TRIES) - 1)
     if attempt == 0:
         levels = [
@@ -145,7 +145,7 @@ def _tried(shape: np.ndarray, span: np.ndarray, attempt: int) -> np.ndarray:
 
 
 def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of platform (n, 6) and carriers (n, c, 6) in formations (n, 4)."""
+    """Return the poses of platform (n, 6) and carriers (n, c, 6) in formations (n, 4)."""
     robot = scenario.robot
     platform, carriers = references.platform.copy(), references.carriers.copy()
     lateral, vertical, yaw, squeeze = shape.T
@@ -165,24 +165,24 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
 
 
 class _Distances:
-    """By how much poses pass the task's distances, all in metres."""
+    """The violation of the task's distances by poses, in metres."""
 
-    def __init__(self, scenario: Scenario, found: NamedLimits):
+    def __init__(self, scenario: Scenario, limits: NamedLimits):
         bodies = 1 + len(scenario.robot.carriers)
         pose = ca.SX.sym("pose", 6, bodies)
         at_rest = [ca.vertcat(pose[:, i], ca.SX.zeros(12)) for i in range(bodies)]
-        values = found.function(*at_rest, ca.SX.zeros(scenario.robot.m))
+        values = limits.function(*at_rest, ca.SX.zeros(scenario.robot.m))
         beyond, at = [ca.SX(0.0)], 0
-        for limit in found.all:
+        for limit in limits.all:
             mine = values[at : at + len(limit.labels)]
             at += len(limit.labels)
             if limit.name in DISTANCES:
-                beyond += [limit.low + ROOM - mine] * bool(np.isfinite(limit.low))
-                beyond += [mine - limit.high + ROOM] * bool(np.isfinite(limit.high))
+                beyond += [limit.low + CLEARANCE - mine] * bool(np.isfinite(limit.low))
+                beyond += [mine - limit.high + CLEARANCE] * bool(np.isfinite(limit.high))
         self._function = ca.Function("beyond", [ca.vec(pose)], [ca.sum1(ca.fmax(ca.vertcat(*beyond), 0.0))])
 
     def __call__(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
-        """Of platform (n, 6) and carriers (n, c, 6): the sum of what is passed, (n,) [m]."""
+        """Return the sum of the violations by platform (n, 6) and carriers (n, c, 6), (n,) [m]."""
         poses = np.concatenate([platform[:, None], carriers], axis=1).reshape(len(platform), -1)
         return self._function.map(len(poses))(poses.T).full().ravel()
 
@@ -190,13 +190,13 @@ class _Distances:
 def _best(
     scenario: Scenario, places: _References, beyond: _Distances, tried: np.ndarray, span: np.ndarray
 ) -> np.ndarray:
-    """The cheapest sequence of formations (k, 4) among those tried at each place, (k, tries, 4)."""
+    """Return the cheapest sequence of formations (k, 4) among those tried at each place, (k, tries, 4)."""
     count, tries, _ = tried.shape
     every = _References(*(np.repeat(part, tries, axis=0) for part in (places.platform, places.carriers, places.across)))
     passed = beyond(*_placed(scenario, every, tried.reshape(-1, 4))).reshape(count, tries)
     size = tried / np.where(span > 0, span, 1.0)
     squares = (size**2).sum(axis=2)
-    cost = PASSING * passed + UNUSUAL * squares
+    cost = VIOLATION * passed + UNUSUAL * squares
     for end in (0, -1):
         cost[end] += _end_cost(scenario, size[end])
     smooth = UNUSUAL * (AHEAD * (count - 1)) ** 2
@@ -204,8 +204,8 @@ def _best(
     total = cost[0]
     for k in range(1, count):
         # |p - p'|^2 of all pairs, by their products.
-        apart = squares[k - 1][:, None] + squares[k] - 2 * size[k - 1] @ size[k].T
-        reached = total[:, None] + smooth * apart
+        change = squares[k - 1][:, None] + squares[k] - 2 * size[k - 1] @ size[k].T
+        reached = total[:, None] + smooth * change
         came_from[k] = reached.argmin(axis=0)
         total = reached[came_from[k], np.arange(tries)] + cost[k]
     best = np.zeros(count, dtype=int)
@@ -216,8 +216,8 @@ def _best(
 
 
 def _end_cost(scenario: Scenario, size: np.ndarray) -> np.ndarray:
-    """What a formation (tries, 4) costs where the task says how to start and end."""
+    """Return what formations (tries, 4) cost at an end that the task prescribes."""
     kept = np.zeros(4)
     kept[[LATERAL, VERTICAL, YAW]] = scenario.task.tube.ends == "exact"
     kept[SQUEEZE] = getattr(scenario.task.base, "ends", "free") in ("exact", "periodic")
-    return PASSING**2 * np.abs(size) @ kept
+    return VIOLATION**2 * np.abs(size) @ kept

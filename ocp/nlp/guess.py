@@ -1,4 +1,4 @@
-"""Where the planner starts."""
+"""Guess the motion that the planner starts from: `initial_guess`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how 
 
 
 def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
-    """A guess that needs nothing from the user.
+    """Return a guess that needs nothing from the user.
 
     Carriers that may go anywhere keep their places about the platform, as at home, or draw together where the task
     keeps them from obstacles (`formation`); others stay. Quadrotors tilt as their thrust has to point. The tensions are
@@ -34,7 +34,7 @@ def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
 
 
 def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
-    """Carriers that may go anywhere, about the platform as at home."""
+    """Return the deviation that keeps carriers which may go anywhere about the platform as at home."""
     robot = scenario.robot
     n = scenario.count
     q, v, a = (np.zeros((len(nodes), n)) for _ in range(3))
@@ -51,7 +51,7 @@ def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
 
 
 def _in_formation(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], nodes: np.ndarray) -> Deviation:
-    """The deviation at `nodes` that brings platform (n, 6) and carriers (n, c, 6) to `poses` there."""
+    """Return the deviation at `nodes` that brings platform (n, 6) and carriers (n, c, 6) to `poses` there."""
     platform, carriers = scenario.references(nodes)
     values = []
     for owner, coordinate in scenario.owners():
@@ -62,7 +62,7 @@ def _in_formation(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], node
 
 
 def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
-    """Cubic splines through q (n, count) at `nodes`: at rest at the ends where the task says so."""
+    """Return cubic splines through q (n, count) at `nodes`, at rest at the ends where the task requires it."""
     from scipy.interpolate import CubicSpline  # loads for longer than a plan takes that does not need it
 
     ends = scenario.task.tube.ends, getattr(scenario.task.base, "ends", "free")
@@ -75,14 +75,14 @@ def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
 
 
 def _pulled(scenario: Scenario, guess: Deviation) -> Deviation:
-    """The same motion with the tensions of least norm, cut to their limits."""
+    """Return the same motion with the tensions of least norm, cut to their limits."""
     A, w = _balance(scenario, guess)
     least = (np.linalg.pinv(A, rcond=1e-6) @ w[..., None])[..., 0]
     return replace(guess, tensions=np.clip(least, *scenario.bounds()))
 
 
 def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
-    """The same with each quadrotor's thrust along the force that its motion and its cables need."""
+    """Return the motion with each quadrotor's thrust along the force that its motion and its cables need."""
     robot = scenario.robot
     A, _ = _balance(scenario, guess)
     _, carriers = scenario.motion(guess.nodes, guess)
@@ -103,14 +103,14 @@ def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
 
 
 def _pointing(force: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Roll and pitch (n,) of a frame whose z axis, (sin p cos r, -sin r, cos p cos r) but for yaw, is along force."""
+    """Return roll r and pitch p, (n,), for which z, (sin p cos r, -sin r, cos p cos r) but for yaw, is along force."""
     x = np.cos(yaw) * force[:, 0] + np.sin(yaw) * force[:, 1]
     y = -np.sin(yaw) * force[:, 0] + np.cos(yaw) * force[:, 1]
     return -np.arcsin(y / np.linalg.norm(force, axis=1)), np.arctan2(x, force[:, 2])
 
 
 def _balance(scenario: Scenario, guess: Deviation) -> tuple[np.ndarray, np.ndarray]:
-    """A (n, 6, m) and w (n, 6) of a motion."""
+    """Return A (n, 6, m) and w (n, 6) of a motion."""
     platform, carriers = scenario.motion(guess.nodes, guess)
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose)
     return A, scenario.dynamics.required_wrench(*platform, wind=scenario.wind)

@@ -1,4 +1,4 @@
-"""What a program asks of an interval: exact integration, and limits that hold at every time in between."""
+"""Write the rows of an interval: exact integration, and limits that hold at every time in between."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Interval:
         (x, x_end) -> the end's motion that integration gives, from what is free at the end: its acceleration, or its
         snap; and what all nodes share.
     rows
-        Of `values`. The first are `gaps` equations: the end is where `flow` says.
+        Names and bounds of `values`. The first are `gaps` equations: the end is what `flow` gives.
     """
 
     function: ca.Function
@@ -50,7 +50,7 @@ class Interval:
 
 
 def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, columns: Sequence[Values]) -> Points:
-    """Of the free coordinates, by integration from the first column."""
+    """Return the Bernstein points of the free coordinates, by integration from the first column."""
     first, last = columns[0], columns[-1]
     jerk = (first[layout.jerk] / h_given, last[layout.jerk] / h_given)
     acceleration = scenario.scheme.acceleration(h, [column[layout.a] for column in columns], jerk)
@@ -59,7 +59,7 @@ def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, column
 
 
 def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
-    """Cost of jerk and constraints of one interval: integration, and limits at the Bernstein points."""
+    """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points."""
     robot, scheme = scenario.robot, scenario.scheme
     wide = 18 * (1 + len(robot.carriers))
     x, x_end = ca.SX.sym("x", layout.width * scheme.size), ca.SX.sym("x_end", layout.width)
@@ -96,7 +96,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
 
 
 def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX]) -> tuple[ca.SX, ca.SX]:
-    """Acceleration and jerk at the end, the jerk as in its column: the integrals of a linear snap."""
+    """Return acceleration and jerk at the end, the jerk as in its column: the integrals of a linear snap."""
     first, last = columns[0], columns[-1]
     share = h / given
     snap, snap_end = first[layout.snap], last[layout.snap]
@@ -113,7 +113,7 @@ def _chain_rows(
     values: list[ca.SX],
     rows: list[Row],
 ) -> None:
-    """The end is where integration leads."""
+    """Add rows: the end is the result of the integration."""
     x_end, n = columns[-1], layout.n
     values += [x_end[layout.q] - own.position[-1], (x_end[layout.v] - own.speed[-1]) * h]
     rows += [("position", 0.0, 0.0)] * n + [("velocity", 0.0, 0.0)] * n
@@ -124,7 +124,7 @@ def _chain_rows(
 
 
 def _end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points) -> ca.SX:
-    """The end's column as integration gives it, what is free there as it is, zeros elsewhere."""
+    """Return the end's column: motion from the integration, what is free there as it is, zeros elsewhere."""
     x_end = ca.SX.zeros(layout.width)
     x_end[layout.motion] = columns[-1][layout.motion]
     x_end[layout.tensions] = columns[-1][layout.tensions]
@@ -144,7 +144,7 @@ def _inner_rows(
     values: list[ca.SX],
     rows: list[Row],
 ) -> None:
-    """Inner points lie on the polynomials and share what all share; where the acceleration jumps, it starts as told."""
+    """Add rows: inner points lie on the polynomials, with equal shared unknowns; so does the start if a jumps there."""
     n = layout.n
     for share, column in zip(scenario.scheme.inner, columns[1:-1], strict=True):
         values += [column[layout.q] - bernstein.value(own.position, share)]
@@ -158,10 +158,10 @@ def _inner_rows(
 
 
 def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points, a_end: ca.SX) -> ca.SX:
-    """Mean square of the jerk in units of the objective's.
+    """Return the mean square of the jerk in units of the objective's.
 
-    A jump counts as if it took an interval where there is no other jerk, else a small part of one: or the motion would
-    jump by half and climb by half, and pay half.
+    A jump is spread over an interval where there is no other jerk, else over a small part of one: otherwise a motion
+    would jump by half and climb by half, at half the cost.
     """
     scale = scenario.task.objective.jerk
     cost, took = ca.SX(0), 1.0
@@ -183,7 +183,7 @@ def _rate_rows(
     values: list[ca.SX],
     rows: list[Row],
 ) -> ca.SX | float:
-    """Tension rates from point to point: their limit, and what they cost."""
+    """Add rows that limit tension rates from point to point; return what the rates cost."""
     objective, most, robot = scenario.task.objective, scenario.task.limits.tension_rate, scenario.robot
     if objective.tension_rate is None and most is None:
         return 0.0
@@ -229,7 +229,7 @@ def _tube_rows(scenario: Scenario, position: list[ca.SX], values: list[ca.SX], r
 def _total(
     scenario: Scenario, h: ca.SX | float, motion: list[list[ca.SX]], offset: list[ca.SX], jerk: list[ca.SX] | None
 ) -> Points:
-    """Points of a carrier's motion, reference and all; the reference is taken as a polynomial of the same degree."""
+    """Return the points of a carrier's whole motion, its reference taken as a polynomial of the same degree."""
     pose, velocity, total = zip(*motion, strict=True)
     slopes = None
     if jerk is not None:

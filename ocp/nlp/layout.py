@@ -1,4 +1,4 @@
-"""Which unknowns a node of the transcription has, and where they are in its column."""
+"""Define the unknowns of a node of the transcription and their places in its column."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ DURATION, MARGIN = "duration", "margin"
 
 @dataclass(frozen=True)
 class Layout:
-    """A point's column.
+    """The column of a point.
 
-    That is q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), missing wrenches (6 each or
-    0), one slack a soft limit, `carried`. A smooth scheme's column has jerk and snap after a, times the first and
-    second power of an interval's length at the scenario's duration: so they are of the size of a.
+    It has q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), missing wrenches (6 each or
+    0), one slack for each soft limit, and `carried`. A smooth scheme's column has jerk and snap after a, times the
+    first and second power of an interval's length at the scenario's duration: so they are of the size of a.
 
-    What all nodes share, the duration and the margin, each node carries a copy of, equal to the next one's: so the
-    program stays banded.
+    Each node carries a copy of what all nodes share, the duration and the margin, equal to the copy of the next node,
+    so that the program stays banded.
     """
 
     n: int
@@ -33,7 +33,7 @@ class Layout:
 
     @staticmethod
     def of(scenario: Scenario, elastic: bool) -> Layout:
-        """The layout that a scenario needs."""
+        """Return the layout that a scenario needs."""
         carried = [DURATION] * (scenario.duration_range is not None)
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
         soft = tuple(scenario.task.limits.soft)
@@ -42,72 +42,72 @@ class Layout:
 
     @property
     def q(self) -> slice:
-        """Free coordinates."""
+        """Return the place of the free coordinates."""
         return slice(0, self.n)
 
     @property
     def v(self) -> slice:
-        """Their rates."""
+        """Return the place of their rates."""
         return slice(self.n, 2 * self.n)
 
     @property
     def a(self) -> slice:
-        """Their accelerations."""
+        """Return the place of their accelerations."""
         return slice(2 * self.n, 3 * self.n)
 
     @property
     def jerk(self) -> slice:
-        """Of a smooth scheme; else empty."""
+        """Return the place of the jerk, which is empty unless the scheme is smooth."""
         return slice(3 * self.n, max(self.derivatives - 1, 3) * self.n)
 
     @property
     def snap(self) -> slice:
-        """Of a smooth scheme; else empty."""
+        """Return the place of the snap, which is empty unless the scheme is smooth."""
         return slice(self.jerk.stop, self.motion.stop)
 
     @property
     def motion(self) -> slice:
-        """All of these."""
+        """Return the place of the coordinates and all their derivatives."""
         return slice(0, self.derivatives * self.n)
 
     @property
     def tensions(self) -> slice:
-        """In units of the robot's force."""
+        """Return the place of the tensions, in units of the robot's force."""
         return slice(self.motion.stop, self.motion.stop + self.m)
 
     @property
     def wind_tensions(self) -> slice:
-        """Those in the decisive winds of a box, one wind after another, likewise."""
+        """Return the place of the tensions in the decisive winds of a box, one wind after another, in the same unit."""
         start = self.tensions.stop
         return slice(start, start + self.winds * self.m)
 
     @property
     def missing(self) -> slice:
-        """Missing wrenches, of an elastic program: of the planned tensions, then of those in each decisive wind."""
+        """Return the place of an elastic program's missing wrenches: as planned, then in each decisive wind."""
         start = self.wind_tensions.stop
         return slice(start, start + 6 * (1 + self.winds) * self.elastic)
 
     @property
     def slacks(self) -> slice:
-        """How far soft limits are passed, in their scale."""
+        """Return the place of the excesses over soft limits, in their scale."""
         start = self.missing.stop
         return slice(start, start + len(self.soft))
 
     def slack_of(self, limit: str) -> int | None:
-        """Place of a soft limit's slack; None if the limit is hard."""
+        """Return the place of a soft limit's slack; None if the limit is hard."""
         return self.slacks.start + self.soft.index(limit) if limit in self.soft else None
 
     @property
     def shared(self) -> slice:
-        """What all nodes share."""
+        """Return the place of what all nodes share."""
         start = self.slacks.stop
         return slice(start, start + len(self.carried))
 
     def at(self, name: str) -> int | None:
-        """Place of a shared unknown; None if there is none."""
+        """Return the place of a shared unknown; None if there is none."""
         return self.shared.start + self.carried.index(name) if name in self.carried else None
 
     @property
     def width(self) -> int:
-        """How many unknowns a node has."""
+        """Return how many unknowns a node has."""
         return self.shared.stop

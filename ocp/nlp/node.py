@@ -1,4 +1,4 @@
-"""What a program asks of one node: the balance A t = w, the limits that hold at an instant, and what it costs."""
+"""Write the rows and the cost of one node: the balance A t = w, and the limits that hold at an instant."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the p
 
 
 def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Function, list[Row]]:
-    """Cost and constraints of one node: the balance A t = w and the limits that hold at an instant."""
+    """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant."""
     robot, dynamics = scenario.robot, scenario.dynamics
     x = ca.SX.sym("x", layout.width)
     parameters = ca.SX.sym("p", 18 * (1 + len(robot.carriers)))
@@ -72,7 +72,7 @@ def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Fu
 
 
 def _in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.SX]]) -> list[ca.SX]:
-    """The platform's pose, velocity and acceleration in {G}."""
+    """Return the platform's pose, velocity and acceleration in {G}."""
     if not scenario.relative:
         return platform
     return list(scenario.dynamics.relative.motion_in_world(*platform, *carriers[0]))
@@ -81,7 +81,7 @@ def _in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.
 def _in_decisive_winds(
     scenario: Scenario, layout: Layout, x: ca.SX, platform: list[ca.SX], carriers: list[list[ca.SX]]
 ) -> list[tuple[ca.SX, ca.SX]]:
-    """For each decisive wind of a box its tensions (m, 1) [N], and by how much more it pushes than the box's middle."""
+    """Return the tensions (m, 1) [N] in each decisive wind of a box, and its wrench less that of the box's middle."""
     box, robot = scenario.wind_box, scenario.robot
     if box is None:
         return []
@@ -108,7 +108,7 @@ def _limit_rows(
     values: list[ca.SX],
     rows: list[Row],
 ) -> ca.SX | float:
-    """Add the limits of `limits`, in units of their scale; return what passing the soft ones costs."""
+    """Add the limits of `limits`, in units of their scale; return what exceeding the soft ones costs."""
     limits = named_limits(scenario)
     cost, at, weight = 0.0, 0, OTHER_COSTS if mesh.elastic else 1.0
     if (place := layout.slack_of("tension_rate")) is not None:  # its rows are of two nodes (`interval`)

@@ -1,14 +1,14 @@
-"""The nonlinear program of a scenario: inverse dynamics at the points of a scheme, exact integrators between them.
+"""Build the nonlinear program of a scenario: inverse dynamics at the points of a scheme, integrated between them.
 
 Unknown at each point k are the free coordinates q_k, their rates v_k and accelerations a_k, and the tensions t_k; the
 duration T too where the task leaves it open:
 
     min   mean over time of sum |quantity / what costs one|^2  (+ T / time - margin)   (`task.Objective`)
-    s.t.  A(q_k) t_k = w(q_k, v_k, a_k)                                 at every point that the scheme asks
+    s.t.  A(q_k) t_k = w(q_k, v_k, a_k)                                 at every point that the scheme selects
           (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
           t_min + margin <= t_k <= t_max - margin
           the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
-          the limits of `limits`                                        at every point that the scheme asks
+          the limits of `limits`                                        at every point that the scheme selects
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
 
 What holds at one point is in `node`, what binds an interval's in `interval`. Tensions are in units of
@@ -46,9 +46,9 @@ class Program:
     lower, upper, lower_g, upper_g
         Bounds of x and g.
     order
-        Which entry of the points' columns, one after the other, each unknown is.
+        The place of each unknown among the entries of the points' columns, one column after the other.
     stages
-        Sizes of its stages; None where it is not in the order of stages.
+        Sizes of its stages; None if it is not ordered by stages.
     """
 
     scenario: Scenario
@@ -64,18 +64,18 @@ class Program:
     stages: Stages | None
 
     def columns(self, x: np.ndarray) -> np.ndarray:
-        """The unknowns of each point, one row a point; zero what it does not have."""
+        """Return the unknowns of each point, one row per point, zero where a point does not have one."""
         found = np.zeros(len(self.shares) * self.layout.width)
         found[self.order] = x
         return found.reshape(-1, self.layout.width)
 
     def duration(self, x: np.ndarray) -> float:
-        """The duration that a solution x has [s]."""
+        """Return the duration of a solution x [s]."""
         place = self.layout.at(DURATION)
         return self.scenario.duration if place is None else float(self.columns(x)[0, place] * self.scenario.duration)
 
     def read(self, x: np.ndarray) -> Deviation:
-        """The deviation that a solution x stands for."""
+        """Return the deviation of a solution x."""
         layout, columns, scheme = self.layout, self.columns(x), self.scenario.scheme
         asked = scheme.balance_points(self.mesh.steps)
         tensions = columns[asked, layout.tensions] * self.scenario.robot.force_scale
@@ -87,22 +87,22 @@ class Program:
 
     @property
     def _step(self) -> float:
-        """Length of an interval at the scenario's duration [s]."""
+        """Return the length of an interval at the scenario's duration [s]."""
         return self.scenario.duration / self.mesh.steps
 
     def missing(self, x: np.ndarray) -> float:
-        """Largest missing wrench at a point of a solution x, in any wind [N]."""
+        """Return the largest missing wrench at a point of a solution x, in any wind [N]."""
         wrenches = self.columns(x)[:, self.layout.missing].reshape(-1, 6)
         return float(np.linalg.norm(wrenches, axis=1).max(initial=0.0) * self.scenario.robot.force_scale)
 
     def violation(self, x: np.ndarray, g: np.ndarray) -> float:
-        """How far x and its constraints g are beyond their bounds at most; infinite if they are no numbers."""
+        """Return the largest violation of the bounds by x and its constraints g; infinite if they are not numbers."""
         beyond = [self.lower - x, x - self.upper, self.lower_g - g, g - self.upper_g]
         worst = float(np.concatenate(beyond).max())
         return worst if np.isfinite(worst) else np.inf
 
     def pack(self, deviation: Deviation) -> np.ndarray:
-        """The x that a deviation at the points stands for, slacks zero."""
+        """Return the x of a deviation at the points, with zero slacks."""
         layout = self.layout
         columns = np.zeros((len(self.shares), layout.width))
         for part, values in ((layout.q, deviation.q), (layout.v, deviation.v), (layout.a, deviation.a)):
@@ -120,7 +120,7 @@ class Program:
 
 
 def build(scenario: Scenario, mesh: Mesh) -> Program:
-    """The nonlinear program of `scenario` on `mesh`."""
+    """Build the nonlinear program of `scenario` on `mesh`."""
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
     shares, asked = scheme.shares(steps), scheme.balance_points(steps)
     times = shares * scenario.duration
@@ -166,18 +166,18 @@ def _picked(X: ca.MX, points: np.ndarray) -> ca.MX:
 
 
 def _groups(values: ca.MX | ca.DM, size: int) -> ca.MX | ca.DM:
-    """Columns of each interval but its end's, one below the other."""
+    """Return the columns of each interval but its end's, one below the other."""
     return ca.reshape(values[:, :-1], values.shape[0] * size, -1)
 
 
 def _parameters(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
-    """Reference motions at the nodes, one column a node: platform, then each carrier; pose, velocity, acceleration."""
+    """Return the reference motions, one column per node: platform, then carriers; pose, velocity, acceleration."""
     platform, carriers = scenario.references(nodes)
     return np.hstack([part for motion in (platform, *carriers) for part in motion]).T
 
 
 def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
-    """What the duration costs and the margin earns."""
+    """Return the cost of the duration less the value of the margin."""
     objective, cost = scenario.task.objective, 0.0
     if (place := layout.at(DURATION)) is not None and objective.time is not None:
         cost += x[place] * scenario.duration / objective.time
@@ -187,7 +187,7 @@ def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
 
 
 def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
-    """What is asked once: periodic ends, waypoints, and how the acceleration starts and ends."""
+    """Return the rows that occur once: periodic ends, waypoints, start and end of the acceleration."""
     found = _waypoint_rows(scenario, layout, X, X_end, steps)
     carriers: list[int] = []
     if getattr(scenario.task.base, "ends", None) == "periodic":
@@ -210,7 +210,7 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, ste
 
 
 def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int, k: int) -> Points:
-    """Of interval k."""
+    """Return the Bernstein points of interval k."""
     size = scenario.scheme.size
     given = scenario.duration / steps
     columns = [*(X[:, k * size + i] for i in range(size)), X_end[:, k]]
@@ -218,7 +218,7 @@ def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, ste
 
 
 def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
-    """No deviation of the platform at the waypoints: the polynomial of the interval that each of them lies in."""
+    """Return rows that exclude a deviation at the waypoints, by the polynomial of the interval of each."""
     path = scenario.task.path
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
@@ -233,7 +233,7 @@ def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, s
 
 
 def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the unknowns themselves: tensions, attitude in the tube, what is fixed at the ends, what is shared."""
+    """Return the bounds of the unknowns: of tensions, attitude in the tube, fixed ends, and what is shared."""
     n = layout.n
     lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
     low, high = scenario.bounds()

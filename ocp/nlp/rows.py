@@ -1,4 +1,4 @@
-"""What the parts of a program share: how finely it looks, its rows, and which motions its unknowns stand for."""
+"""Define what the parts of a program share: its mesh, its rows, and the motions that its unknowns stand for."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
 
 @dataclass(frozen=True)
 class Mesh:
-    """How finely and how carefully a program looks at its scenario.
+    """The number of intervals of a program, and its distance from the limits.
 
     Attributes
     ----------
@@ -28,9 +28,10 @@ class Mesh:
     reserve
         Further distance from the tension limits [N], for what happens between the nodes.
     shrink
-        Share by which the carriers' speed and acceleration limits, and those of the task, are lowered, likewise.
+        Share by which the carriers' speed and acceleration limits, and those of the task, are reduced, for the same
+        reason.
     elastic
-        Let A t = w + s with a high cost on the slack s, so that there always is a solution.
+        Whether A t = w + s with a high cost on the slack s, so that there is always a solution.
     """
 
     steps: int
@@ -40,13 +41,13 @@ class Mesh:
 
 
 def stretch(layout: Layout, x: Values) -> Values:
-    """The duration of column x, relative to that of the references."""
+    """Return the duration of column x, relative to that of the references."""
     place = layout.at(DURATION)
     return 1.0 if place is None else x[place]
 
 
 def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
-    """Options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
+    """Return the options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
 
     CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
     long.
@@ -55,7 +56,7 @@ def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
 
 
 def spread(scenario: Scenario, owner: int | None) -> ca.DM:
-    """From free coordinates to the six of the platform (None) or of a carrier, (6, n)."""
+    """Return the matrix (6, n) from free coordinates to the six of the platform (None) or of a carrier."""
     chosen = ca.DM(6, scenario.count)
     for column, (whose, coordinate) in enumerate(scenario.owners()):
         if whose == owner:
@@ -64,15 +65,15 @@ def spread(scenario: Scenario, owner: int | None) -> ca.DM:
 
 
 def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> list[list[ca.SX]]:
-    """Platform and carriers as symbols, [pose, velocity, acceleration] each: reference plus deviation."""
+    """Return platform and carriers as symbols, [pose, velocity, acceleration] each: reference plus deviation."""
     owners: list[int | None] = [None, *range(len(scenario.robot.carriers))]
     scale = stretch(layout, x)
-    found = []
+    each = []
     for position, owner in enumerate(owners):
         chosen = spread(scenario, owner)
         reference = ca.vertsplit(parameters[18 * position : 18 * (position + 1)], 6)
         deviation = (x[layout.q], x[layout.v], x[layout.a])
-        found.append(
+        each.append(
             [at / scale**k + chosen @ off for k, (at, off) in enumerate(zip(reference, deviation, strict=True))]
         )
-    return found
+    return each

@@ -1,4 +1,4 @@
-"""IPOPT or fatrop for a program: from a guess, a motion or its own last solution, and what came of it."""
+"""Run IPOPT or fatrop on a program, from a guess, a motion or the last solution: `Solver`."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ Progress = Callable[[int, float, float], None]  # iteration, objective, infeasib
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the solver came back with."""
+    """The result of a run of the solver."""
 
     deviation: Deviation
     duration: float  # [s]
-    success: bool  # whether all constraints are met; the message tells whether it is an optimum too
+    success: bool  # whether all constraints are met; the message states whether it is an optimum too
     message: str
     iterations: int
     slack: float  # largest missing wrench at a node, in any wind [N], zero in the rigid program
@@ -86,7 +86,7 @@ class Solver:
         self._last: dict[str, ca.DM] | None = None
 
     def prepare(self, guess: Deviation | None, coarser: bool = False) -> ca.Function:
-        """The solver for a run from `guess`, made when it is first asked for."""
+        """Return the solver for a run from `guess`, made at the first call."""
         own = "guess" if self._last is None else "solution"
         start = own if guess is None else "coarser" if coarser else "motion"
         if start not in self._solvers:
@@ -128,10 +128,10 @@ class Solver:
         coarser: bool = False,
         seconds: float = np.inf,
     ) -> Outcome:
-        """Solve from `guess`; None: from the last solution and its multipliers, or else from a guess of our own.
+        """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
-        with the best that it has; fatrop does not. That nothing is found is told, not raised.
+        with the best that it has; fatrop does not. A run without a solution is a result, not an error.
 
         Raises
         ------
@@ -183,14 +183,14 @@ class Solver:
         )
 
     def _abandon(self) -> None:
-        """Stop the run that nobody waits for; what its thread still uses is not used again."""
+        """Stop the run for which nobody waits; objects that its thread still uses are not used again."""
         self._watch.abandoned = True
         self._watch = _Watch(self.program)
         self._solvers = {}
 
 
 def _checked(call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-    """Call CasADi; what it raises becomes a SolverError of one line."""
+    """Call CasADi, and turn its exceptions into a SolverError of one line."""
     try:
         return call(*arguments, **named)
     except RuntimeError as error:
@@ -213,7 +213,7 @@ class _Watch(ca.Callback):
         self.construct("watch", {})
 
     def begin(self, progress: Progress | None, seconds: float = np.inf) -> None:
-        """Start to count anew."""
+        """Start to count again from zero."""
         self._progress = progress
         self.errands: Errands = SimpleQueue()  # calls of `progress`, for the thread that waits
         self._deadline = time.perf_counter() + seconds
@@ -231,7 +231,7 @@ class _Watch(ca.Callback):
 
     @property
     def settled(self) -> bool:
-        """Whether `best` is as good as it gets."""
+        """Return whether `best` no longer improves."""
         return len(self.best) > 0 and self._iteration - self._since > PATIENCE
 
     def infeasibility(self, g: np.ndarray) -> float:
@@ -269,7 +269,7 @@ class _Watch(ca.Callback):
         return [int(self.abandoned or self.settled or self.late)]
 
     def _better(self) -> float:
-        """Objective that makes it worth to go on."""
+        """Return the objective below which it is worth going on."""
         return self._mark - BETTER * abs(self._mark) if np.isfinite(self._mark) else np.inf
 
     def _keep(self, x: np.ndarray, g: np.ndarray, objective: float) -> None:

@@ -1,9 +1,9 @@
-"""In which order a program's unknowns and rows stand: all at once for IPOPT, stage by stage for fatrop.
+"""Order a program's unknowns and rows: all at once for IPOPT, stage by stage for fatrop.
 
 fatrop factorises along the time: each stage k has states x_k and controls u_k, its dynamics x_{k+1} = F(x_k, u_k), and
 rows of x_k and u_k alone. The state of a node is its motion and what all nodes share; its tensions too, if their rates
 count. Controls are the rest of its column, the columns of the interval's inner points, and what is free of the next
-state (its acceleration, or its snap). What an interval's rows say of its end they say of F.
+state (its acceleration, or its snap). Rows of an interval that contain its end contain F in its place.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Block", "Stages", "Unknowns", "all_at_once", "put_in_order", "stage_
 
 
 class Block(NamedTuple):
-    """Rows of the same kind: one column a stage."""
+    """Rows of the same kind, one column per stage."""
 
     values: ca.MX  # (r, k)
     rows: list[Row]  # r
@@ -44,15 +44,15 @@ class Unknowns(NamedTuple):
     columns
         (width, points), zero where a point has no such unknown.
     ends
-        (width, N), the column at the end of each interval, as the interval's rows see it.
+        (width, N), the column at the end of each interval, as the interval's rows contain it.
     order
-        Which entry of the columns, one after the other, each unknown is.
+        The place of each unknown among the entries of the columns, one column after the other.
     copies
-        Which unknowns are such an entry once more, as the control of the stage before.
+        The unknowns that repeat such an entry, as controls of the stage before.
     gaps
-        x_{k+1} - F(x_k, u_k), (states, N); None where the interval's own rows say so.
+        x_{k+1} - F(x_k, u_k), (states, N); None where the interval's own rows contain it.
     controls
-        How many each stage has; empty where there are no stages.
+        The number of controls of each stage; empty where there are no stages.
     """
 
     x: ca.MX
@@ -65,7 +65,7 @@ class Unknowns(NamedTuple):
 
 
 def _exists(scenario: Scenario, layout: Layout, steps: int) -> np.ndarray:
-    """(points, width): where the balance is not asked there are neither tensions nor slacks."""
+    """Return which entries of the columns exist, (points, width): tensions and slacks only where there is a balance."""
     scheme = scenario.scheme
     there = np.zeros((steps * scheme.size + 1, layout.width), dtype=bool)
     there[scheme.balance_points(steps)] = True
@@ -74,7 +74,7 @@ def _exists(scenario: Scenario, layout: Layout, steps: int) -> np.ndarray:
 
 
 def _gathered(x: ca.MX, where: np.ndarray) -> ca.MX:
-    """A matrix of entries of x; zero where its place is -1. `where` has a row for each of its columns."""
+    """Return a matrix of entries of x, zero for a place of -1; each row of `where` has the places of a column."""
     flat = where.ravel()
     if np.array_equal(flat, np.arange(x.numel())):
         return ca.reshape(x, where.shape[1], -1)
@@ -83,7 +83,7 @@ def _gathered(x: ca.MX, where: np.ndarray) -> ca.MX:
 
 
 def all_at_once(scenario: Scenario, layout: Layout, steps: int, flow: ca.Function) -> Unknowns:
-    """Point after point, each unknown once."""
+    """Return the unknowns point after point, each of them once."""
     there = _exists(scenario, layout, steps)
     order = np.flatnonzero(there)
     where = np.full(there.size, -1)
@@ -95,7 +95,7 @@ def all_at_once(scenario: Scenario, layout: Layout, steps: int, flow: ca.Functio
 
 
 def stage_by_stage(scenario: Scenario, layout: Layout, steps: int, flow: ca.Function) -> Unknowns:
-    """State and controls of one stage after the other's."""
+    """Return the unknowns stage after stage: the state, then the controls."""
     there, width, size = _exists(scenario, layout, steps), layout.width, scenario.scheme.size
     state, free = _parts(scenario, layout)
     order: list[int] = []
@@ -129,7 +129,7 @@ def stage_by_stage(scenario: Scenario, layout: Layout, steps: int, flow: ca.Func
 
 
 def _parts(scenario: Scenario, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    """Which entries of a node's column are its state, and which of those the stage before chooses."""
+    """Return which entries of a node's column are its state, and which of those the stage before chooses."""
     at = np.arange(layout.width)
     rated = scenario.task.objective.tension_rate is not None or scenario.task.limits.tension_rate is not None
     tensions = at[layout.tensions] if rated else at[:0]
@@ -138,7 +138,7 @@ def _parts(scenario: Scenario, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
 
 
 def put_in_order(unknowns: Unknowns, blocks: list[Block]) -> tuple[ca.MX, list[Row], Stages | None]:
-    """All rows as one column with their bounds; those of a program in stages stage by stage, its gaps first."""
+    """Return all rows as one column with their bounds; in a program with stages stage by stage, gaps first."""
     rows = [row for block in blocks for row in block.rows * len(block.stages)]
     values = ca.vertcat(*(ca.vec(block.values) for block in blocks))
     if unknowns.gaps is None:

@@ -1,4 +1,4 @@
-"""`wait_for`: long work in a thread of its own, so that Ctrl-C ends the wait for it at once.
+"""Do long work in a thread of its own, so that Ctrl-C ends the wait for it at once: `wait_for`.
 
 CasADi and the solvers compute for seconds without returning to Python, and an interrupt that arrives in one of their
 callbacks becomes a warning and a normal return. Python delivers signals to the main thread alone, so the work is done
@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, TypeVar
 
 __all__ = ["Errands", "wait_for"]
 
-POLL = 0.1  # [s]: on Windows an interrupt is raised only between two looks
+POLL = 0.1  # [s]: on Windows an interrupt is raised only between two checks
 Result = TypeVar("Result")
 Errands: TypeAlias = "SimpleQueue[Callable[[], Any] | None]"
 
@@ -32,7 +32,7 @@ def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Resu
     Raises
     ------
     KeyboardInterrupt
-        If an interrupt arrives meanwhile; and what `work` or an errand raises.
+        If an interrupt arrives meanwhile. Exceptions of `work` or of an errand are raised as well.
     """
     queue: Errands = SimpleQueue() if errands is None else errands
     results: list[Result] = []
