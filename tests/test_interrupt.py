@@ -64,7 +64,7 @@ def test_an_interrupt_from_outside_ends_plan(folder, moment):
     assert any(line == "interrupted\n" for line in lines), process.stderr.read()
     assert time.perf_counter() - sent < PROMPT
     assert list(lines) == ["went on\n"]
-    # What still computed ends. If the interrupt hit the making of a dataclass, Python dies of it at its end all the same.
+    # What still computed ends. If the interrupt hit the making of a dataclass, Python still dies of it in the end.
     assert process.wait(60) in (0, -signal.SIGINT)
     assert process.stderr.read() == ""
 
