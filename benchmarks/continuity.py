@@ -61,7 +61,7 @@ class Motion:
         self.directions = rng.normal(size=(2, 3, m))
         self.levels = rng.uniform(5, 50, m), rng.uniform(-4, 4, m)
         self.phases = rng.uniform(0, 2 * np.pi, m)
-        # The direction to the boundary along which no cable changes sides on the way: the corner then moves smoothly.
+        # The direction to the boundary along which no cable changes sides: the corner then moves smoothly.
         times = np.linspace(0, 2, 41)
         self.rate, best = (1.0 if kind == "inside" else 0.3), 0.0
         matrices = np.array([self.matrix(moment) for moment in times])  # (times, 6, m)
@@ -210,8 +210,8 @@ def _taken(method: str, motions: Sequence[Motion], seeds: range, options: dict[s
         left = jump(tensions)
         if left > worst:
             worst, at = left, seed
-    inaccurate, found = statuses["inaccurate"], statuses["optimal"]
-    unanswered = statuses.total() - found - inaccurate
+    inaccurate, solved = statuses["inaccurate"], statuses["optimal"]
+    unanswered = statuses.total() - solved - inaccurate
     return Result(len(seeds), worst, at, inaccurate, unanswered, time.perf_counter() - start)
 
 
@@ -233,17 +233,17 @@ def main() -> None:
     results: list[tuple[str, Result]] = []
     for name, method in methods().items():
         if method.continuous:
-            results.append(_told(f"{name}: tensions", continuity(name, seeds)))
+            results.append(_report(f"{name}: tensions", continuity(name, seeds)))
         if method.always_answers:
-            results.append(_told(f"{name}: out of the set and back", leaving(name, seeds)))
-            results.append(_told(f"{name}: the same with rho = 1", leaving(name, seeds, rho=1.0)))
+            results.append(_report(f"{name}: out of the set and back", leaving(name, seeds)))
+            results.append(_report(f"{name}: the same with rho = 1", leaving(name, seeds, rho=1.0)))
         if name in SMOOTH:
-            results.append(_told(f"{name}: derivative", smoothness(name, seeds, **SMOOTH[name])))
+            results.append(_report(f"{name}: derivative", smoothness(name, seeds, **SMOOTH[name])))
     print(f"{sum(result.seconds for _, result in results):.0f} s")
     sys.exit(any(result.worst > JUMP or result.unanswered for _, result in results))
 
 
-def _told(name: str, result: Result) -> tuple[str, Result]:
+def _report(name: str, result: Result) -> tuple[str, Result]:
     parts = [f"{name}: {result.motions} motions, {result.worst:.1e} of a change left (seed {result.worst_seed})"]
     parts += [f"{result.inaccurate} instants inaccurate"] * bool(result.inaccurate)
     parts += [f"{result.unanswered} without an answer"] * bool(result.unanswered)

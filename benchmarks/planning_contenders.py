@@ -264,7 +264,7 @@ def rockit(steps: int) -> Run:
     from rockit import MultipleShooting, Ocp
 
     def write(problem: _Shooting, ipopt: dict[str, Any]) -> Solve:
-        make: Any = Ocp  # its types say that T is a whole number and that a state may be None
+        make: Any = Ocp  # by its types T is a whole number and a state may be None
         ocp = make(T=problem.seconds)
         x, u = ocp.state(18), ocp.control(9)
         place = ocp.parameter(6, grid="control+")

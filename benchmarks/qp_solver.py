@@ -123,8 +123,8 @@ def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upp
     """Return the multipliers of the equations and the limits at an optimum x.
 
     The variables between their limits determine y by least squares, as long as the signs that it gives at the limits
-    are right. At a degenerate vertex they need not be, since too few variables are between: then y and z_box are found
-    together, under the signs that the limits allow.
+    are right. At a degenerate vertex they need not be, since too few variables are between: then y and z_box
+    are computed together, under the signs that the limits allow.
 
     Parameters
     ----------
@@ -151,12 +151,12 @@ def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upp
         gap = gradient @ x + b @ y + z[z < 0] @ lower[z < 0] + z[z > 0] @ upper[z > 0]
         return max(float(np.abs(gradient + y @ A + z).max()), abs(float(gap)))
 
-    found: list[tuple[float, Array, Array]] = []
+    candidates: list[tuple[float, Array, Array]] = []
     for cut in _CUTS:
         y = np.asarray(np.linalg.lstsq(A[:, inside].T, -gradient[inside], rcond=cut)[0], dtype=np.float64)
         z = signed(-(gradient + y @ A))
-        found.append((error(y, z), y, z))
-        if found[-1][0] <= _GOOD:
+        candidates.append((error(y, z), y, z))
+        if candidates[-1][0] <= _GOOD:
             return y, z
     rows = A.shape[0]
     M = np.hstack([A.T, np.eye(x.size)[:, ~inside]])
@@ -166,8 +166,8 @@ def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upp
     both, _ = box_least_squares(M, -gradient, low, high)
     y = both[:rows]
     z = signed(-(gradient + y @ A))
-    found.append((error(y, z), y, z))
-    _, y, z = min(found, key=lambda candidate: candidate[0])
+    candidates.append((error(y, z), y, z))
+    _, y, z = min(candidates, key=lambda candidate: candidate[0])
     return y, z
 
 

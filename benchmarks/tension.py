@@ -164,11 +164,11 @@ class _Runner:
 
     def _batch(self, call: Callable[[], tuple[Array, NDArray[np.bool_]]]) -> tuple[list[float], list[Array | None]]:
         start = time.perf_counter_ns()
-        tensions, found = call()
+        tensions, solved = call()
         elapsed = time.perf_counter_ns() - start
         self._account(elapsed)
         count = len(self.task.problems)
-        answers = [x if ok else None for x, ok in zip(tensions[:count], found[:count], strict=True)]
+        answers = [x if ok else None for x, ok in zip(tensions[:count], solved[:count], strict=True)]
         return [elapsed / 1e3 / len(tensions)], answers
 
     def _singles(self, call: Callable[[int], Array | None]) -> tuple[list[float], list[Array | None]]:

@@ -78,12 +78,12 @@ class Contender(NamedTuple):
 def contenders() -> list[Contender]:
     """Return every contender that is installed, the reference first."""
     required = f"{EPS:g} absolute"
-    found = [Contender(REFERENCE, required, _daqp)]
+    entries = [Contender(REFERENCE, required, _daqp)]
     for name in methods():
-        found.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
-    found.append(Contender("towline kernel alone", "its own, 1e-9", _towline_kernel))
-    found.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
-    found.append(
+        entries.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
+    entries.append(Contender("towline kernel alone", "its own, 1e-9", _towline_kernel))
+    entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
+    entries.append(
         Contender("towline solve_batch, rho", "its own, 3e-14", _towline_soft_batch, batch=True, kinds=("soft",))
     )
     native = {
@@ -99,15 +99,15 @@ def contenders() -> list[Contender]:
     }
     for module, (name, prepare) in native.items():
         if find_spec(module) is not None:
-            found.append(Contender(name, "exact" if module == "quadprog" else required, prepare))
+            entries.append(Contender(name, "exact" if module == "quadprog" else required, prepare))
     if find_spec("moreau") is not None:
-        found.append(Contender("moreau batch", required, _moreau_batch, batch=True))
+        entries.append(Contender("moreau batch", required, _moreau_batch, batch=True))
     import qpsolvers
 
     for name in sorted(set(_QPSOLVERS) & set(qpsolvers.available_solvers)):
         tolerance = "exact" if name == "quadprog" else required
-        found.append(Contender(f"qpsolvers {name}", tolerance, _through_qpsolvers(name)))
-    return found
+        entries.append(Contender(f"qpsolvers {name}", tolerance, _through_qpsolvers(name)))
+    return entries
 
 
 def _stacked(qp: dict[str, Any]) -> tuple[Array, Array, Array]:

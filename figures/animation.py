@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
 
 SIZE = (7.0, 5.2)  # [inches]
-DPI = 100  # an even number of pixels each way, which MP4 asks for
+DPI = 100  # an even number of pixels in each direction, which MP4 requires
 MOST_FRAMES = 3000
 NO_TENSIONS = "#999999"
 
@@ -116,7 +116,7 @@ def timing(path: Path, duration: float, speed: float, fps: float) -> Timing:
 
 
 def draw(scene: Scene, when: Timing, path: Path) -> Path:
-    """Draw the film into `path`; see `film.write`."""
+    """Draw the film into `path` as `film.write` does."""
     stage = _Stage(scene, when)
     return film.write(path, stage.frame, len(when.times), when.rate)
 
@@ -186,25 +186,25 @@ class _Stage:
             named.append(ax.add_collection3d(reach))
         name_axes(ax)
         corners = [corner for box in scene.boxes for corner in box]
-        seen = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
-        equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in seen]))
+        shown = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
+        equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]))
         outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
         if outlines:
             keep_out = Line3DCollection(outlines, colors=style.colour(1), linewidths=0.8, label="keep out")
             named.append(ax.add_collection3d(keep_out, autolim=False))
         ax.legend(handles=named, fontsize="x-small", loc="upper left")
-        pace = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
-        ax.set_title(f"{scene.title} ({pace})", fontsize=10)
+        speed = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
+        ax.set_title(f"{scene.title} ({speed})", fontsize=10)
         bar = self._figure.colorbar(
             cm.ScalarMappable(self._norm, self._map), ax=ax, shrink=0.7, pad=0.12, label="tension [N]"
         )
-        told = []
+        lines = []
         for name, limits in (("t_min", scene.t_min), ("t_max", scene.t_max)):
             for limit in np.unique(limits):
                 if self._norm.vmin <= limit <= self._norm.vmax:
                     bar.ax.axhline(limit, color="#000000", linestyle="--", linewidth=1.4)
-                told.append(f"{name} = {limit:g} N")
-        bar.ax.set_title("\n".join(told) if len(told) <= 4 else "dashed: limits", fontsize=8)
+                lines.append(f"{name} = {limit:g} N")
+        bar.ax.set_title("\n".join(lines) if len(lines) <= 4 else "dashed: limits", fontsize=8)
 
     def _make_actors(self) -> None:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
@@ -246,12 +246,12 @@ class _Body:
 def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndarray]:
     """Return the outlines inside two corners (2, 3), because a wall may be much larger than the robot."""
     low, high = corners
-    found = []
+    inside = []
     for lines in places:
         points = np.vstack(lines)
         if (points.max(axis=0) > low).all() and (points.min(axis=0) < high).all():
-            found += [np.clip(line, low, high) for line in lines]
-    return found
+            inside += [np.clip(line, low, high) for line in lines]
+    return inside
 
 
 def _tension_colours(scene: Scene) -> tuple[Colormap, Normalize]:
@@ -266,6 +266,6 @@ def _tension_colours(scene: Scene) -> tuple[Colormap, Normalize]:
         near = max(most - least, 0.1 * most)
         low = low if least - low <= near else least
         high = high if high - most <= near else most
-    # The palest colours of the map cannot be seen as thin lines on white.
+    # The palest colours of the map are invisible as thin lines on white.
     visible = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 256)))
     return visible, Normalize(low, max(high, low + 1e-3))

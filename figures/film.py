@@ -101,19 +101,19 @@ def _write_mp4(path: Path, draw: Draw, count: int, rate: float, program: str) ->
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{rate:.6f}", "-i", "-"]
     coded = ["-an", "-vcodec", rcParams["animation.codec"], "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
     command = [program, "-loglevel", "error", "-y", *raw, *coded, "-f", "mp4", str(path)]
-    with tempfile.TemporaryFile() as told:
-        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=told) as process:
+    with tempfile.TemporaryFile() as messages:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=messages) as process:
             try:
                 assert process.stdin is not None
                 for k in range(count):
                     process.stdin.write(np.ascontiguousarray(draw(k)))
                 process.stdin.close()
             except BrokenPipeError:
-                pass  # its exit code and its last line say why
+                pass  # its exit code and its last line give the reason
             except BaseException:
                 process.kill()
                 raise
         if process.returncode:
-            told.seek(0)
-            lines = told.read().decode(errors="replace").strip().splitlines() or ["no message"]
+            messages.seek(0)
+            lines = messages.read().decode(errors="replace").strip().splitlines() or ["no message"]
             raise TowlineError(f"ffmpeg: stopped with exit code {process.returncode} ({lines[-1]})")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_CURVES = 8  # of a panel; of more the least and the largest at each time
-LEAST = 0.1  # of a limit: a panel is at least so high; a limit that is farther away than that height is told
+LEAST = 0.1  # of a limit: a panel is at least so high; a limit that is farther away than that height is only named
 
 
 class Limited(NamedTuple):
@@ -53,13 +53,13 @@ def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
 
 
 def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]) -> None:
-    values, told = quantity.values, []
+    values, notes = quantity.values, []
     if len(quantity.labels) > MOST_CURVES:
         least, most = values.min(axis=1), values.max(axis=1)
         ax.fill_between(times, least, most, color="#cccccc", linewidth=0)
         for edge in (least, most):
             ax.plot(times, edge, color="#000000", linewidth=1.0)
-        told.append(f"least and largest of {len(quantity.labels)}")
+        notes.append(f"least and largest of {len(quantity.labels)}")
     else:
         for label, curve in zip(quantity.labels, values.T, strict=True):
             index = looks.setdefault(label, len(looks))
@@ -72,18 +72,18 @@ def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]
     near = [bound for bound in bounds if low - size <= bound <= high + size]
     for bound in near:
         ax.axhline(bound, **style.LIMIT)
-    told.append(_in_words(quantity) + ("" if near or not bounds else " (far)"))
+    notes.append(_as_text(quantity) + ("" if near or not bounds else " (far)"))
     middle, shown = (low + high) / 2, [low, high, *near]
     ax.set_ylim(min(*shown, middle - size / 2) - 0.1 * size, max(*shown, middle + size / 2) + 0.1 * size)
     ax.margins(x=0.01)
-    ax.set_title(f"{quantity.name}: {', '.join(told)}", fontsize=9, loc="left")
+    ax.set_title(f"{quantity.name}: {', '.join(notes)}", fontsize=9, loc="left")
 
 
-def _in_words(quantity: Limited) -> str:
+def _as_text(quantity: Limited) -> str:
     low, high, unit = quantity.low, quantity.high, quantity.unit
     if low == high:
         return f"{low:g} {unit}"
     if low == -high:
-        return f"at most {high:g} {unit} either way"
-    told = [f"{word} {bound:g} {unit}" for word, bound in (("at least", low), ("at most", high)) if np.isfinite(bound)]
-    return ", ".join(told)
+        return f"at most {high:g} {unit} in both directions"
+    parts = [f"{word} {bound:g} {unit}" for word, bound in (("at least", low), ("at most", high)) if np.isfinite(bound)]
+    return ", ".join(parts)

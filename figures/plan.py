@@ -43,7 +43,7 @@ def path(trajectory: xr.Dataset) -> Figure:
 
 
 def tensions(trajectory: xr.Dataset) -> Figure:
-    """Draw the tension of every cable over time with its limits; see `tensions_side_by_side`."""
+    """Draw the tension of every cable over time with its limits, as `tensions_side_by_side` does."""
     return tensions_side_by_side({"": trajectory})
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito (2008), told apart with any kind of colour vision; black and yellow last.
+# Okabe and Ito (2008), distinct for every kind of colour vision; black and yellow last.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442"]
 LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 1.0}
 DPI = 160

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-VIEWS = ((0, 1), (0, 2), (1, 2))  # axes of {G} that are seen: from above, along y, along x
-MOST_POINTS = 20_000  # of a series in a panel: more are not seen, and files grow
+VIEWS = ((0, 1), (0, 2), (1, 2))  # axes of {G} in the pictures: from above, along y, along x
+MOST_POINTS = 20_000  # of a series in a panel: more are not visible, and files grow
 
 
 def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) -> Figure:
@@ -33,8 +33,8 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
         style.axes(canvas, f"{'xyz'[across]} [m]", f"{'xyz'[up]} [m]", (1, 3, column + 1))
         for column, (across, up) in enumerate(VIEWS)
     ]
-    for ax, seen in zip(panels, VIEWS, strict=True):
-        _panel(ax, {label: some[:, seen] for label, some in points.items()}, None if marks is None else marks[:, seen])
+    for ax, axes in zip(panels, VIEWS, strict=True):
+        _panel(ax, {label: some[:, axes] for label, some in points.items()}, None if marks is None else marks[:, axes])
     style.legend_below(canvas, panels[0])
     return canvas
 
@@ -69,28 +69,28 @@ def cross_sections(
     return canvas
 
 
-def reached(found: xr.Dataset) -> Figure:
+def reached(result: xr.Dataset) -> Figure:
     """Draw the accepted share of the samples along each line of sight: from above, from the front and the side.
 
     Axes along which the region has no extent are left out.
 
     Parameters
     ----------
-    found
+    result
         From `workspace.sample`, with the counts `tried` and `reached` (x, y, z) of its cells.
     """
-    thick = [name for name in ("x", "y", "z") if found.sizes[name] > 1]
+    thick = [name for name in ("x", "y", "z") if result.sizes[name] > 1]
     pairs = [(a, b) for a, b in (("x", "y"), ("x", "z"), ("y", "z")) if a in thick and b in thick]
     canvas = style.figure(width=0.9 + 2.2 * max(len(pairs), 1), height=2.8)
     if not pairs:
-        _reached_along(canvas, found, thick[0] if thick else "x")
+        _reached_along(canvas, result, thick[0] if thick else "x")
         return canvas
     panels = []
     for index, (across, up) in enumerate(pairs):
         behind = next(name for name in ("x", "y", "z") if name not in (across, up))
         ax = style.axes(canvas, f"{across} [m]", f"{up} [m]", (1, len(pairs), index + 1))
-        share = _share(found, (behind,)).transpose(up, across)
-        ax.pcolormesh(found[across], found[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
+        share = _share(result, (behind,)).transpose(up, across)
+        ax.pcolormesh(result[across], result[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
         ax.set_aspect("equal")
         panels.append(ax)
     canvas.colorbar(panels[0].collections[0], ax=panels, label="share accepted along the line of sight [-]")
@@ -100,7 +100,7 @@ def reached(found: xr.Dataset) -> Figure:
 def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) -> None:
     for index, (label, some) in enumerate(points.items()):
         shown = some[:: -(-len(some) // MOST_POINTS)] if len(some) else some
-        # Raster images inside: tens of thousands of shapes make files that no viewer likes.
+        # Raster images inside: tens of thousands of shapes make files that are slow to view.
         ax.plot(*shown.T, ".", color=style.colour(index), markersize=1.2, label=label or None, rasterized=True)
     if marks is not None:
         ax.plot(*marks.T, "^", color="#000000", markersize=4, label="anchors")
@@ -109,14 +109,14 @@ def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) ->
     ax.yaxis.set_major_locator(few_ticks())
 
 
-def _reached_along(canvas: Figure, found: xr.Dataset, along: str) -> None:
+def _reached_along(canvas: Figure, result: xr.Dataset, along: str) -> None:
     """Draw the accepted share over the axis of a region of one dimension."""
-    share = _share(found, tuple(name for name in ("x", "y", "z") if name != along))
-    style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(found[along], share, color=style.colour(0))
+    share = _share(result, tuple(name for name in ("x", "y", "z") if name != along))
+    style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(result[along], share, color=style.colour(0))
 
 
-def _share(found: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:
+def _share(result: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:
     """Return the accepted share, nan where nothing was tried."""
-    tried, reached = found["tried"].sum(over), found["reached"].sum(over)
-    # What nothing was accepted of stays white.
+    tried, reached = result["tried"].sum(over), result["reached"].sum(over)
+    # Lines without an accepted sample stay white.
     return (reached / tried.where(tried > 0)).where(reached > 0, np.nan)

@@ -39,7 +39,7 @@ class Mesh:
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m^3], by the divergence theorem."""
+        """Return the enclosed volume [m^3], by the divergence theorem."""
         a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
         return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6.0)
 

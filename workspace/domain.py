@@ -79,19 +79,19 @@ class Domain:
 
     @cached_property
     def varying(self) -> np.ndarray:
-        """Indices of the quantities that vary, (d,)."""
+        """Return the indices of the quantities that vary, (d,)."""
         thick = self.high - self.low > THINNEST
         thick[:3] &= not self.position_from_lengths
         return np.flatnonzero(thick)
 
     @property
     def extent(self) -> np.ndarray:
-        """Range of each quantity that varies, (d,) [m, rad]."""
+        """Return the range of each quantity that varies, (d,) [m, rad]."""
         return (self.high - self.low)[self.varying]
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest corner of the box of positions, (3,) [m]."""
+        """Return the lowest and the highest corner of the box of positions, (3,) [m]."""
         return self.low[:3], self.high[:3]
 
     @cached_property
@@ -106,13 +106,13 @@ class Domain:
 
     @property
     def measure(self) -> float:
-        """Volume of the box [m^3], or its area [m^2] or length [m] where it has no thickness along an axis."""
+        """Return the volume of the box [m^3], or its area [m^2] or length [m] if it has no thickness along an axis."""
         thick = self.high[:3] - self.low[:3]
         return float(np.prod(thick[thick > THINNEST]))
 
     @property
     def measure_unit(self) -> str:
-        """Unit of `measure`."""
+        """Return the unit of `measure`."""
         return {1: "m", 2: "m^2", 3: "m^3"}.get(int((self.high[:3] - self.low[:3] > THINNEST).sum()), "1")
 
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:

@@ -84,7 +84,7 @@ class JobResult:
     counts
         Samples tried and accepted in each cell of the box of positions, (2, *cells).
     samples
-        What is kept of each sample, (n, k), see `width_of`.
+        Numbers kept of each sample, (n, k), as `width_of` counts them.
     accepted
         Whether each kept sample was accepted, (n,).
     """

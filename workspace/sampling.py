@@ -45,17 +45,17 @@ class Sampler:
 
     @cached_property
     def cells(self) -> tuple[int, ...]:
-        """Cells of the grid along each quantity; empty for other methods."""
+        """Return the cells of the grid along each quantity; empty for other methods."""
         return cells_of(np.array(self.extent), self.requested) if self.method == "grid" else ()
 
     @property
     def samples(self) -> int:
-        """Number of samples."""
+        """Return the number of samples."""
         return int(np.prod(self.cells)) if self.cells else self.requested
 
     @property
     def chunks(self) -> int:
-        """Number of chunks."""
+        """Return the number of chunks."""
         return -(-self.samples // CHUNK)
 
     def size(self, chunk: int) -> int:

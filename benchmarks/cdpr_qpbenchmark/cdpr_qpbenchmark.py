@@ -33,12 +33,12 @@ class CdprQpbenchmark(qpbenchmark.ParquetTestSet):
 
     @property
     def title(self) -> str:
-        """Title of the report."""
+        """Return the title of the report."""
         return "Cable-driven parallel robots test set"
 
     @property
     def description(self) -> str:
-        """Description in the report."""
+        """Return the description in the report."""
         return (
             "Tension distribution of cable-driven parallel robots: least-norm tensions inside their limits that give "
             "a wrench. In units of the largest tension limit."
@@ -46,7 +46,7 @@ class CdprQpbenchmark(qpbenchmark.ParquetTestSet):
 
     @property
     def sparse_only(self) -> bool:
-        """The matrices are dense."""
+        """Return False: the matrices are dense."""
         return False
 
     def __init__(self) -> None:

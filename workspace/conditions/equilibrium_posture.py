@@ -37,8 +37,8 @@ class EquilibriumPosture(Condition):
     """At the position of the place, there is an attitude at which tensions inside the limits hold the platform at rest.
 
     The attitude of the place is ignored. Newton's method searches for one attitude, starting from level: where the
-    condition does not hold, none was found, which proves nothing. With the drive fixed-length the position is unknown
-    too, and starts at that of the place: `postures` returns the resulting pose.
+    condition does not hold, the search ended without one, which proves nothing. With the drive fixed-length the
+    position is unknown too, and starts at that of the place: `postures` returns the resulting pose.
     """
 
     kind: Literal["equilibrium-posture"] = "equilibrium-posture"

@@ -3,7 +3,7 @@
 Half of the placements tried are points of a scrambled Sobol sequence in the product of the boxes. The others are ever
 smaller steps from the best of them, each kept if the shortfall of the condition is smaller after it. Points and steps
 are the same for every place, so that the result for a place depends on nothing else. It is one-sided: a placement
-proves that the condition holds; that none was found proves nothing.
+proves that the condition holds; a search without a result proves nothing.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class ExistsPlacement(Condition):
         return self.condition.why_nowhere(robot)
 
     def _search(self, robot: Robot, mobile: list[int], places: Places) -> np.ndarray:
-        """Return for which places a placement is found, (n,) of bool."""
+        """Return for which places the search ends with a placement, (n,) of bool."""
         points, steps = _placements(3 * len(mobile) + 3, self.tries, self.seed)
         least = np.full(len(places), np.inf)
         best = np.zeros((len(places), points.shape[1]))

@@ -2,8 +2,8 @@
 
     python generate/generate.py [FOLDER]
 
-Needs towline and qpbenchmark. Everything is seeded. Each QP that is said to be feasible is one that towline solves, and
-each that is said to be infeasible has a verified certificate.
+Needs towline and qpbenchmark. Everything is seeded. Each QP that is declared feasible is one that towline solves, and
+each that is declared infeasible has a verified certificate.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ STEP = 1e-3  # [s] of the trajectories
 
 
 def static_poses(rng: np.random.Generator) -> Iterator[TensionProblem]:
-    """Robots at rest: home if they can rest there, and two random poses; up to three for each robot."""
+    """Yield robots at rest: home if they can rest there, and two random poses; up to three for each robot."""
     for name in available():
         dynamics = Dynamics(load(name))
         robot = dynamics.robot
         spread = robot.dof_mask * np.r_[np.ptp(robot.home_anchors, axis=0) / 4, np.full(3, 0.2)]
-        found = 0
+        count = 0
         for trial in range(60):
             pose = robot.home + spread * rng.uniform(-1, 1, 6) * min(trial, 1) * 0.97**trial
             problem = pose_problem(dynamics, pose)
-            if found < 3 and solve(problem).feasible:
-                found += 1
+            if count < 3 and solve(problem).feasible:
+                count += 1
                 yield problem
 
 
 def trajectories(rng: np.random.Generator) -> Iterator[TensionProblem]:
-    """Twelve samples in a row, at 1 kHz, of a circle about home by two robots: next to equal, as in a control loop."""
+    """Yield twelve samples at 1 kHz of a circle about home by two robots: nearly equal, as in a control loop."""
     for name, radius, frequency in (("ipanema-1", 0.3, 1.0), ("caroca", 0.5, 0.5)):
         dynamics = Dynamics(load(name))
         start, omega = rng.uniform(0, 1), 2 * np.pi * frequency
@@ -57,7 +57,7 @@ def trajectories(rng: np.random.Generator) -> Iterator[TensionProblem]:
 
 
 def near_singular(rng: np.random.Generator) -> Iterator[TensionProblem]:
-    """Wrench matrices with singular values of 1e-3 to 1e-9, and at last two that have lost rank.
+    """Yield wrench matrices with singular values of 1e-3 to 1e-9, and at last two that have lost rank.
 
     Every cable line of wang-flying-printed meets in one point when the platform is level; all upper cables of ipanema-1
     lie in a plane when the platform is as high as their anchors.
@@ -69,7 +69,7 @@ def near_singular(rng: np.random.Generator) -> Iterator[TensionProblem]:
 
 
 def degenerate(rng: np.random.Generator) -> Iterator[TensionProblem]:
-    """Wrenches on the boundary of the available wrench set, where the limits alone determine the tensions."""
+    """Yield wrenches on the boundary of the available wrench set, where the limits alone determine the tensions."""
     for name in REDUNDANT:
         dynamics = Dynamics(load(name))
         robot = dynamics.robot
@@ -81,7 +81,7 @@ def degenerate(rng: np.random.Generator) -> Iterator[TensionProblem]:
 
 
 def soft(rng: np.random.Generator) -> Iterator[TensionProblem]:
-    """Wrenches within reach and out of it, of which some may be missing: variables (t, e) with A t + e = w."""
+    """Yield wrenches within reach and out of it, of which some may be missing: variables (t, e) with A t + e = w."""
     for name in REDUNDANT:
         for beyond in (0.0, 1.0, 3.0):
             hard = _beyond(rng, name, beyond) if beyond else _given(rng, name, np.zeros(6))
@@ -95,7 +95,7 @@ def soft(rng: np.random.Generator) -> Iterator[TensionProblem]:
 
 
 def infeasible(rng: np.random.Generator) -> Iterator[TensionProblem]:
-    """Wrenches beyond the available wrench set, by 1e-6 to 1 of the largest tension."""
+    """Yield wrenches beyond the available wrench set, by 1e-6 to 1 of the largest tension."""
     for name in REDUNDANT:
         for part in (1e-6, 1e-4, 1e-2, 0.1, 1.0):
             yield _beyond(rng, name, part)
@@ -108,7 +108,7 @@ def _nearby(rng: np.random.Generator, dynamics: Dynamics) -> np.ndarray:
 
 
 def _given(rng: np.random.Generator, name: str, offset: np.ndarray) -> TensionProblem:
-    """The wrench of random tensions between the limits, at an offset from home."""
+    """Return the wrench of random tensions between the limits, at an offset from home."""
     dynamics = Dynamics(load(name))
     robot = dynamics.robot
     A = dynamics.wrench_matrix(robot.home + offset)
@@ -117,7 +117,7 @@ def _given(rng: np.random.Generator, name: str, offset: np.ndarray) -> TensionPr
 
 
 def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
-    """A wrench at `part` times the largest tension beyond the boundary, along the normal there."""
+    """Return a wrench at `part` times the largest tension beyond the boundary, along the normal there."""
     dynamics = Dynamics(load(name))
     robot = dynamics.robot
     scale = robot.wrench_scale * robot.dof_mask
@@ -133,7 +133,7 @@ SETS = {"STATIC": static_poses, "TRAJ": trajectories, "SINGULAR": near_singular,
 
 
 def feasible_problems() -> Iterator[tuple[str, TensionProblem]]:
-    """Names and problems of the test set."""
+    """Yield names and problems of the test set."""
     for seed, (code, make) in enumerate(SETS.items()):
         for number, problem in enumerate(make(np.random.default_rng(seed))):
             answer = solve(problem)
@@ -143,7 +143,7 @@ def feasible_problems() -> Iterator[tuple[str, TensionProblem]]:
 
 
 def infeasible_problems() -> Iterator[tuple[str, TensionProblem]]:
-    """Names and problems of the set kept apart."""
+    """Yield names and problems of the set kept apart."""
     for number, problem in enumerate(infeasible(np.random.default_rng(100))):
         if certify(problem) is None:
             raise RuntimeError(f"INFEAS{number}: has no certificate")
@@ -151,7 +151,7 @@ def infeasible_problems() -> Iterator[tuple[str, TensionProblem]]:
 
 
 def collect(named: Iterator[tuple[str, TensionProblem]]) -> ProblemList:
-    """The problems as qpbenchmark saves them."""
+    """Return the problems as qpbenchmark saves them."""
     problems = ProblemList()
     for name, problem in named:
         qp: dict[str, Any] = {"G": None, "h": None, **as_qp(problem)}
