@@ -4,8 +4,8 @@
 
 A seed determines a task. A feasible plan must have tensions inside their limits that give the force, by equations that
 are written here again. An infeasible plan must have a certificate, which is verified again, or carriers that the task
-itself moves beyond their limits. Plans of status "not-found" are counted. The exit code is 1 if more than 5 % are not
-found or any plan claims what is not true.
+itself moves beyond their limits. Plans of status "not-found" are counted. The exit code is 1 if more than 5 % have
+that status or any plan claims what is not true.
 """
 
 from __future__ import annotations

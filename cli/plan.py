@@ -11,8 +11,8 @@ from .options import JsonOption, RobotArgument, print_json
 from .watching import watching
 
 
-def _print_schema(asked: bool) -> None:
-    if asked:
+def _print_schema(requested: bool) -> None:
+    if requested:
         from ..ocp import Task
 
         print_json(Task.model_json_schema())
@@ -57,21 +57,21 @@ def plan(
         if file is not None:
             check_writable(file)
     with watching(f"planning {read.name}", quiet=as_json) as watch:
-        found = plan_motion(loaded, read, watch)
-        written = {"file": found.save(target)}
+        planned = plan_motion(loaded, read, watch)
+        written = {"file": planned.save(target)}
         watch.now("drawing")
-        pictures = found.plot(figures) if figures else []
+        pictures = planned.plot(figures) if figures else []
         if report is not None:
-            written["report"] = found.save_report(report)
+            written["report"] = planned.save_report(report)
         if animate is not None:
-            written["animation"] = found.animate(animate, speed, fps)
+            written["animation"] = planned.animate(animate, speed, fps)
     if as_json:
         files = {name: str(path) for name, path in written.items()}
-        print_json({**found.to_dict(), **files, "figures": [str(picture) for picture in pictures]})
+        print_json({**planned.to_dict(), **files, "figures": [str(picture) for picture in pictures]})
     else:
-        typer.echo(found.report())
+        typer.echo(planned.report())
         typer.echo("  Written")
         for path in (*written.values(), *pictures):
             typer.echo(f"    {path}")
-    if not found.feasible:
+    if not planned.feasible:
         raise typer.Exit(1)

@@ -25,7 +25,7 @@ def reproduce(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Recompute the equations, tables and figures of a paper, with a verdict on each claim."""
+    """Recompute the equations, tables and figures of a paper, and report for each claim whether it is reproduced."""
     from ..studies.accounts.files import write
     from ..studies.papers import PAPERS
     from ..writing import check_writable

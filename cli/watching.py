@@ -7,40 +7,42 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from ..text import quantity
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
 
 class Watch:
-    """Takes a solver's progress and shows it.
+    """A display of a solver's progress.
 
     Attributes
     ----------
     rows
         All rows received: (iteration, objective, infeasibility).
     attempt
-        Counts the runs of the solver: another one begins where the iteration falls back.
+        Number of the solver's runs: another one begins where the iteration number falls back.
     """
 
     def __init__(self, shown: Progress | None, what: str):
         self.rows: list[tuple[int, float, float]] = []
         self.attempt = 1
         self._shown = shown
-        self._line: TaskID | None = None if shown is None else shown.add_task(what, told="preparing", total=None)
+        self._line: TaskID | None = None if shown is None else shown.add_task(what, detail="preparing", total=None)
 
     def __call__(self, iteration: int, objective: float, infeasibility: float) -> None:
         """Show one iteration."""
         if self.rows and iteration <= self.rows[-1][0]:
             self.attempt += 1
         self.rows.append((iteration, objective, infeasibility))
-        told = f"attempt {self.attempt}  iteration {iteration:<3}  "
-        told += f"objective {objective:<9.4g}  infeasibility {infeasibility:.1e}"
-        self._update(told=told)
+        detail = f"attempt {self.attempt}  iteration {iteration:<3}  "
+        detail += f"objective {quantity(objective):<9}  infeasibility {infeasibility:.1e}"
+        self._update(detail=detail)
 
     def now(self, what: str) -> None:
         """Show the next step, without iterations."""
-        self._update(description=what, told="")
+        self._update(description=what, detail="")
 
     def _update(self, **shown: Any) -> None:
         if self._shown is not None and self._line is not None:
@@ -54,7 +56,7 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
     Parameters
     ----------
     what
-        What is being done.
+        What is being done, as the label.
     quiet
         Show nothing, because standard output is for a program (`--json`).
     console
@@ -70,7 +72,7 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
     to = console or Console(stderr=True)
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}\n{task.fields[told]}", markup=False),  # together too wide for 80 columns
+        TextColumn("{task.description}\n{task.fields[detail]}", markup=False),  # together too wide for 80 columns
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=to, transient=True, disable=not to.is_terminal) as shown:

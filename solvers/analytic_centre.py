@@ -55,10 +55,10 @@ class AnalyticCentre(Method):
             lower=form.lower[limited],
             upper=form.upper[limited],
         )
-        found = barrier_point(reduced, 0.0, 1.0, None if start is None else start[limited])
-        if found.s is None:
-            return found
+        centre = barrier_point(reduced, 0.0, 1.0, None if start is None else start[limited])
+        if centre.s is None:
+            return centre
         s = np.zeros(form.lower.size)
-        s[limited] = found.s
+        s[limited] = centre.s
         s[~limited] = np.linalg.lstsq(unlimited, form.b - form.Q @ s, rcond=RANK)[0]
-        return found._replace(s=s)
+        return centre._replace(s=s)

@@ -94,13 +94,13 @@ def spans(A: np.ndarray) -> np.ndarray:
 def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
     """Return rows of equal rank, and an orthonormal basis (k, n, rank) of their columns' span; None for all of R^n."""
     full = spans(columns)
-    found: list[tuple[np.ndarray, np.ndarray | None]] = [(np.flatnonzero(full), None)] if full.any() else []
+    groups: list[tuple[np.ndarray, np.ndarray | None]] = [(np.flatnonzero(full), None)] if full.any() else []
     flat = np.flatnonzero(~full)
     if flat.size:
         U, sigma, _ = np.linalg.svd(columns[flat])
         ranks = (sigma > RANK * sigma.max(axis=1, initial=np.finfo(float).tiny, keepdims=True)).sum(axis=1)
-        found += [(flat[ranks == rank], U[ranks == rank][:, :, :rank]) for rank in np.unique(ranks)]
-    return found
+        groups += [(flat[ranks == rank], U[ranks == rank][:, :, :rank]) for rank in np.unique(ranks)]
+    return groups
 
 
 def _full(columns: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

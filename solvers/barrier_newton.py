@@ -35,10 +35,10 @@ _ON_PLANE = 1e-10
 # How far, relative to mu, the products of distance and multiplier may be from mu when plain Newton steps take over.
 _CENTRED = 0.5
 
-# By how much one step may lower the products of distance and multiplier, on their way to mu.
+# By how much one step may lower the products of distance and multiplier, towards mu.
 _REDUCTION = 0.05
 
-# Of the way to the nearest limit, what a step may go.
+# The share of the distance to the nearest limit that a step may go.
 _FRACTION = 0.99
 
 # A distance to a limit, in units of s, that rounding may cancel.
@@ -66,17 +66,17 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
         return Proposal(np.zeros(0))
     near, used = _primal_dual(form, square, mu, _pulled_inside(form, start), warm=start is not None)
     if near is not None:
-        found, more = _damped(form, square, mu, near)
+        point, more = _damped(form, square, mu, near)
         used += more
-        if found is not None:
-            return Proposal(found, used)
+        if point is not None:
+            return Proposal(point, used)
     inner = _interior_point(form)
     if inner is None:
         return Proposal(None, used, "the feasible tensions have no interior")
-    found, more = _damped(form, square, mu, inner)
-    if found is None and square == 0.0:
+    point, more = _damped(form, square, mu, inner)
+    if point is None and square == 0.0:
         return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", final=True)
-    return Proposal(found, used + more, "" if found is not None else f"not converged in {_DAMPED_STEPS} Newton steps")
+    return Proposal(point, used + more, "" if point is not None else f"not converged in {_DAMPED_STEPS} Newton steps")
 
 
 def _pulled_inside(form: StandardForm, start: Array | None) -> Array:
@@ -193,8 +193,8 @@ def _interior_point(form: StandardForm) -> Array | None:
     # Of wide ranges, a unit of s is space enough.
     space = np.minimum(form.upper - form.lower, 1.0)[:, None]
     rows = np.block([[-np.eye(k), space], [np.eye(k), space]])
-    found = optimise(form, np.r_[np.zeros(k), -1.0], rows, np.r_[-form.lower, form.upper], nonnegative=True, most=0.5)
-    if found.s is None:
+    result = optimise(form, np.r_[np.zeros(k), -1.0], rows, np.r_[-form.lower, form.upper], nonnegative=True, most=0.5)
+    if result.s is None:
         return None
-    share = (np.minimum(found.s - form.lower, form.upper - found.s) / space[:, 0]).min(initial=1.0)
-    return found.s if share > 1e-9 else None
+    share = (np.minimum(result.s - form.lower, form.upper - result.s) / space[:, 0]).min(initial=1.0)
+    return result.s if share > 1e-9 else None

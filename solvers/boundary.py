@@ -1,7 +1,7 @@
 """The optimum when w is on the boundary of the available wrench set, where rounding decides between yes and no.
 
 There the feasible tensions have no interior, and an error of 1e-16 in A or w makes an exact method see none. `solve`
-comes here if the method found nothing and no certificate explains it.
+comes here if the method has no solution and no certificate explains it.
 """
 
 from collections.abc import Iterator

@@ -32,7 +32,7 @@ def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[A
     Returns
     -------
     x :
-        A minimiser, shape (m,), exactly inside the limits. Where it is not unique, the one found first.
+        A minimiser, shape (m,), exactly inside the limits. Where it is not unique, the first one reached.
     free :
         Mask, shape (m,), of the variables that the minimisation determined; their columns are linearly independent.
     """
@@ -68,7 +68,7 @@ def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[A
 
 
 def _settle(M: Array, b: Array, lower: Array, upper: Array, x: Array, free: NDArray[np.bool_]) -> None:
-    """Minimise over the free variables, in place; those that meet a limit on the way stop there and leave `free`."""
+    """Minimise over the free variables, in place; those that meet a limit stop there and leave `free`."""
     while free.any():
         index = np.flatnonzero(free)
         held = np.where(free, 0.0, x)

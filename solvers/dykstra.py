@@ -40,7 +40,7 @@ class Dykstra(Method):
     """Projection of t_ref on the feasible tensions by alternating projections.
 
     Existence: wherever the problem is feasible, in the limit. Converges to the same unique tensions as "active-set",
-    hence continuous; it ends once the cables at their limits are found, but it may stand still for long before. Stops
+    hence continuous; it ends once the cables at their limits are known, but it may stand still for long before. Stops
     when those cables fulfil the optimality conditions, when the two projections agree to 1e-11 of the size of the
     tensions, when they prove that there is nothing, or after `max_iter`: then the status is inaccurate and `residual`
     reports how far it came. Cost: two matrix products an iteration, tens to thousands of iterations. Outside the
@@ -72,8 +72,8 @@ class Dykstra(Method):
             if step @ step <= _STEP**2:
                 return Proposal(x, iteration)
             if iteration % _CHECK == 0:
-                if (found := _optimum_held_by(form, p)) is not None:
-                    return Proposal(found, iteration)
+                if (point := _optimum_held_by(form, p)) is not None:
+                    return Proposal(point, iteration)
                 if _apart(form, error):
                     return Proposal(None, iteration, "the limits and the equations do not meet")
             p += x + step

@@ -47,14 +47,14 @@ def corners(form: StandardForm) -> Array | None:
     largest = max(np.abs(form.lower[~open_low]).max(initial=0.0), np.abs(form.upper[~open_high]).max(initial=0.0))
     far = _FAR * (1.0 + largest)
     low, high = np.where(open_low, -far, form.lower) - base, np.where(open_high, far, form.upper) - base
-    found = _by_qhull(form.N, low, high) if freedom > 2 else meet(form.N, low, high)
-    s = base + found @ form.N
+    vertices = _by_qhull(form.N, low, high) if freedom > 2 else meet(form.N, low, high)
+    s = base + vertices @ form.N
     if ((s < -0.1 * far) & open_low).any() or ((s > 0.1 * far) & open_high).any():
         return None
-    if freedom == 2 and found.shape[0] > 2:
-        around = found - found.mean(axis=0)
-        found = found[np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
-    return found
+    if freedom == 2 and vertices.shape[0] > 2:
+        around = vertices - vertices.mean(axis=0)
+        vertices = vertices[np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
+    return vertices
 
 
 def simplex_centroid(points: Array) -> Array:
@@ -104,10 +104,10 @@ def meet(N: Array, low: Array, high: Array, zero: Array | None = None) -> Array:
     lines = [low, high] if zero is None else [low, high, zero]
     normals, offsets = np.concatenate([N.T] * len(lines)), np.concatenate(lines)
     if freedom == 0:
-        found = np.zeros((1, 0))
+        vertices = np.zeros((1, 0))
     elif freedom == 1:
         moves = np.abs(normals[:, 0]) > _PARALLEL
-        found = (offsets[moves] / normals[moves, 0])[:, None]
+        vertices = (offsets[moves] / normals[moves, 0])[:, None]
     else:
         i, j = np.array(list(combinations(range(offsets.size), 2))).T
         cross = normals[i, 0] * normals[j, 1] - normals[i, 1] * normals[j, 0]
@@ -115,8 +115,8 @@ def meet(N: Array, low: Array, high: Array, zero: Array | None = None) -> Array:
         i, j, cross = i[crossing], j[crossing], cross[crossing]
         x = (offsets[i] * normals[j, 1] - offsets[j] * normals[i, 1]) / cross
         y = (normals[i, 0] * offsets[j] - normals[j, 0] * offsets[i]) / cross
-        found = np.stack([x, y], axis=1)
-    return found[inside(found @ N, low, high)]
+        vertices = np.stack([x, y], axis=1)
+    return vertices[inside(vertices @ N, low, high)]
 
 
 def inside(s: Array, low: Array, high: Array) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ class Proposal(NamedTuple):
     Attributes
     ----------
     s :
-        The point in standard form, shape (k,), or None if the method found none.
+        The point in standard form, shape (k,), or None if the method has none.
     iterations :
         How many it took, None if not counted.
     detail :
@@ -36,7 +36,7 @@ class Proposal(NamedTuple):
 
 
 class Method(ABC):
-    """A way to choose tensions. Subclass it, fill the class variables, write `propose`, and list it in the registry."""
+    """A method to choose tensions. Subclass it, fill the class variables, write `propose`, and register it."""
 
     name: ClassVar[str]
     """The name that `solve` takes."""

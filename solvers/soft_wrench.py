@@ -80,7 +80,7 @@ def _nearest_wrench(form: StandardForm) -> Proposal:
         return exact
     nearest, _ = box_least_squares(form.sigma[:, None] * form.Q, form.sigma * form.b, form.lower, form.upper)
     for slack in _SLACKS:
-        found = least_norm(form.Q @ nearest, slack)
-        if found.s is not None:
-            return found
+        solution = least_norm(form.Q @ nearest, slack)
+        if solution.s is not None:
+            return solution
     return Proposal(nearest)

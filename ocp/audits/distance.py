@@ -89,7 +89,7 @@ def _nearest(
         gradient = np.einsum("nij,ni->nj", matrix, _times(matrix, t) - w[left])
         noise = 1e-9 * np.linalg.norm(matrix, axis=1) * np.linalg.norm(rest, axis=1)[:, None]
         below, above = free & (t < low), free & (t > high)
-        # A cable at its lower limit stays there if more tension would lead farther from w, and the other way round.
+        # A cable at its lower limit stays there if more tension would lead farther from w, and conversely.
         release = ((here == AT_LOW) & (gradient < -noise)) | ((here == AT_HIGH) & (gradient > noise))
         change = below | above | release
         # Changing all cables at once can go round in circles: where it brings nothing, only the last one is changed.

@@ -107,16 +107,16 @@ class LinePath(PathBase):
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        start, way = np.array(self.start), np.array(self.end) - np.array(self.start)
+        start, change = np.array(self.start), np.array(self.end) - np.array(self.start)
         s = (times / duration)[:, None]
         if self.timing == "uniform":
-            return Motion(start + s * way, np.ones_like(s) * way / duration, np.zeros_like(s) * way)
+            return Motion(start + s * change, np.ones_like(s) * change / duration, np.zeros_like(s) * change)
         # Acceleration and jerk are zero at both ends: carriers take places that follow the platform's acceleration, so
         # only then can they start and end at rest too.
         done = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
         rate = 140 * s**3 * (1 - s) ** 3 / duration
         rate_rate = 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s) / duration**2
-        return Motion(start + done * way, rate * way, rate_rate * way)
+        return Motion(start + done * change, rate * change, rate_rate * change)
 
 
 class CirclePath(PathBase):

@@ -56,8 +56,8 @@ class Timing:
     ----------
     status
         See `MotionStatus`. If infeasible, at `at` no tensions inside their limits give the wrench that the path needs,
-        whatever the speed and acceleration; at the ends, for the platform to rest there. If not-found, every place of the
-        grid allows some speed, but no law joins them, or none that passes the audit.
+        whatever the speed and acceleration; at the ends, for the platform to rest there. If not-found, every place of
+        the grid allows some speed, but no law joins them, or none that passes the audit.
     parametrised
         The robot and the geometry that was timed.
     limits

@@ -1,6 +1,6 @@
 """Mark the functions of this package that `compiled.py` can turn into machine code; until then they are plain Python.
 
-The same source gives the same bits either way: Numba compiles it without fused or reordered arithmetic.
+The same source gives the same bits with and without Numba: Numba compiles it without fused or reordered arithmetic.
 """
 
 from __future__ import annotations
