@@ -76,7 +76,7 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
         file.attrs.update(contents.attributes)
         for name, variable in everything.items():
             values, attributes = np.asarray(variable.values), dict(variable.attributes)
-            # Coordinates beside those of the dimensions are found by this convention (CF 1.11, section 5).
+            # Coordinates beside those of the dimensions are named by this convention (CF 1.11, section 5).
             beside = [
                 other
                 for other, coordinate in contents.coordinates.items()

@@ -1,4 +1,4 @@
-"""Define the contenders of the hot-loop benchmark: each a name, a tolerance as text, and a way to prepare for a task.
+"""Define the contenders of the hot-loop benchmark: each has a name, a tolerance as text, and a function for a task.
 
 What is prepared is not timed: arrays in the layout that a solver wants, and for solvers that keep their memory between
 problems (native, reuse) one instance. What is timed begins with such arrays, a new wrench matrix included, and ends

@@ -27,7 +27,7 @@ body { font: 16px/1.45 system-ui, sans-serif; color: #222; background: #fff; max
 h1 { font-size: 1.5rem; margin: 0.8rem 0 0.3rem; }
 h2 { font-size: 1.1rem; margin: 1.6rem 0 0.3rem; }
 h3 { font-size: 1rem; margin: 1.2rem 0 0.2rem; }
-.verdict { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: #f6f6f6; margin: 0.6rem 0; }
+.status { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: #f6f6f6; margin: 0.6rem 0; }
 table { border-collapse: collapse; width: 100%; }
 th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid #ddd; }
 th { font-weight: 600; width: 9.5rem; }
@@ -42,7 +42,7 @@ pre { overflow-x: auto; font-size: 0.8rem; background: #f6f6f6; padding: 0.6rem;
 </head>
 <body>
 <h1>$title</h1>
-<p class="verdict"><strong>$word</strong>: $summary</p>
+<p class="status"><strong>$word</strong>: $summary</p>
 $parts
 <footer>towline $version</footer>
 </body>

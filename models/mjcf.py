@@ -58,7 +58,7 @@ def to_mjcf(robot: Robot) -> str:
 def _check(robot: Robot) -> None:
     for index, cable in enumerate(robot.cables):
         if cable.pulley is not None:
-            raise InputError(f"cables[{index}].pulley must be null, because MuJoCo's tendons have none")
+            raise InputError(f"cables[{index}].pulley must be null, because MuJoCo's tendons have none, got a pulley")
     for index, carrier in enumerate(robot.carriers):
         if carrier.name == "platform":
             raise InputError(f"carriers[{index}].name must not be 'platform', which is the platform's name in MuJoCo")

@@ -50,7 +50,7 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
 
 
 def read_bytes(path: Path, what: str) -> bytes:
-    """Return the content of `path`; raise InputError that it must be `what` if it cannot be read or is too large."""
+    """Return the content of `path`, or raise InputError if it cannot be read or is too large; `what` describes it."""
     try:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():
             raise InputError(f"{path} must be {what}, got a device or a pipe")

@@ -304,7 +304,9 @@ class Robot(Part):
         if self.drive == "fixed-length":
             for index, cable in enumerate(self.cables):
                 if cable.length is None:
-                    raise ValueError(f"cables[{index}].length must be a number > 0 [m] if the drive is fixed-length")
+                    raise ValueError(
+                        f"cables[{index}].length must be a number > 0 [m] if drive is fixed-length, got none"
+                    )
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(

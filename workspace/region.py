@@ -22,7 +22,7 @@ class AngleBox(Part):
     def _ordered(self) -> Self:
         for angle, low, high in zip(("roll", "pitch", "yaw"), self.min, self.max, strict=True):
             if low > high:
-                raise ValueError(f"min must not exceed max, but of {angle} min is {low:g} and max is {high:g}")
+                raise ValueError(f"min must not exceed max, {high:g} rad for {angle}, got {low:g} rad")
         return self
 
 
@@ -51,7 +51,9 @@ class Region(Part):
     @model_validator(mode="after")
     def _one_source_of_positions(self) -> Self:
         if self.position is not None and self.lengths is not None:
-            raise ValueError("position and lengths must not both be given: the position follows from the lengths")
+            raise ValueError(
+                "position and lengths must not both be given, because the position follows from the lengths, got both"
+            )
         return self
 
 

@@ -160,7 +160,9 @@ def driving_force(
 def _cable_constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     for index, cable in enumerate(robot.cables):
         if cable.pulley is not None:
-            raise InputError(f"cables[{index}].pulley must be left out, because the procedure has point anchors")
+            raise InputError(
+                f"cables[{index}].pulley must be null, because the procedure has point anchors, got a pulley"
+            )
         if cable.stiffness is None:
             raise InputError(f"cables[{index}].stiffness must be E A > 0 [N] for dT_K, got none")
         if cable.damping is None:
