@@ -112,7 +112,7 @@ class Leaving(Motion):
 
 
 class Result(NamedTuple):
-    """What came out for one method.
+    """The result of one method.
 
     Attributes
     ----------

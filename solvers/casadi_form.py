@@ -93,7 +93,7 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
         return np.full(m, np.nan) if tensions is None else tensions
 
     class Jacobian(ca.Callback):
-        """Blocks dt / d(A, w, t_min, t_max), each (m, entries)."""
+        """Return the blocks dt / d(A, w, t_min, t_max), each (m, entries)."""
 
         def __init__(self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]):
             ca.Callback.__init__(self)
@@ -129,7 +129,7 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
             return [by.A.transpose(0, 2, 1).reshape(m, n * m), by.w, by.t_min, by.t_max]
 
     class Tensions(ca.Callback):
-        """The distribution."""
+        """Return the distribution."""
 
         def __init__(self) -> None:
             ca.Callback.__init__(self)

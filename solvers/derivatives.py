@@ -33,7 +33,7 @@ _RANK = 1e-9
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of the optimal tensions, each one's last dimensions those of what it is with respect to.
+    """Derivatives of the optimal tensions, each with the dimensions of its variable last.
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ __all__ = ["Status", "TensionSolution"]
 
 
 class Status(StrEnum):
-    """What a solution is. Its values are plain strings, fit for JSON."""
+    """The status of a solution; the values are plain strings."""
 
     OPTIMAL = "optimal"
     """The tensions give w inside the limits, within `TensionProblem.tolerance`, and are the method's answer."""

@@ -76,8 +76,6 @@ def offences(text):
     ]
 
 
-# Packages and pages whose prose is still being rewritten: not checked yet, and this set shrinks to nothing.
-PENDING = {"ocp"}
 PACKAGES = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
 MODULES = [
     str(file.relative_to(ROOT)) for package in PACKAGES for file in ROOT.joinpath(*package.split(".")[1:]).glob("*.py")
@@ -165,35 +163,29 @@ def test_the_list_leaves_plain_english_alone(text):
     assert not offences(text)
 
 
-def pending(path):
-    return any(path == part or path.startswith(f"{part}/") for part in PENDING)
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if not pending(page)])
+@pytest.mark.parametrize("page", PAGES)
 def test_pages(page):
     file = ROOT / page
     assert not offences(cells(file) if file.suffix == ".ipynb" else file.read_text())
 
 
-@pytest.mark.parametrize("module", [module for module in MODULES if not pending(module)])
+@pytest.mark.parametrize("module", MODULES)
 def test_docstrings_and_messages(module):
     hits = [f"{module}:{line}: {hit}" for line, text in literals(ROOT / module) for hit in offences(text)]
     assert not hits, "\n".join(hits)
 
 
-@pytest.mark.parametrize("module", [module for module in MODULES if not pending(module)])
+@pytest.mark.parametrize("module", MODULES)
 def test_docstrings_of_functions_begin_with_a_verb(module):
     hits = [f"{module}:{line}: {word} ..." for line, word in openings(ROOT / module) if NO_VERB.fullmatch(word)]
     assert not hits, "\n".join(hits)
 
 
-@pytest.mark.skipif("cli" in PENDING, reason="still being rewritten")
 @pytest.mark.parametrize("words", commands(typer.main.get_command(app)), ids=" ".join)
 def test_help(words):
     assert not offences(" ".join(CliRunner().invoke(app, [*words, "--help"]).output.split()))
 
 
-@pytest.mark.skipif("ocp" in PENDING, reason="still being rewritten")
 def test_reports():
     """Check one feasible, one infeasible and one undecided report, and their JSON."""
     robot = load("wang-flying")
@@ -206,7 +198,6 @@ def test_reports():
         assert not offences(result.report())
 
 
-@pytest.mark.skipif(bool({"models", "ocp"} & PENDING), reason="still being rewritten")
 @pytest.mark.parametrize("model", [Robot, Task])
 def test_schemas(model):
     assert not offences("\n".join(descriptions(model.model_json_schema())))

@@ -1,6 +1,6 @@
 """Tensions of every instant of a motion, and its distance from possible wrenches where there are none.
 
-What counts as violation is the distance, in newtons (moments over `Robot.length`), from the wrench that the motion
+The violation is the distance, in newtons (moments over `Robot.length`), from the wrench that the motion
 requires to those that the cables can give inside their limits less the task's margin. For a box of winds it is the
 largest such distance of the winds that decide (`wind_set`), and if that is none, of winds inside the box too.
 """
@@ -29,7 +29,7 @@ INNER_WINDS = 8  # of a box, at each instant others
 
 
 class AuditedTensions(NamedTuple):
-    """Tensions of every instant, and why there are none where there are none."""
+    """The tensions of every instant, and the reason where none exist."""
 
     tensions: np.ndarray  # (n, m) [N], nan where there are none
     violation: np.ndarray  # (n,) [N]

@@ -42,7 +42,7 @@ class Outcome:
 _FROM_A_GUESS = {"mu_init": 1e-2}
 
 
-# A motion that was found on another mesh or for another task is nearer: a minimum time of three robots took 96
+# A motion from another mesh or for another task is nearer: a minimum time of three robots took 96
 # iterations from the coarser mesh instead of more than 150.
 _FROM_A_MOTION = {"mu_init": 1e-3}
 
