@@ -133,7 +133,7 @@ class Certificate:
         InputError
             If `up` is not three finite numbers.
         """
-        pull_only = ": the cables can pull only the other way" if self.support < 0.0 else ""
+        pull_only = " (the cables can pull only the other way)" if self.support < 0.0 else ""
         limits = [
             f"{name} of cable{'s' if indices.size > 1 else ''} {', '.join(str(int(i) + 1) for i in indices)}"
             for name, indices in (("t_min", self.at_min), ("t_max", self.at_max))
@@ -142,7 +142,7 @@ class Certificate:
         return CertificateText(
             along=self._along(None if up is None else finite_array("up", up, (3,))),
             needed=f"{quantity(self.demand, 'N')}",
-            available=f"{quantity(self.support, 'N')} at most{pull_only}",
+            available=f"at most {quantity(self.support, 'N')}{pull_only}",
             short_by=f"{quantity(self.shortfall, 'N')}",
             limits="; ".join(limits) or "no cable pulls along this direction, however large its tension",
         )

@@ -1,8 +1,8 @@
 """Run the kernels as plain Python until machine code pays; both give the same bits.
 
 Importing Numba and loading the machine code from the disk takes about a second, compiling it (once on a machine) some
-30 s. A process pays for that once it has lost as much time to plain Python, or when it calls `load`, as a control loop
-does before it starts.
+30 s. A process pays for that once it has lost as much time to plain Python, or has solved 200 problems one by one and
+the machine code is on the disk, or when it calls `load`, as a control loop does before it starts.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` rep
 
 _SECONDS_TO_LOAD = 1.0
 _SECONDS_TO_COMPILE = 30.0
+_LOOP = 200  # single problems: what solves so many one by one is a loop that goes on, half a millisecond each
 _DISK_SPACE = 50_000_000  # bytes; the machine code takes about 5 MB
 
 _FOLDER = Path(__file__).parent / "kernels"
@@ -42,6 +43,7 @@ _MODULES = (
 
 _lock = threading.Lock()
 _lost = 0.0  # seconds spent in plain Python so far
+_alone = 0  # single problems solved in plain Python so far
 _patience: float | None = None
 
 
@@ -98,7 +100,7 @@ def _interpreted(data: Any, n: int, m: int, t: Any) -> int:
     except ZeroDivisionError:  # machine code goes on with inf and nan, and ends at the same answer
         return UNSURE
     finally:
-        _lose(perf_counter() - start)
+        _lose(perf_counter() - start, problems=1)
 
 
 def _interpreted_rows(*arguments: Any) -> None:
@@ -110,14 +112,15 @@ def _interpreted_rows(*arguments: Any) -> None:
 _kernels = Kernels(INTERPRETED, _interpreted, _interpreted_rows, None)
 
 
-def _lose(seconds: float) -> None:
-    """Count the time spent in plain Python, and load the machine code once that would have been quicker."""
-    global _lost, _patience
+def _lose(seconds: float, problems: int = 0) -> None:
+    """Count the time and the single problems spent in plain Python, and load the machine code once it pays."""
+    global _lost, _alone, _patience
     _lost += seconds
-    if _lost > _SECONDS_TO_LOAD:
+    _alone += problems
+    if _lost > _SECONDS_TO_LOAD or _alone > _LOOP:
         if _patience is None:
             _forget_old_code()
-            _patience = _SECONDS_TO_LOAD if _on_disk() else _SECONDS_TO_COMPILE
+            _patience = 0.0 if _on_disk() else _SECONDS_TO_COMPILE
         if _lost > _patience:
             load()
 
