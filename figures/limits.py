@@ -67,7 +67,7 @@ def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     bounds = [bound for bound in (quantity.low, quantity.high) if np.isfinite(bound)]
-    # What hardly changes beside its limit shall look so.
+    # A curve that hardly changes relative to its limit must look flat.
     size = max(high - low, LEAST * max((abs(bound) for bound in bounds), default=0.0), 1e-9)
     near = [bound for bound in bounds if low - size <= bound <= high + size]
     for bound in near:

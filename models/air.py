@@ -1,6 +1,6 @@
 """Winds over time: constant, paper F's trapezoid with noise, and Dryden turbulence; velocities of the air in {G}.
 
-Each is a function of times and gives (n, 3) in [m/s]. What is random is seeded: the same seed gives the same wind.
+Each is a function of times and gives (n, 3) in [m/s]. Random parts are seeded: the same seed gives the same wind.
 """
 
 from __future__ import annotations

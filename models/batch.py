@@ -100,7 +100,7 @@ def compiled(function: ca.Function) -> Kernel:
 
 
 class _Evaluator:
-    """What the numeric calls of one Function share."""
+    """The data that the numeric calls of one Function share."""
 
     def __init__(self, function: ca.Function):
         self._function = ca.Function(dense(function))  # a handle of its own: see _evaluators

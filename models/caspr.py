@@ -9,7 +9,7 @@ frame {J} as platform frame, c = com_location, and the joint's base at p in {G}:
     I_com = I_J - m (c.c E - c c^T)           if the inertia's ref is "joint"
     x = p + q_xyz,  R = Rx(q_4) Ry(q_5) Rz(q_6)   for SPATIAL_EULER_XYZ, whereas towline has Rz Ry Rx
 
-What would make a different robot is an error; what is merely left out is a note. The files may come from anywhere:
+A content that would make a different robot is an error; one that is left out is a note. Files may come from anywhere:
 entities and any DTD of their own are refused, and the DTD that CASPR names beside them is not read.
 """
 

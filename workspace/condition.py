@@ -1,4 +1,4 @@
-"""What makes a place part of a workspace: `Condition`, and conditions joined by & and |.
+"""Conditions that make a place part of a workspace: `Condition`, and conditions joined by & and |.
 
 A condition is data: it does not change, compares by value, and goes to JSON and back by its `kind`, so that it can be
 written into a result, a checkpoint or a message to another machine.

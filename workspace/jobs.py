@@ -25,7 +25,7 @@ WORTH_KERNELS = 500_000  # samples of a run: the first kernels on a machine take
 
 @dataclass(frozen=True)
 class RunSettings:
-    """What all jobs of a run share.
+    """The settings that all jobs of a run share.
 
     Attributes
     ----------

@@ -20,8 +20,8 @@ The damping increment is C times what the vibration adds to the length, over one
 
     dT_C = C (l(B + dB) - l(B)) / dt      dB = dx_B + [dTheta]x R b
 
-Source: paper F, section III, Eqs. 8 to 23, corrected: k_l has E A / e (Eq. 15 prints E A / de); sgn looks at the
-elongation of an element (Eq. 16 looks at the signs of its nodes' displacements, by which element 1, whose node 0 is
+Source: paper F, section III, Eqs. 8 to 23, corrected: k_l has E A / e (Eq. 15 prints E A / de); sgn follows from the
+elongation of an element (Eq. 16 takes the signs of its nodes' displacements, by which element 1, whose node 0 is
 held, never pulls); increments have a sign (Eq. 22 takes the norm).
 """
 
@@ -51,7 +51,7 @@ class ElementChain:
     elements
         n.
     pretension
-        What every element carries before the increments [N]; `inf`: the cable cannot become slack.
+        Tension of every element before the increments [N]; `inf`: the cable cannot become slack.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def elastic_increment(
     winding
         De of each element [m], (...).
     pretension
-        What each cable carries before [N], (...); `inf`: it cannot become slack.
+        Tension of each cable before [N], (...); `inf`: it cannot become slack.
     """
     lengths = np.linalg.norm(vectors, axis=-1)
     end = -np.einsum("...i,...i->...", vectors, displacements) / lengths
