@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
-from .models.robot import Robot
+from .inputs import real_array
+from .models.robot import LARGEST, Robot
 from .solvers.problem import TensionProblem
 from .solvers.solution import TensionSolution
 
@@ -88,6 +89,16 @@ def pose_problem(
         If an argument has a wrong type, shape or value, or a cable has no length.
     """
     robot = dynamics.robot
+    given = {"pose": pose, "velocity": velocity, "acceleration": acceleration, "carrier_pose": carrier_pose}
+    given |= {"carrier_velocity": carrier_velocity, "carrier_acceleration": carrier_acceleration, "wind": wind}
+    for name, value in given.items():
+        if value is None:
+            continue
+        array = real_array(name, value)
+        if array.ndim > (2 if name.startswith("carrier") else 1):
+            raise InputError(f"{name} must be that of one instant, got an array of shape {array.shape}")
+        if np.isfinite(array).all() and np.abs(array).max(initial=0.0) > LARGEST:
+            raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {np.abs(array).max():g}")
     rate = np.zeros(6) if velocity is None else velocity
     rate_rate = np.zeros(6) if acceleration is None else acceleration
     short = np.flatnonzero(~(dynamics.cable_lengths(pose, carrier_pose) > COINCIDENT))

@@ -1,5 +1,8 @@
 """Check arguments, and refuse wrong ones in one line: the field, what is accepted, the value."""
 
+import os
+from collections.abc import Collection
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -7,19 +10,40 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 
-__all__ = ["finite_array", "number", "real_array", "required", "shown", "whole_number"]
+__all__ = [
+    "file_path",
+    "finite_array",
+    "flag",
+    "number",
+    "one_of",
+    "printable",
+    "real_array",
+    "required",
+    "shown",
+    "whole_number",
+]
 
 Kind = TypeVar("Kind")
 
 _LONGEST = 60  # letters of a value in a message
+LONGEST_TEXT = 400  # letters of a path or of a part of a message
 
 
 def shown(value: object) -> str:
     """Return a value in one short line, for a message."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of shape {value.shape}"
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an int of more than 4300 digits
+        return f"{type(value).__name__} without a short form"
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def printable(text: str, longest: int = LONGEST_TEXT) -> str:
+    """Return text in one line that a terminal shows as it is: paths and files may hold line breaks and escapes."""
+    line = "".join(char if char.isprintable() else repr(char)[1:-1] for char in " ".join(text.splitlines()))
+    return line if len(line) <= longest else f"{line[: longest - 3]}..."
 
 
 def required(name: str, value: object, kind: type[Kind]) -> Kind:
@@ -44,6 +68,28 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:
         return int(value)
     raise InputError(f"{name} must be a whole number from {least} to {most}, got {shown(value)}")
+
+
+def flag(name: str, value: object) -> bool:
+    """Return True or False, or raise InputError."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def one_of(name: str, value: object, accepted: Collection[str]) -> str:
+    """Return a word that is among those accepted, or raise InputError."""
+    if not isinstance(value, str) or value not in accepted:
+        raise InputError(f"{name} must be one of {', '.join(accepted)}, got {shown(value)}")
+    return value
+
+
+def file_path(name: str, value: object, accepted: str = "a path") -> Path:
+    """Return a text or path-like object as a path, or raise InputError; `accepted` is what the message names."""
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise InputError(f"{name} must be {accepted}, got {shown(value)}")
+    return Path(text)
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:

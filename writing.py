@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError
+from .inputs import printable
 
 _unfinished: set[Path] = set()
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -59,7 +60,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
         If `path` exists already, or cannot be written.
     """
     if path.exists() or path.is_symlink():
-        raise InputError(f"{path} must be a new path, got one that exists")
+        raise InputError(f"{printable(str(path))} must be a new path, got one that exists")
     target = check_writable(path)
     try:
         temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix="."))
@@ -99,12 +100,13 @@ def check_writable(path: Path) -> Path:
     InputError
         If it is a folder, a device or a pipe, or its folder cannot be written.
     """
+    where = printable(str(path))
     try:
         target = path.resolve()
         if not path.name or target.is_dir():
-            raise InputError(f"{path} must be the path of a file, got a folder")
+            raise InputError(f"{where} must be the path of a file, got a folder")
         if target.exists() and not stat.S_ISREG(target.stat().st_mode):
-            raise InputError(f"{path} must be the path of a file, got a device or a pipe")
+            raise InputError(f"{where} must be the path of a file, got a device or a pipe")
         target.parent.mkdir(parents=True, exist_ok=True)
         if not os.access(target.parent, os.W_OK):
             raise PermissionError(13, "Permission denied")
@@ -117,7 +119,7 @@ def check_writable(path: Path) -> Path:
 
 def _refusal(path: Path, error: Exception) -> InputError:
     reason = getattr(error, "strerror", None) or str(error)
-    return InputError(f"{path}: cannot be written ({reason})")
+    return InputError(f"{printable(str(path))}: cannot be written ({reason})")
 
 
 def _mode(target: Path) -> int:

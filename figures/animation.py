@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..inputs import number
 from . import film, style
 from .hull import faces
 from .plan import equal_scales, name_axes
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 SIZE = (7.0, 5.2)  # [inches]
 DPI = 100  # an even number of pixels in each direction, which MP4 requires
 MOST_FRAMES = 3000
+SLOWEST, FASTEST = 1e-6, 1e6  # seconds of the motion in one of the film
 NO_TENSIONS = "#999999"
 
 
@@ -92,8 +94,7 @@ def check_film(path: Path, speed: float, fps: float) -> float:
     InputError
         If the suffix, the speed or the frame rate are not possible.
     """
-    if not (speed > 0 and np.isfinite(speed)):
-        raise InputError(f"speed must be a number above 0 (1 is real time), got {speed:g}")
+    number("speed", speed, SLOWEST, FASTEST)
     return film.frame_rate(path, fps)
 
 

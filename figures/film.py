@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, TowlineError
+from ..inputs import number, shown
 from ..writing import whole_file
 
 SUFFIXES = (".gif", ".mp4")
@@ -30,10 +31,9 @@ def frame_rate(path: Path, rate: float) -> float:
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(f"{path} must end in {' or '.join(SUFFIXES)}, got {path.suffix!r}")
+        raise InputError(f"file must end in {' or '.join(SUFFIXES)}, got {shown(path.name)}")
     fastest = 1 / (SHORTEST * TICK) if suffix == ".gif" else FASTEST
-    if not 0.1 <= rate <= fastest:
-        raise InputError(f"fps must be a number from 0.1 to {fastest:g} for {suffix}, got {rate:g}")
+    rate = number("fps", rate, 0.1, fastest, also=f" for {suffix}")
     if suffix == ".gif":
         return 1 / (TICK * round(1 / (TICK * rate)))
     ffmpeg(path)

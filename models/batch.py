@@ -277,10 +277,10 @@ def _leading(arrays: dict[str, np.ndarray], cores: dict[str, tuple[int, ...]]) -
 def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     try:
         given = np.asarray(value)
-        if given.dtype.kind == "c":
+        if given.dtype.kind not in "fiubO":
             raise TypeError
         array = given.astype(float, copy=False)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
         raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")

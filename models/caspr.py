@@ -31,7 +31,8 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser, ParseError
 
 from ..errors import InputError
-from .parsing import brief, read_bytes, validate
+from ..inputs import shown
+from .parsing import read_bytes, validate
 from .robot import COORDINATES, LARGEST, Cable, Coordinate, Platform, Robot, inertia_matrix
 from .rotation import rotation
 
@@ -105,8 +106,8 @@ def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> 
     default = cables.element.get("default_cable_set")
     remarks = [text if count == 1 else f"{text} ({count} times)" for text, count in notes.items()]
     source = (
-        f"Imported from the CASPR folder {brief(name)}, link {brief(link.element.get('name', ''))}, cable set "
-        f"{brief(chosen.attribute('id'))}: geometry, mass, inertia and tension limits. Home is q_initial."
+        f"Imported from the CASPR folder {shown(name)}, link {shown(link.element.get('name', ''))}, cable set "
+        f"{shown(chosen.attribute('id'))}: geometry, mass, inertia and tension limits. Home is q_initial."
     )
     data = {
         "name": _name(name if chosen.attribute("id") == default else f"{name}-{chosen.attribute('id')}"),
@@ -171,14 +172,14 @@ class _Node:
         values = [float(word) if NUMBER.fullmatch(word) else math.nan for word in words]
         if len(values) != count or not all(map(math.isfinite, values)):
             accepted = "be one finite number" if count == 1 else f"be {count} finite numbers"
-            raise self.wrong(accepted, brief(text.strip()), attribute or "")
+            raise self.wrong(accepted, shown(text.strip()), attribute or "")
         return values
 
 
 def _label(element: Element) -> str:
     """Return the element's tag, and its name, id or number if it has one."""
     called = next((element.get(key) for key in ("name", "id", "num") if element.get(key)), None)
-    return f": {brief(element.tag)[1:-1]}" + (f" {brief(called)}" if called else "")
+    return f": {shown(element.tag)[1:-1]}" + (f" {shown(called)}" if called else "")
 
 
 def _file(folder: Path, ending: str) -> Path:
@@ -202,14 +203,14 @@ def _read(file: Path, root: str, notes: Counter[str]) -> _Node:
             f"{file} must be plain XML, with at most a DOCTYPE that names a file, got a DTD or entities of its own"
         ) from None
     except ParseError as error:
-        reason = brief(str(error))[1:-1]
+        reason = shown(str(error))[1:-1]
         raise InputError(f"{file} must be a CASPR {root} file, got text that is not XML ({reason})") from None
     except (LookupError, ValueError):  # encodings that Python or expat do not know
         raise InputError(f"{file} must be XML in UTF-8, got an unknown encoding") from None
     if element.tag != root:
-        raise InputError(f"{file} must have the root element {root}, got {brief(element.tag)}")
+        raise InputError(f"{file} must have the root element {root}, got {shown(element.tag)}")
     for holder in _with_stray_text(element):
-        notes[f"{file.name}: text beside the elements of {brief(holder)[1:-1]} is left out"] += 1
+        notes[f"{file.name}: text beside the elements of {shown(holder)[1:-1]} is left out"] += 1
     return _Node(element, str(file))
 
 
@@ -225,7 +226,7 @@ def _only_link(bodies: _Node) -> _Node:
     links = bodies.child("links").children()
     for link in links:
         if link.element.tag != "link_rigid":
-            raise link.wrong("be a link_rigid", brief(link.element.tag))
+            raise link.wrong("be a link_rigid", shown(link.element.tag))
     if len(links) != 1:
         raise bodies.wrong("have one link, because towline's robots have one platform", str(len(links)))
     return links[0]
@@ -236,7 +237,7 @@ def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
     joint, physical = link.child("joint"), link.child("physical")
     kind = joint.attribute("type")
     if kind not in JOINTS:
-        raise joint.wrong(f"be one of {', '.join(JOINTS)}", brief(kind), "type")
+        raise joint.wrong(f"be one of {', '.join(JOINTS)}", shown(kind), "type")
     if joint.element.get("actuated") == "true":
         raise joint.wrong("be a joint that only the cables move", "one with a motor")
     mass = physical.child("mass").numbers(1)[0]
@@ -260,7 +261,7 @@ def _inertia(node: _Node, mass: float, com: np.ndarray) -> tuple[float, float, f
     xx, yy, zz, xy, xz, yz = (node.child(name).numbers(1)[0] for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"))
     reference = node.attribute("ref")
     if reference not in ("com", "joint"):
-        raise node.wrong("be com or joint", brief(reference), "ref")
+        raise node.wrong("be com or joint", shown(reference), "ref")
     matrix = inertia_matrix((xx, yy, zz, xy, xz, yz))
     if reference == "joint":
         matrix = matrix - mass * (com @ com * np.eye(3) - np.outer(com, com))
@@ -272,7 +273,7 @@ def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
     """Return q_initial as a pose in {G} [m, rad]."""
     parent = link.child("parent")
     if parent.child("num").numbers(1) != [0.0]:
-        raise parent.child("num").wrong("be 0, the ground", brief(parent.child("num").element.text or ""))
+        raise parent.child("num").wrong("be 0, the ground", shown(parent.child("num").element.text or ""))
     pose = np.zeros(6)
     pose[:3] = parent.child("location").numbers(3)
     dof = JOINTS[kind]
@@ -314,12 +315,12 @@ def _choose(cables: _Node, requested: str | None) -> tuple[_Node, list[str]]:
     """Return the set of cables to import, and the ids of all sets."""
     sets = cables.children("cable_set")
     ids = [node.attribute("id") for node in sets]
-    known = ", ".join(brief(name)[1:-1] for name in ids) or "no set, because the file has none"
+    known = ", ".join(shown(name)[1:-1] for name in ids) or "no set, because the file has none"
     chosen = requested or cables.element.get("default_cable_set") or (ids[0] if len(ids) == 1 else "")
     if not chosen:
         raise cables.wrong(f"be one of {known}", "none", "default_cable_set")
     if ids.count(chosen) != 1:
-        got = f"{brief(chosen)}, which is there twice" if chosen in ids else brief(chosen)
+        got = f"{shown(chosen)}, which is there twice" if chosen in ids else shown(chosen)
         raise cables.wrong(f"be one of {known}", got, "cable set")
     return sets[ids.index(chosen)], ids
 
@@ -327,10 +328,10 @@ def _choose(cables: _Node, requested: str | None) -> tuple[_Node, list[str]]:
 def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
     kind = node.element.tag
     if kind not in CABLES:
-        raise node.wrong(f"be one of {', '.join(CABLES)}", brief(kind))
+        raise node.wrong(f"be one of {', '.join(CABLES)}", shown(kind))
     reference = node.attribute("attachment_reference")
     if reference not in ("com", "joint"):
-        raise node.wrong("be com or joint", brief(reference), "attachment_reference")
+        raise node.wrong("be com or joint", shown(reference), "attachment_reference")
     properties = node.child("properties")
     lower = properties.find("force_min")
     if lower is None:
@@ -351,7 +352,7 @@ def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
         notes[f"the variable stiffness of {kind} is left out"] += 1
     for extra in properties.children():
         if extra.element.tag not in used:
-            notes[f"the property {brief(extra.element.tag)[1:-1]} of {kind} is left out"] += 1
+            notes[f"the property {shown(extra.element.tag)[1:-1]} of {kind} is left out"] += 1
     return validate(data | _ends(node, com if reference == "com" else np.zeros(3), notes), Cable, node.where)
 
 
@@ -384,7 +385,7 @@ def _link(point: _Node) -> int:
     if point.element.tag == "base_rotating_pulley":
         return 0
     if point.element.tag != "attachment":
-        raise point.wrong("be an attachment or a base_rotating_pulley", brief(point.element.tag))
+        raise point.wrong("be an attachment or a base_rotating_pulley", shown(point.element.tag))
     number = point.child("link").numbers(1)[0]
     if not number.is_integer():
         raise point.child("link").wrong("be 0 or 1", f"{number:g}")

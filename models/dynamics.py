@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..inputs import flag, required
 from . import elasticity, forward, kinematics, points, rigid_body, wind
 from .arrays import Array, Symbol
 from .batch import arrays, call, is_symbolic
@@ -24,7 +25,7 @@ from .robot import QuadrotorCarrier, Robot
 
 def dynamics_of(robot: Robot) -> Dynamics:
     """Return the `Dynamics` of a robot, kept for the next call."""
-    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
+    key: Any = required("robot", robot, Robot)  # frozen, so it has a hash, unknown to a type checker
     return _dynamics_of(key)
 
 
@@ -363,7 +364,7 @@ class Dynamics:
         InputError
             If `elastic` and a cable has no stiffness.
         """
-        if elastic:
+        if flag("elastic", elastic):
             for index, cable in enumerate(self.robot.cables):
                 if cable.stiffness is None:
                     raise InputError(

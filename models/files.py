@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from ..errors import InputError
-from ..inputs import shown
+from ..inputs import file_path, shown
 from .library import FOLDER, available
 from .parsing import read_yaml
 from .robot import Robot
@@ -26,18 +26,16 @@ def load(name: str | os.PathLike[str]) -> Robot:
     InputError
         If there is no such robot or file, or the file is not a valid robot: one line with file, field and value.
     """
-    try:
-        text = os.fspath(name)
-    except TypeError:
-        raise InputError(f"robot must be a name or a path, got {shown(name)}") from None
+    path = file_path("robot", name, "a name of the library or the path of a YAML file")
+    text = os.fspath(name)
     if text in available():
         return read_yaml(FOLDER / f"{text}.yaml", Robot)
-    path = Path(text)
     if path.suffix in (".yaml", ".yml") or _exists(path):
         return read_yaml(path, Robot)
     close = difflib.get_close_matches(text, available(), n=1)
     hint = f", did you mean {close[0]!r}?" if close else ""
-    raise InputError(f"robot must be one of {', '.join(available())}, or the path of a YAML file, got {text!r}{hint}")
+    known = ", ".join(available())
+    raise InputError(f"robot must be one of {known}, or the path of a YAML file, got {shown(text)}{hint}")
 
 
 def as_robot(robot: object) -> Robot:

@@ -18,9 +18,9 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
 from ..errors import InputError
+from ..inputs import LONGEST_TEXT, printable, shown
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
-LONGEST_PART = 400  # [characters] of an error's line
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -42,29 +42,31 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
     InputError
         If the file cannot be read, is too large, is not YAML or is not a valid `model`: one line that names the file.
     """
+    where = printable(str(path))
     try:
         text = read_bytes(path, "a YAML file").decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} must be a YAML file in UTF-8, got another text (byte {error.start})") from None
-    return parse_yaml(text, model, where=str(path))
+        raise InputError(f"{where} must be a YAML file in UTF-8, got another text (byte {error.start})") from None
+    return parse_yaml(text, model, where)
 
 
 def read_bytes(path: Path, what: str) -> bytes:
     """Return the content of `path`, or raise InputError if it cannot be read or is too large; `what` describes it."""
+    where = printable(str(path))
     try:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():
-            raise InputError(f"{path} must be {what}, got a device or a pipe")
+            raise InputError(f"{where} must be {what}, got a device or a pipe")
         with path.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
             size = max(len(content), path.stat().st_size)
-            raise InputError(f"{path} must be {what} of at most {LARGEST_FILE / 1e6:g} MB, got {size / 1e6:.1f} MB")
+            raise InputError(f"{where} must be {what} of at most {LARGEST_FILE / 1e6:g} MB, got {size / 1e6:.1f} MB")
         return content
     except InputError:
         raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be read ({reason}); it must be a readable file") from None
+        raise InputError(f"{where}: cannot be read ({reason}); it must be a readable file") from None
 
 
 def parse_yaml(text: str, model: type[Model], where: str) -> Model:
@@ -78,7 +80,7 @@ def parse_yaml(text: str, model: type[Model], where: str) -> Model:
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise InputError(f"{where}: is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
-        raise InputError(f"{where}: must hold a mapping with {_keys(_schema(model))}, got {brief(data)}")
+        raise InputError(f"{where}: must hold a mapping with {_keys(_schema(model))}, got {shown(data)}")
     return validate(data, model, where)
 
 
@@ -101,7 +103,7 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     # A list whose items are wrong is counted by pydantic once more as too short.
     others = [other for other in details[1:] if other["type"] != "too_short"]
     more = f" (and {len(others)} more)" if others else ""
-    line = _printable(_sentence(details[0], model))
+    line = printable(_sentence(details[0], model))
     return (f"{where}: {line}" if where else line) + more
 
 
@@ -110,7 +112,7 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     place, kind, value, context = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
     field, holder = _walk(place, _schema(model))
     key = str(place[-1]) if place else ""
-    field = _printable(field, LONGEST_PART // 2)  # leaves enough of the line for what is wrong with it
+    field = printable(field, LONGEST_TEXT // 2)  # leaves enough of the line for what is wrong with it
     if kind == "extra_forbidden":
         return f"{field} is not a known key{_close(key, _known(holder))} (known keys: {_keys(holder)})"
     if kind == "missing":
@@ -119,17 +121,17 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     if kind == "union_tag_invalid":
         tags = _tags(place, model)
         meant = _close(str(context["tag"]), tags)
-        return f"{field}.kind must be one of {', '.join(tags)}, got {brief(context['tag'])}{meant}"
+        return f"{field}.kind must be one of {', '.join(tags)}, got {shown(context['tag'])}{meant}"
     if kind == "union_tag_not_found":
         return f"{field}.kind is missing: one of {', '.join(_tags(place, model))}"
     if kind == "too_short":
         return f"{field} must have at least {context['min_length']} items, got {context['actual_length']}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        message = f"must be a mapping with {_keys(_schema_at(place, model))}, got {brief(value)}"
+        message = f"must be a mapping with {_keys(_schema_at(place, model))}, got {shown(value)}"
     else:
         message = detail["msg"]
         if kind != "value_error" or not isinstance(value, dict):
-            message += f", got {brief(value)}"
+            message += f", got {shown(value)}"
     if not field:
         return message
     if message.partition(" ")[0] in _known(_schema_at(place, model)):  # a part's own check names one of its fields
@@ -207,7 +209,7 @@ class _PlainComposer(Composer):
             raise ComposerError(problem="has a YAML alias (*name)", problem_mark=event.start_mark)
         if getattr(event, "tag", None) is not None:
             raise ComposerError(
-                problem=f"has a YAML tag ({brief(str(event.tag))[1:-1]})", problem_mark=event.start_mark
+                problem=f"has a YAML tag ({shown(str(event.tag))[1:-1]})", problem_mark=event.start_mark
             )
         return super().compose_node(parent, index)
 
@@ -217,19 +219,7 @@ def _problem(error: Exception) -> str:
     problem = getattr(error, "problem", None) or str(error) or type(error).__name__
     mark = getattr(error, "problem_mark", None)
     place = f", line {mark.line + 1}" if mark is not None else ""
-    return f"{_printable(str(problem).splitlines()[0])}{place}"
-
-
-def _printable(text: str, longest: int = LONGEST_PART) -> str:
-    """Return one line that a terminal shows as it is: a file's keys may have line breaks and escape sequences."""
-    shown = "".join(char if char.isprintable() else repr(char)[1:-1] for char in " ".join(text.splitlines()))
-    return shown if len(shown) <= longest else f"{shown[: longest - 3]}..."
-
-
-def brief(value: Any) -> str:
-    """Return the `repr` of a value, cut to 60 characters; it is one line whatever the value is."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return f"{printable(str(problem).splitlines()[0])}{place}"
 
 
 def _keys(schema: dict[str, Any]) -> str:

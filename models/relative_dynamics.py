@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import cached_property
 from typing import overload
 
@@ -13,6 +14,7 @@ from ..errors import InputError
 from . import kinematics, relative, wind
 from .arrays import Array, Symbol
 from .batch import call
+from .files import as_robot
 from .robot import Robot
 
 
@@ -23,13 +25,24 @@ class RelativeDynamics:
     `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], a single carrier having no row of its own.
 
+    Parameters
+    ----------
+    robot
+        A `Robot` with one carrier, the name of one in the library, or the path of a robot file.
+
     Attributes
     ----------
     functions
         The CasADi Functions by name, with named inputs and outputs.
+
+    Raises
+    ------
+    InputError
+        If `robot` is none of these. Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot | str | os.PathLike[str]):
+        robot = as_robot(robot)
         if len(robot.carriers) != 1:
             raise InputError(
                 f"relative must have a robot with one carrier, got {robot.name!r} with {len(robot.carriers)}"

@@ -49,6 +49,18 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    def __init__(self, /, **fields: Any):
+        """Check the fields, with the errors of `model_validate`."""
+        from .parsing import one_line
+
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise InputError(one_line(error, type(self).__name__.lower(), type(self))) from None
+
+    # As of pydantic's own: parts inside of parts are checked without a call of it, so that errors keep their place.
+    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
         """Check a mapping as pydantic does, with the errors of towline.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..inputs import file_path
 from ..netcdf import save_netcdf
 from ..solvers import Certificate
 from ..writing import whole_file
@@ -146,7 +147,7 @@ class Plan:
         """
         from .reports.trajectory import trajectory
 
-        return save_netcdf(trajectory(self), Path(file))
+        return save_netcdf(trajectory(self), file_path("file", file))
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Save the figures as PNG files in `folder`, and return their paths.
@@ -156,7 +157,8 @@ class Plan:
         """
         from ..figures import style
 
-        return [style.save(drawn, Path(folder) / f"{name}.png") for name, drawn in self.figures().items()]
+        into = file_path("folder", folder)
+        return [style.save(drawn, into / f"{name}.png") for name, drawn in self.figures().items()]
 
     def figures(self) -> dict[str, Figure]:
         """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.
@@ -190,7 +192,7 @@ class Plan:
         from ..figures import animation
         from .reports.scene import scene
 
-        path = Path(file)
+        path = file_path("file", file)
         frames = animation.timing(path, self.scenario.duration, speed, fps)
         return animation.draw(scene(self, frames.times), frames, path)
 
@@ -213,7 +215,7 @@ class Plan:
         """
         from .reports.report_page import page
 
-        path = Path(file)
+        path = file_path("file", file)
         with whole_file(path) as temporary:
             temporary.write_text(page(self, self.trajectory), encoding="utf-8")
         return path

@@ -173,6 +173,7 @@ class TensionProblem:
         """
         if not isinstance(tensions, np.ndarray) or tensions.shape != self.t_min.shape or tensions.dtype != np.float64:
             tensions = _per_cable("tensions", tensions, self.m)
+            _require_finite("tensions", tensions)
         nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
         required = np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero)
         return float(FEASIBILITY * required + ROUNDING * (self.column_norms @ (np.abs(tensions) + np.abs(self.t_ref))))

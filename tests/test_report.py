@@ -332,11 +332,11 @@ def test_a_broken_ffmpeg_is_one_line_and_leaves_no_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("file", "options", "message"),
     [
-        ("film.avi", {}, "must end in .gif or .mp4, got '.avi'"),
-        ("film", {}, "must end in .gif or .mp4, got ''"),
+        ("film.avi", {}, "must end in .gif or .mp4, got 'film.avi'"),
+        ("film", {}, "must end in .gif or .mp4, got 'film'"),
         ("film.gif", {"fps": 80}, "fps must be a number from 0.1 to 50 for .gif, got 80"),
         ("film.gif", {"fps": float("nan")}, "fps must be a number"),
-        ("film.gif", {"speed": 0}, "speed must be a number above 0"),
+        ("film.gif", {"speed": 0}, "speed must be a number from 1e-06"),
         ("film.gif", {"speed": 1e-4}, "must have at most 3000 frames"),
     ],
 )

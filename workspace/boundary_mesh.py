@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..inputs import required, shown, whole_number
+from ..inputs import finite_array, required, whole_number
 from ..models import Robot
 from ..writing import whole_file
 from .condition import Condition
@@ -85,11 +85,11 @@ def boundary(
     """
     required("robot", robot, Robot)
     required("condition", condition, Condition)
-    low, high = _three("low", low), _three("high", high)
+    low, high = finite_array("low", low, (3,)), finite_array("high", high, (3,))
     if not (high > low).all():
         raise InputError(f"low must be below high in all three numbers, got {low.tolist()} and {high.tolist()}")
     whole_number("cells", cells, 2, MOST_CELLS)
-    angles = robot.home[3:] if attitude is None else _three("attitude", attitude)
+    angles = robot.home[3:] if attitude is None else finite_array("attitude", attitude, (3,))
     counts = np.maximum(np.ceil((high - low) / ((high - low).max() / cells)).astype(int), 1) + 1
     axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
     poses = np.empty((int(np.prod(counts)), 6))
@@ -97,18 +97,6 @@ def boundary(
     poses[:, 3:] = angles
     held = condition.holds(robot, Places.at_home(robot, poses))
     return boundary_of_values(held.reshape(counts) - 0.5, low, high)
-
-
-def _three(field: str, values: ArrayLike) -> np.ndarray:
-    """Return values as an array (3,); raise InputError if they are not three finite numbers."""
-    message = f"{field} must be three finite numbers, got {shown(values)}"
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(message) from None
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InputError(message)
-    return array
 
 
 def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:

@@ -10,14 +10,13 @@ from abc import ABC, abstractmethod
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
-from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError
+from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from ..errors import InputError
 from ..inputs import required, shown
 from ..models import Robot
-from ..models.parsing import one_line
 from ..models.robot import Part
-from .places import Places
+from .places import Places, check_places
 
 __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
 
@@ -26,12 +25,6 @@ class Condition(Part, ABC):
     """A property of a place that holds or does not. A condition of your own has a `kind` and `_holds`."""
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
-
-    def __init__(self, /, **fields: Any):
-        try:
-            super().__init__(**fields)
-        except ValidationError as error:
-            raise InputError(one_line(error, type(self).__name__, type(self))) from None
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -47,7 +40,7 @@ class Condition(Part, ABC):
         InputError
             If an argument has a wrong type or shape, or the condition does not apply to the robot.
         """
-        required("places", places, Places).check(required("robot", robot, Robot))
+        check_places(robot, places)
         finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
         if finite.all():
             return self._holds(robot, places)

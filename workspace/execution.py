@@ -127,8 +127,8 @@ def _cluster(address: str) -> Iterator[Any]:
         get_address_host(address)
         client = distributed.Client(address, timeout=CONNECT_WITHIN, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        reason = "no answer" if isinstance(error, OSError) else str(error)
-        raise InputError(f"{accepted}, got {shown(address)} ({' '.join(reason.split())})") from None
+        reason = "no answer" if isinstance(error, OSError) else "not an address"
+        raise InputError(f"{accepted}, got {shown(address)} ({reason})") from None
     try:
         try:
             client.wait_for_workers(1, timeout=WORKERS_WITHIN)

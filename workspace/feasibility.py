@@ -10,12 +10,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..inputs import required
 from ..models import Robot
 from ..models.batch import compiled
 from ..models.dynamics import dynamics_of
 from ..solvers import compiled as solver_kernels
 from ..solvers import solve_batch
-from .places import Places
+from .places import Places, check_places
 
 __all__ = [
     "feasible",
@@ -47,7 +48,7 @@ def rest_wrench(robot: Robot) -> np.ndarray:
 
 def wrench_rows(robot: Robot, forces_only: bool = False) -> np.ndarray:
     """Return the indices of the wrench rows of the coordinates that can move, or of those that are forces."""
-    rows = np.flatnonzero(robot.dof_mask)
+    rows = np.flatnonzero(required("robot", robot, Robot).dof_mask)
     return rows[rows < 3] if forces_only else rows
 
 
@@ -81,12 +82,12 @@ def feasible(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarra
         Wrench rows to give; default: those of the coordinates that can move.
     """
     rows = wrench_rows(robot) if rows is None else rows
-    required = scaled(robot, wrenches, rows)
-    shared = required.ndim == 2
+    to_give = scaled(robot, wrenches, rows)
+    shared = to_give.ndim == 2
     held = np.zeros(len(places), dtype=bool)
     for part, A in wrench_matrices(robot, places, rows):
         left = np.arange(len(A))
-        for w in required if shared else required[:, part]:
+        for w in to_give if shared else to_give[:, part]:
             some = A if left.size == len(A) else A[left]
             left = left[solve_batch(some, w if shared else w[left], robot.t_min, robot.t_max, threads=1).feasible]
             if not left.size:
@@ -100,6 +101,7 @@ def shortfall(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarr
 
     It is the shortfall of the batch solver's certificates: zero exactly where `feasible` is true.
     """
+    check_places(robot, places)
     rows = wrench_rows(robot) if rows is None else rows
     largest = np.zeros(len(places))
     for part, A in wrench_matrices(robot, places, rows):

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..inputs import required, shown
+from ..inputs import real_array, required, shown
 from ..models import Robot
 
-__all__ = ["Places"]
+__all__ = ["Places", "check_places"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,7 @@ class Places:
             If an argument has a wrong type or shape.
         """
         home = required("robot", robot, Robot).carrier_home
-        try:
-            poses = np.atleast_2d(np.asarray(pose, dtype=float))
-        except (TypeError, ValueError):
-            raise InputError(f"pose must be an array of numbers of shape (n, 6), got {shown(pose)}") from None
+        poses = np.atleast_2d(real_array("pose", pose).astype(float, copy=False))
         if poses.ndim != 2 or poses.shape[1] != 6:
             raise InputError(f"pose must have the shape (n, 6), got {np.shape(pose)}")
         return cls(poses, np.broadcast_to(home, (len(poses), *home.shape)))
@@ -51,8 +48,18 @@ class Places:
         return len(self.pose)
 
     def only(self, rows: np.ndarray | slice) -> Places:
-        """Return the places of some rows: indices, flags (n,) or a slice."""
-        return Places(self.pose[rows], self.carriers[rows])
+        """Return the places of some rows: indices, flags (n,) or a slice.
+
+        Raises
+        ------
+        InputError
+            If `rows` are none of these.
+        """
+        try:
+            return Places(self.pose[rows], self.carriers[rows])
+        except (IndexError, TypeError, ValueError):
+            accepted = f"indices below {len(self)}, flags ({len(self)},) or a slice"
+            raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
 
     def check(self, robot: Robot) -> None:
         """Check that the shapes are those of a robot.
@@ -62,7 +69,12 @@ class Places:
         InputError
             If one is not.
         """
-        n, carriers = np.shape(self.pose)[:1], len(robot.carriers)
+        n, carriers = np.shape(self.pose)[:1], len(required("robot", robot, Robot).carriers)
         for name, value, shape in (("pose", self.pose, (*n, 6)), ("carriers", self.carriers, (*n, carriers, 6))):
             if not isinstance(value, np.ndarray) or value.shape != shape or value.dtype.kind not in "fiu":
                 raise InputError(f"places.{name} must be an array of numbers of shape {shape}, got {shown(value)}")
+
+
+def check_places(robot: Robot, places: Places) -> None:
+    """Check that these are a robot and places of it; raise InputError if they are not."""
+    required("places", places, Places).check(robot)

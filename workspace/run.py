@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..inputs import required, shown, whole_number
+from ..inputs import file_path, flag, one_of, required, shown, whole_number
 from ..models import Robot
 from ..netcdf import Contents, save_netcdf
 from ..writing import whole_folder
@@ -132,17 +132,14 @@ def sample(
     check_sampling(method, samples, seed)
     whole_number("workers", workers, 1, MOST_WORKERS)
     whole_number("points_max", points_max, 0, MOST_POINTS)
-    if keep not in KEEP:
-        raise InputError(f"keep must be one of {', '.join(KEEP)}, got {shown(keep)}")
-    if scheduler is not None and not isinstance(scheduler, str):
+    one_of("keep", keep, KEEP)
+    if scheduler is not None and not (isinstance(scheduler, str) and scheduler):
         raise InputError(f"scheduler must be the address of a Dask scheduler or None, got {shown(scheduler)}")
-    if checkpoint is not None and not isinstance(checkpoint, str | os.PathLike):
-        raise InputError(f"checkpoint must be a path or None, got {shown(checkpoint)}")
-    if not isinstance(resume, bool):
-        raise InputError(f"resume must be True or False, got {shown(resume)}")
+    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    flag("resume", resume)
     if progress is not None and not callable(progress):
         raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    if resume and checkpoint is None:
+    if resume and file is None:
         raise InputError("checkpoint must be a path if resume is True, got None")
     if size is not None and method != "adaptive":
         raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
@@ -162,7 +159,7 @@ def sample(
     totals = Totals(domain, points_max if keep != "none" else 0)
     packed = RunSettings(robot, condition, domain, sampler, keep, total).packed()
     header = _header(robot, {**requested, "samples": total, "size": size})
-    opened = open_checkpoint(Path(checkpoint), header, resume) if checkpoint is not None else nullcontext()
+    opened = open_checkpoint(file, header, resume) if file is not None else nullcontext()
     with executor(packed, workers, scheduler) as evaluate, opened as stored:
         work = _Work(evaluate, totals, stored, progress, total)
         if refinement is None:
@@ -199,9 +196,7 @@ def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     import xarray as xr
 
     required("result", result, xr.Dataset)
-    if not isinstance(file, str | os.PathLike):
-        raise InputError(f"file must be a path, got {shown(file)}")
-    path = Path(file)
+    path = file_path("file", file)
     lasting = result.copy(deep=False)
     lasting.attrs = {name: value for name, value in result.attrs.items() if name not in OF_THIS_RUN}
     if path.suffix == ".zarr":

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import shown, whole_number
+from ..inputs import one_of, whole_number
 from .halton import halton
 
 CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
@@ -123,7 +122,6 @@ def _sobol(dimension: int, seed: int) -> _Sobol:
 
 def check_sampling(method: str, samples: int, seed: int) -> None:
     """Check the arguments of a sampler; raise InputError if one is wrong."""
-    if method not in METHODS:
-        raise InputError(f"method must be one of {', '.join(METHODS)}, got {shown(method)}")
+    one_of("method", method, METHODS)
     whole_number("samples", samples, 1, MOST_SOBOL if method == "sobol" else MOST)
     whole_number("seed", seed, 0, 2**63 - 1)

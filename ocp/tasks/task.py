@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ...errors import InputError
-from ...inputs import shown
+from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
 from ...models.ranges import PositiveRange
 from ...models.robot import Name, NonNegative, Part, Pose, Positive, Vector3
@@ -187,8 +186,4 @@ def read_task(task: Task | dict[str, Any] | str | os.PathLike[str]) -> Task:
         return task
     if isinstance(task, dict):
         return validate(task, Task, "task")
-    try:
-        path = Path(task)
-    except TypeError:
-        raise InputError(f"task must be a Task, a mapping or the path of a YAML file, got {shown(task)}") from None
-    return read_yaml(path, Task)
+    return read_yaml(file_path("task", task, "a Task, a mapping or the path of a YAML file"), Task)

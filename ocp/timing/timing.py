@@ -19,7 +19,7 @@ import numpy as np
 
 from ...distribution import wrench_problem
 from ...errors import InputError, SolverError
-from ...inputs import whole_number
+from ...inputs import file_path, real_array, required, shown, whole_number
 from ...models import Robot
 from ...models.files import as_robot
 from ...models.parsing import to_yaml
@@ -29,7 +29,18 @@ from ...text import quantity
 from ...writing import whole_file
 from ..status import MotionStatus
 from ..tasks.carrier_paths import by_index
-from ..tasks.path import AnyPath, CirclePath, Curve, LinePath, Motion, RestPath, SamplePath, TimedPath, WaypointPath
+from ..tasks.path import (
+    AnyPath,
+    CirclePath,
+    Curve,
+    LinePath,
+    Motion,
+    PathBase,
+    RestPath,
+    SamplePath,
+    TimedPath,
+    WaypointPath,
+)
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from ..tasks.task import FreeBase, GivenBase, HoldBase, Task, read_task
 from ..tasks.task_limits import TaskLimits
@@ -144,7 +155,10 @@ class Timing:
         InputError
             If there is no law.
         """
-        s, sd, sdd = self.path.law(np.asarray(times, dtype=float))
+        instants = real_array("times", times).astype(float, copy=False)
+        if instants.ndim != 1 or not np.isfinite(instants).all():
+            raise InputError(f"times must be finite numbers of shape (n,) [s], got {shown(times)}")
+        s, sd, sdd = self.path.law(instants)
         platform, carriers = self.parametrised.at(s)
         return platform.timed(sd, sdd), carriers.timed(sd, sdd)
 
@@ -178,7 +192,7 @@ class Timing:
         InputError
             If there is no law, or the place cannot be written to.
         """
-        path, text = Path(file), to_yaml(self.task(name))
+        path, text = file_path("file", file), to_yaml(self.task(name))
         with whole_file(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
         return path
@@ -208,6 +222,7 @@ class Timing:
         """
         if np.isnan(self.sd).any():
             raise InputError(f"timing must be feasible to have a motion, got status {self.status.value!r}")
+        required("path", path, PathBase)
         law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
         return TimedPath(kind="timed", frame=path.frame, along=path, until=self.parametrised.until(path), **law)
 

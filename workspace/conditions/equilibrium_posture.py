@@ -23,7 +23,7 @@ from ...models.batch import call
 from ...models.dynamics import dynamics_of
 from ..condition import Condition
 from ..feasibility import feasible, rest_wrench
-from ..places import Places
+from ..places import Places, check_places
 
 __all__ = ["EquilibriumPosture"]
 
@@ -60,6 +60,7 @@ class EquilibriumPosture(Condition):
         InputError
             If the platform cannot turn about all three axes, or has fewer than three cables or no weight.
         """
+        check_places(robot, places)
         if robot.drive == "fixed-length" and robot.m > 3:
             raise InputError(
                 f"robot must have three cables if their lengths are fixed, got {robot.name!r} with {robot.m}"

@@ -12,7 +12,7 @@ from ...models.robot import Finite
 from ...solvers.available_wrench import facets
 from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, too_few_cables, wrench_matrices, wrench_rows
-from ..places import Places
+from ..places import Places, check_places
 
 __all__ = ["Margin"]
 
@@ -40,6 +40,7 @@ class Margin(Condition):
         Inside, they are positive and those of `solvers.capacity_margin`, also for a set without volume. Outside, they
         are negative and bounds: the distance is at least as large, and equal where a facet is nearest.
         """
+        check_places(robot, places)
         rows = wrench_rows(robot)
         w = scaled(robot, rest_wrench(robot), rows)
         margins = np.empty(len(places))

@@ -67,6 +67,6 @@ class WrenchFeasible(Condition):
         return too_few_cables(robot)
 
     def _wrenches(self, robot: Robot) -> np.ndarray:
+        weight = rest_wrench(robot)
         # A guide takes the wrench along a coordinate that cannot move.
-        corners = np.unique(self.corners() * robot.dof_mask, axis=0)
-        return rest_wrench(robot) - corners
+        return weight - np.unique(self.corners() * robot.dof_mask, axis=0)

@@ -12,7 +12,7 @@ from ...models.robot import NonNegative
 from ...solvers import solve_batch
 from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
-from ..places import Places
+from ..places import Places, check_places
 
 __all__ = ["WrenchWithTolerance"]
 
@@ -37,6 +37,7 @@ class WrenchWithTolerance(Condition):
 
     def error(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the smallest wrench error that tensions inside the limits leave, (n,) [N]; infinite without any."""
+        check_places(robot, places)
         rows = wrench_rows(robot)
         w = scaled(robot, rest_wrench(robot), rows)
         error = np.empty(len(places))

@@ -1,0 +1,350 @@
+"""Call every public function with wrong arguments, one at a time: it answers in one line, or accepts the value.
+
+The calls are generated from the signatures: a parameter keeps a valid value, kept in a table by its name, or gets each
+of the wrong values in turn. A public function that is in neither table fails the test.
+"""
+
+from __future__ import annotations
+
+import inspect
+import random
+import warnings
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import towline
+from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along
+from towline.inputs import printable
+from towline.models import RelativeDynamics
+from towline.workspace import Places, Region, StaticEquilibrium, sample
+
+PACKAGES = ("towline", "towline.models", "towline.solvers", "towline.workspace", "towline.ocp")
+EACH = 6  # wrong values for each parameter
+LONGEST = 500  # characters of a message; the lists of robots and of keys are long
+ROBOT = "wang-flying"
+
+# Not called by a user: exceptions and status words, what an author of a method writes or gets, and results, which
+# towline makes (their methods are called).
+NOT_CALLED = {
+    "InputError",
+    "SolverError",
+    "TowlineError",
+    "MotionStatus",
+    "Status",
+    "Method",
+    "Proposal",
+    "StandardForm",
+    "BatchSolution",
+    "Certificate",
+    "solvers.Margin",
+    "Plan",
+    "TensionSolution",
+    "Timing",
+    "load_kernels",  # compiles for half a minute
+}
+
+WRONG: dict[str, Any] = {
+    "none": None,
+    "empty text": "",
+    "text": "nonsense",
+    "two lines": "two\nlines",
+    "long text": "x" * 5000,
+    "nul": "a\0b",
+    "bytes": b"bytes",
+    "nan": float("nan"),
+    "inf": float("inf"),
+    "minus one": -1,
+    "no float": 10**400,
+    "no digits": 10**5000,
+    "true": True,
+    "complex": 1j,
+    "object": object(),
+    "list": [],
+    "mapping": {},
+    "mapping of lists": {"kind": []},
+    "unequal rows": [[1, 2], [3]],
+    "strings": ["a", "b"],
+    "set": {1, 2},
+    "function": lambda *_: None,
+    "class": Planner,
+    "no file": Path("does/not/exist.yaml"),
+    "shape": np.zeros((2, 3, 5)),
+    "no rows": np.zeros((0, 6)),
+    "nan array": np.full(6, np.nan),
+    "complex array": np.ones(6, dtype=complex),
+    "object array": np.array([None] * 6),
+    "text array": np.array(["1"] * 6),
+    "dates": np.array(["2020-01-01"] * 6, dtype="datetime64[D]"),
+    "huge array": np.full(6, 1e300),
+}
+
+# The first asks the network for a host of this name, the second raises what the caller's own function raises.
+NOT_TRIED = {("scheduler", "text"), ("progress", "class")}
+
+TASK = {"name": "short", "path": {"kind": "rest", "pose": [0, 0, -1, 0, 0, 0]}, "duration": 0.2, "output_rate": 20}
+LINE = {"kind": "line", "start": [0, 0, -1, 0, 0, 0], "end": [0.1, 0, -1, 0, 0, 0]}
+
+
+@cache
+def robot() -> towline.Robot:
+    return load(ROBOT)
+
+
+@cache
+def problem() -> TensionProblem:
+    return TensionProblem(np.eye(6, 7), np.ones(6), 0.0, 10.0)
+
+
+@cache
+def infeasible() -> towline.TensionSolution:
+    return solve(TensionProblem(np.eye(6, 7), np.full(6, 20.0), 0.0, 10.0))
+
+
+@cache
+def dynamics() -> Dynamics:
+    return Dynamics(ROBOT)
+
+
+@cache
+def places() -> Places:
+    return Places.at_home(robot(), robot().home)
+
+
+@cache
+def a_plan() -> towline.Plan:
+    return plan(ROBOT, TASK)
+
+
+@cache
+def time_law() -> towline.Timing:
+    return time_along(ROBOT, {"path": LINE}, grid=10)
+
+
+# Valid values by parameter name. Of functions that mean something else by a name: by "function.name".
+VALID: dict[str, Callable[[], Any]] = {
+    "A": lambda: np.eye(6, 7),
+    "w": lambda: np.ones(6),
+    "t_min": lambda: 0.0,
+    "t_max": lambda: 10.0,
+    "t_ref": lambda: 1.0,
+    "weights": lambda: 1.0,
+    "length": lambda: 1.0,
+    "rho": lambda: 1.0,
+    "threads": lambda: 1,
+    "backend": lambda: None,
+    "m": lambda: 3,
+    "n": lambda: 6,
+    "problem": problem,
+    "solution": lambda: solve(problem()),
+    "tensions": lambda: np.full(6, 5.0),
+    "TensionProblem.tolerance.tensions": lambda: np.ones(7),
+    "previous": lambda: 1.0,
+    "rate_max": lambda: 100.0,
+    "index": lambda: 0,
+    "up": lambda: np.array([0.0, 0.0, 1.0]),
+    "robot": robot,
+    "dynamics": dynamics,
+    "pose": lambda: robot().home,
+    "velocity": lambda: np.zeros(6),
+    "acceleration": lambda: np.zeros(6),
+    "carrier_pose": lambda: np.zeros((1, 6)),
+    "carrier_velocity": lambda: np.zeros((1, 6)),
+    "carrier_acceleration": lambda: np.zeros((1, 6)),
+    "wind": lambda: np.ones(3),
+    "thrust": lambda: np.ones(1),
+    "torque": lambda: np.zeros((1, 3)),
+    "elastic": lambda: False,
+    "method": lambda: "active-set",
+    "sample.method": lambda: "random",
+    "name": lambda: "short",
+    "load.name": lambda: ROBOT,
+    "task": lambda: TASK,
+    "time_along.task": lambda: {"path": LINE},
+    "start": lambda: None,
+    "progress": lambda: None,
+    "grid": lambda: 10,
+    "times": lambda: np.zeros(2),
+    "path": lambda: time_law().parametrised.path,
+    "file": lambda: "file.nc",
+    "Plan.animate.file": lambda: "film.gif",
+    "folder": lambda: "folder",
+    "speed": lambda: 1.0,
+    "fps": lambda: 5.0,
+    "condition": StaticEquilibrium,
+    "condition_from.data": lambda: {"kind": "margin"},
+    "region": lambda: None,
+    "samples": lambda: 20,
+    "seed": lambda: 0,
+    "size": lambda: None,
+    "workers": lambda: 1,
+    "scheduler": lambda: None,
+    "checkpoint": lambda: None,
+    "resume": lambda: False,
+    "keep": lambda: "accepted",
+    "points_max": lambda: 10,
+    "low": lambda: np.full(3, -1.0),
+    "high": lambda: np.zeros(3),
+    "cells": lambda: 2,
+    "attitude": lambda: np.zeros(3),
+    "count": lambda: 2,
+    "places": places,
+    "carriers": lambda: np.zeros((1, 1, 6)),
+    "rows": lambda: slice(0, 1),
+    "result": lambda: sample(robot(), StaticEquilibrium(), samples=20),
+}
+
+# Other words by which a message may name a parameter: a file also by its path.
+ALSO = {
+    "data": ("condition",),
+    "load.name": ("robot",),
+    "nonsense": ("options",),
+}
+
+# Models: their fields are their parameters, and these the valid values.
+REST = {"kind": "static-equilibrium"}
+MODELS: dict[str, dict[str, Any]] = {
+    "Robot": robot().model_dump(mode="json"),
+    "Task": TASK,
+    "Region": {},
+    "AllOf": {"conditions": [REST]},
+    "AnyOf": {"conditions": [REST]},
+    "Dynamic": {"accelerations": [[0, 0, 1, 0, 0, 0]]},
+    "EquilibriumPosture": {},
+    "ExistsPlacement": {"condition": REST},
+    "ForceBalance": {},
+    "Interference": {"between_cables": 0.1},
+    "Lengths": {"min": 0.1, "max": 10.0},
+    "Margin": {},
+    "StaticEquilibrium": {},
+    "WrenchClosure": {},
+    "WrenchFeasible": {"box": [[0] * 6, [1] * 6]},
+    "WrenchWithTolerance": {"tolerance": 1.0},
+}
+
+# Objects whose public methods are called.
+OBJECTS: dict[str, Callable[[], Any]] = {
+    "Dynamics": dynamics,
+    "RelativeDynamics": lambda: RelativeDynamics(robot()),
+    "Planner": lambda: Planner(ROBOT, TASK),
+    "Plan": a_plan,
+    "Timing": time_law,
+    "TensionProblem": problem,
+    "TensionSolution": lambda: solve(problem()),
+    "Certificate": lambda: infeasible().certificate,
+    "BatchSolution": lambda: solve_batch(np.eye(6, 7)[None], np.ones((2, 6)), 0.0, 10.0),
+    "Places": places,
+    "Robot": robot,
+    "Task": lambda: towline.read_task(TASK),
+    "Region": Region,
+}
+
+
+class Subject:
+    """One public function: how to call it with keywords, the parameters to replace, and their valid values."""
+
+    def __init__(self, label: str, call: Callable[..., Any], valid: dict[str, Any], names: list[str]):
+        self.label, self.call, self.valid, self.names = label, call, valid, names
+
+
+def of_function(label: str, function: Callable[..., Any]) -> Subject:
+    """Read a function's parameters from its signature; `**options` stand for a key that is none."""
+    valid, names = {}, []
+    for name, parameter in inspect.signature(function).parameters.items():
+        if parameter.kind is parameter.VAR_KEYWORD:
+            names.append("nonsense")
+            continue
+        names.append(name)
+        make = VALID.get(f"{label}.{name}") or VALID.get(name)
+        assert make is not None, f"{label}: no valid value of {name} in the table"
+        valid[name] = make()
+    return Subject(label, function, valid, names)
+
+
+def public_methods(value: Any) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Yield the methods of an object that towline itself defines."""
+    for name in dir(type(value)):
+        static = inspect.getattr_static(type(value), name)
+        function = static.__func__ if isinstance(static, classmethod | staticmethod) else static
+        if name[0] != "_" and inspect.isfunction(function) and function.__module__.startswith("towline"):
+            yield name, getattr(value, name)
+
+
+@cache
+def subjects() -> dict[str, Subject]:
+    """Return the public functions, classes and methods by label."""
+    result: dict[str, Subject] = {}
+    known: set[int] = set()
+    for package in PACKAGES:
+        module = import_module(package)
+        for name in module.__all__:
+            value = getattr(module, name)
+            of_package = f"{package.rpartition('.')[2]}.{name}"
+            if {name, of_package} & NOT_CALLED or id(value) in known or inspect.isabstract(value):
+                continue
+            known.add(id(value))
+            if name in MODELS:
+                names = list(value.model_fields)
+                result[name] = Subject(name, value, MODELS[name], names)
+                result[f"{name}.model_validate"] = Subject(name, value.model_validate, {"obj": MODELS[name]}, ["obj"])
+            else:
+                result[name] = of_function(name, value)
+    workspace = import_module("towline.workspace")
+    objects = {name: make() for name, make in OBJECTS.items()}
+    objects |= {name: getattr(workspace, name)(**MODELS[name]) for name in MODELS if name not in objects}
+    for name, value in objects.items():
+        for method, bound in public_methods(value):
+            if method != "model_validate":
+                result[f"{name}.{method}"] = of_function(f"{name}.{method}", bound)
+    for name, method in towline.methods().items():
+        options = list(method.options or {})
+        result[f"solve by {name}"] = Subject(f"solve by {name}", partial(solve, problem(), name), {}, options)
+    return result
+
+
+def calls() -> Iterator[tuple[Subject, str, str]]:
+    """Draw the calls: for each parameter of each function some of the wrong values."""
+    draw = random.Random(12)
+    for subject in subjects().values():
+        for name in subject.names:
+            for wrong in draw.sample(list(WRONG), EACH):
+                if (name, wrong) not in NOT_TRIED:
+                    yield subject, name, wrong
+
+
+def complaint(subject: Subject, name: str, wrong: Any) -> str | None:
+    """Return what is wrong about the answer of one call, None if it is one clear line or the value is accepted."""
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            subject.call(**{**subject.valid, name: wrong})
+    except TowlineError as error:
+        text = str(error)
+        if not text.isprintable() or len(text) > LONGEST:
+            return f"not one short line: {text[:200]!r}"
+        named = [name, *ALSO.get(name, ()), *ALSO.get(f"{subject.label}.{name}", ()), subject.label.lower()]
+        if isinstance(wrong, str | Path):
+            named.append(printable(str(wrong)))
+        return None if any(word in text for word in named) else f"does not name {name}: {text}"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    # Others' modules, when they are imported, warn of what concerns their authors.
+    own = [one for one in caught if not issubclass(one.category, DeprecationWarning | SyntaxWarning | ResourceWarning)]
+    return f"{own[0].category.__name__}: {own[0].message}" if own else None
+
+
+def test_wrong_arguments_are_answered_in_one_line(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    count, complaints = 0, []
+    for subject, name, wrong in calls():
+        count += 1
+        text = complaint(subject, name, WRONG[wrong])
+        if text is not None:
+            complaints.append(f"{subject.label}({name}={wrong}): {text}")
+    assert not complaints, f"{len(complaints)} of {count} calls:\n" + "\n".join(complaints)
+    assert count >= 1000
+    assert capfd.readouterr() == ("", "")
