@@ -115,7 +115,13 @@ class Planner:
     def plan(
         self, progress: Progress | None = None, start: Plan | Timing | AnyPath | dict[str, Any] | None = None
     ) -> Plan:
-        """Plan; from `start`, else from the last solution, else from a guess."""
+        """Plan; from `start`, else from the last solution, else from a guess.
+
+        Raises
+        ------
+        InputError
+            If `progress` is not a function, or `start` does not fit.
+        """
         if progress is not None and not callable(progress):
             accepted = "a function of (iteration, objective, infeasibility)"
             raise InputError(f"progress must be {accepted}, got {shown(progress)}")

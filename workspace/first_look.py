@@ -19,6 +19,15 @@ def hints(dynamics: Dynamics, count: int = 400, seed: int = 0) -> tuple[np.ndarr
     The positions are uniform in the box of home and anchors, at the attitude of home. `sample` computes the workspace
     itself, with volumes and conditions.
 
+    Parameters
+    ----------
+    dynamics
+        Of the robot.
+    count
+        How many positions.
+    seed
+        Of the random positions.
+
     Returns
     -------
     Positions (count, 3) in {G} [m], and flags (count,).
