@@ -40,7 +40,8 @@ def tension(
         raise InputError(f"--m must be numbers of cables from 1 to 16, separated by commas, got {m!r}") from None
     if out is not None:
         check_writable(out / "tension.md")
-    with Progress(console=Console(stderr=True)) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         shown = bar.add_task("tension distribution", total=None)
 
         def progress(task: str, done: int, total: int) -> None:

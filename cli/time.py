@@ -35,7 +35,7 @@ def time(
     timing = time_along(loaded, read, grid=grid)
     file = timing.save_task(target, f"{read.name[:54]}-timed") if timing.feasible else None
     if as_json:
-        print_json({**timing.summary(), "file": None if file is None else str(file)})
+        print_json({**timing.to_dict(), "file": None if file is None else str(file)})
     else:
         typer.echo(timing.report())
         if file is not None:

@@ -198,7 +198,7 @@ def test_who_hangs_or_breaks_is_out_and_the_others_go_on():
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--count", "0"], "count: is 0"),
+        (["--count", "0"], "count must be a whole number from 1, got 0"),
         (["--m", "8,x"], "--m must be numbers of cables from 1 to 16, separated by commas, got '8,x'"),
         (["--m", "99"], "m must be numbers of cables from 1 to 16, got [99]"),
     ],

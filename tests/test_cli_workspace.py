@@ -113,7 +113,7 @@ def test_checkpoint_then_resume(folder):
         (("--samples", "1.5"), "--samples must be a whole number from 1"),
         (("--box", "0 0 0"), "--box must be 'x y z; x y z', got '0 0 0'"),
         (("--box", "0 0 0; 0 0 0"), "region.position must have min below max"),
-        (("--box", "0 0 x; 0 0 0"), "--box: '0 0 x' is not a list of numbers"),
+        (("--box", "0 0 x; 0 0 0"), "--box must be 3 finite numbers, got '0 0 x'"),
         (("--condition", "levitation"), "condition.kind must be one of"),
         (("--condition", "{kind"), "--condition must be a kind or JSON"),
         (("--scheduler", "tcp://127.0.0.1:9"), "scheduler must be the address"),
@@ -129,7 +129,7 @@ def test_checkpoint_then_resume(folder):
             ("--mesh", "m.stl", "--attitude", "0 0 0; 0 0 1"),
             "--mesh must be of a region in which only positions vary",
         ),
-        (("--resume", "/proc/a"), "/proc/a: cannot be written"),
+        (("--resume", "/proc/a"), "checkpoint must be a file that can be written, got /proc/a"),
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(folder, arguments, message):

@@ -150,7 +150,7 @@ def test_stiffness_is_how_elastic_cables_pull_back():
 
 def test_stiffness_needs_elastic_cables():
     robot = load("ipanema-1")
-    with pytest.raises(InputError, match=r"cables\[0\]\.stiffness: robot 'ipanema-1' has none"):
+    with pytest.raises(InputError, match=r"cables\[0\]\.stiffness must be E A > 0 \[N\]"):
         Dynamics(robot).stiffness(robot.home, np.ones(8))
 
 

@@ -49,7 +49,7 @@ def test_equal_contents_are_equal_files_and_compressed_ones_smaller(tmp_path):
 
 
 def test_a_place_that_cannot_be_written_to_is_named(tmp_path):
-    with pytest.raises(InputError, match="is a folder"):
+    with pytest.raises(InputError, match="must be the path of a file, got a folder"):
         save_netcdf(CONTENTS, tmp_path)
 
 

@@ -180,7 +180,7 @@ def test_nothing_is_overwritten(tmp_path):
     with pytest.raises(InputError, match="checkpoint must be a new file unless it is resumed"):
         run(file, False)
     assert file.read_text() == "mine"
-    with pytest.raises(InputError, match="is a folder"):
+    with pytest.raises(InputError, match="must be the path of a file, got a folder"):
         run(tmp_path, True)
     with pytest.raises(InputError, match="cannot be written"):
         run(file / "below", True)

@@ -206,7 +206,7 @@ def test_a_zarr_folder_has_the_same_as_the_file(tmp_path):
     in_file = xr.load_dataset(save(found, tmp_path / "found.nc"))
     folder = save(found, tmp_path / "found.zarr")
     xr.testing.assert_identical(xr.open_zarr(folder).load(), in_file)
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="must be a new path"):
         save(found, folder)
 
 

@@ -170,7 +170,7 @@ class Timing:
         """
         return bottlenecks(self.parametrised, self.limits, self.margin, self.path) if self.feasible else []
 
-    def summary(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return what `towline time --json` prints, ready for JSON; what does not exist is None."""
         return {
             "feasible": self.feasible,
