@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import BatchSolution, Status, TensionProblem, certify, solve_batch
+from ..solvers import BatchSolution, Status, TensionProblem, certify, compiled, solve_batch
 
 Array = NDArray[np.float64]
 
@@ -45,6 +45,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.count < 1 or options.start < 0:
         parser.error(f"--count must be at least 1 and --start at least 0, got {options.count} and {options.start}")
+    compiled.load()
     report = Report(Counter(), [], 0.0)
     for first in range(options.start, options.start + options.count, BLOCK):
         report = report.plus(check(range(first, min(first + BLOCK, options.start + options.count))))

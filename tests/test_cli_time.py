@@ -96,7 +96,7 @@ def test_without_a_law_there_is_a_proof_and_no_file(folder):
         ("tube: {position: 0.1}\n", "tube must be left out to time a path"),
         ("base: {kind: free}\n", "base.kind must be hold or given to time a path"),
         ("wind: {min: [0, 0, 0], max: [1, 0, 0]}\n", "wind must be [0, 0, 0], still air"),
-        ("limits: {tension_rate: 3}\n", "limits.tension_rate cannot be kept by a time law"),
+        ("limits: {tension_rate: 3}\n", "limits.tension_rate must be left out to time a path"),
     ],
 )
 def test_what_timing_cannot_do_is_told(folder, more, message):
