@@ -25,7 +25,7 @@ from ..writing import whole_file
 from .kernels import memory, single, wide
 from .kernels.codes import UNSURE
 
-__all__ = ["COMPILED", "INTERPRETED", "Kernels", "current", "load", "machine_code", "solve_packed"]
+__all__ = ["COMPILED", "INTERPRETED", "Kernels", "current", "keep", "load", "machine_code", "solve_packed"]
 
 COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
 
@@ -91,6 +91,13 @@ def load() -> Kernels:
             _forget_old_code()
             _kernels = _compile()
     return _kernels
+
+
+def keep() -> None:
+    """Compile the machine code if the disk has none, so that processes which start later only load it."""
+    _forget_old_code()
+    if not _on_disk():
+        load()
 
 
 def _interpreted(data: Any, n: int, m: int, t: Any) -> int:

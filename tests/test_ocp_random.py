@@ -12,7 +12,7 @@ from towline.ocp import MotionStatus, plan
 
 @pytest.mark.parametrize("seed", range(2 * len(ROBOTS)))
 def test_a_random_task_ends_in_a_plan_or_a_proof(seed):
-    assert attempt(seed).told in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
+    assert attempt(seed).result in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
 
 
 def test_the_check_can_see():

@@ -231,7 +231,7 @@ def test_machine_code_of_other_sources_is_forgotten(tmp_path, monkeypatch):
 def test_without_a_folder_or_space_for_machine_code_it_is_not_kept(tmp_path, monkeypatch):
     space = {}
     exec(compile("def twice(x):\n    return 2 * x", "<nowhere>", "exec"), space)  # Numba finds no place for this
-    assert compiled._jit(space["twice"])(21) == 42
+    assert compiled.machine_code(space["twice"])(21) == 42
     monkeypatch.setattr("shutil.disk_usage", lambda _: type("usage", (), {"free": 1000}))
     assert not compiled._has_space()
 

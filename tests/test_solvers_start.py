@@ -16,7 +16,7 @@ INTERPRETED = compiled.Kernels(compiled.INTERPRETED, compiled._interpreted, comp
 @pytest.fixture
 def patient(monkeypatch):
     """Let this process lose no time: plain Python stays plain."""
-    monkeypatch.setattr(compiled, "_lose", lambda seconds: None)
+    monkeypatch.setattr(compiled, "_lose", lambda *_, **__: None)
 
 
 def other_process(code):
@@ -99,6 +99,19 @@ def test_plain_python_answers_the_zoo(monkeypatch, patient):
         assert solution.backend in ("interpreted", "daqp")
 
 
+def test_a_loop_of_single_problems_loads_machine_code_that_is_there(monkeypatch):
+    loads = []
+    monkeypatch.setattr(compiled, "load", lambda: loads.append(1))
+    monkeypatch.setattr(compiled, "_forget_old_code", lambda: None)
+    for on_disk in (False, True):
+        monkeypatch.setattr(compiled, "_on_disk", lambda there=on_disk: there)
+        for name, value in (("_lost", 0.0), ("_alone", 0), ("_patience", None)):
+            monkeypatch.setattr(compiled, name, value)
+        for _ in range(300):
+            compiled._lose(1e-4, problems=1)
+        assert bool(loads) is on_disk
+
+
 @pytest.mark.parametrize(("on_disk", "seconds"), [(True, 1.0), (False, 30.0)])
 def test_machine_code_is_loaded_once_that_would_have_been_quicker(on_disk, seconds, monkeypatch):
     loads = []
@@ -106,6 +119,7 @@ def test_machine_code_is_loaded_once_that_would_have_been_quicker(on_disk, secon
     monkeypatch.setattr(compiled, "_on_disk", lambda: on_disk)
     monkeypatch.setattr(compiled, "_forget_old_code", lambda: None)
     monkeypatch.setattr(compiled, "_lost", 0.0)
+    monkeypatch.setattr(compiled, "_alone", 0)
     monkeypatch.setattr(compiled, "_patience", None)
     compiled._lose(0.9 * seconds)
     assert not loads

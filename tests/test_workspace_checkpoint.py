@@ -11,6 +11,7 @@ import pytest
 
 from towline.errors import InputError
 from towline.models import load
+from towline.solvers import compiled
 from towline.workspace import Condition, StaticEquilibrium, sample, save
 from towline.workspace.checkpoint import MAGIC, begin, open_checkpoint
 from towline.workspace.sampling import CHUNK
@@ -48,6 +49,7 @@ def run(checkpoint, resume, condition: Condition | None = None, **changed):
 
 def test_killed_and_resumed_is_the_identical_file(tmp_path):
     """A real process with two workers, killed as soon as some chunks are there; nobody of it lives on."""
+    compiled.keep()  # or the run would spend its first minute with that
     command = [str(TOWLINE), "workspace", "wang-flying", "--samples", "1e6", "--json", "--resume"]
     options = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     first = subprocess.Popen([*command, "killed", "--workers", "2"], **options)

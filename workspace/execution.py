@@ -18,7 +18,7 @@ from typing import Any
 
 from ..errors import InputError, SolverError
 from ..inputs import shown
-from .jobs import Job, JobResult, evaluate
+from .jobs import Job, JobResult, evaluate, prepare
 
 AHEAD = 3  # jobs for each worker, one of which it works on
 CONNECT_WITHIN = 5.0  # [s]
@@ -53,6 +53,7 @@ def executor(packed: bytes, workers: int, scheduler: str | None) -> Iterator[Eva
     elif workers == 1:
         yield lambda jobs: (evaluate(packed, job) for job in jobs)
     else:
+        prepare(packed)
         # New processes, not copies of this one: a copy would have its locks, but not the threads that hold them.
         context = multiprocessing.get_context("spawn")
         alive, stop = context.Pipe(duplex=False)

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import processors
 from ..models import Robot
+from ..solvers import compiled
 from .condition import Condition
 from .domain import THINNEST, Domain
 from .feasibility import load_kernels
@@ -168,6 +169,13 @@ def _cell(position: np.ndarray, domain: Domain, cells: tuple[int, int, int]) -> 
             along = ((position[:, axis] - low[axis]) * (count / (high[axis] - low[axis]))).astype(np.int32)
         index = index * count + np.clip(along, 0, count - 1)
     return index
+
+
+def prepare(packed: bytes) -> None:
+    """Compile the kernels of a large run once, before its processes start: each would compile them for itself."""
+    settings: RunSettings = pickle.loads(packed)
+    if settings.samples >= WORTH_KERNELS:
+        compiled.keep()
 
 
 def _sampler(settings: RunSettings) -> Sampler:
