@@ -224,5 +224,5 @@ def test_a_rate_of_tensions_that_jump_is_refused():
     with pytest.raises(InputError, match=r"limits\.tension_rate must be left out with the scheme 'gauss'") as caught:
         lay_out(load("ipanema-1"), task)
     assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match=r"scheme: .*'cubic'"):
+    with pytest.raises(InputError, match=r"scheme must be .* got 'cubic'"):
         plan(load("ipanema-1"), {**CRANE, "scheme": "cubic"})

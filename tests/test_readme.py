@@ -170,7 +170,11 @@ def test_the_tutorial_does_what_it_claims(tmp_path, monkeypatch):
 def test_errata_are_current(study):
     """Of the claims that compute quickly, the page lists exactly those not reproduced; if not, run `make errata`."""
     sections = PAGES[f"docs/errata/{study.PAPER.name}.md"].split("\n## ")
-    titles = {Verdict.DIFFERS: "What is printed", Verdict.IMPOSSIBLE: "What cannot", Verdict.NOT_DETERMINED: "What the"}
+    titles = {
+        Verdict.DIFFERS: "What is printed",
+        Verdict.IMPOSSIBLE: "Impossible",
+        Verdict.NOT_DETERMINED: "Not printed",
+    }
     for claim in [claim for chapter in study.CHAPTERS.values() if chapter not in SLOW for claim in chapter().claims]:
         where = [section for section in sections if f"| {claim.id} |" in section]
         if claim.verdict is Verdict.REPRODUCED:

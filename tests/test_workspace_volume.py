@@ -151,9 +151,9 @@ def test_a_flat_box_has_no_mesh():
     [
         ({"cells": np.nan}, "cells must be a whole number from 2"),
         ({"cells": 10**6}, "got 1000000"),
-        ({"high": [1, 1, np.inf]}, "high must be three finite numbers"),
-        ({"low": "here"}, "low must be three finite numbers, got 'here'"),
-        ({"attitude": [0, 0]}, r"attitude must be three finite numbers, got \[0, 0\]"),
+        ({"high": [1, 1, np.inf]}, r"high must be an array of shape \(3,\) of finite numbers"),
+        ({"low": "here"}, "low must be an array of real numbers, got 'here'"),
+        ({"attitude": [0, 0]}, r"attitude must be an array of shape \(3,\) of finite numbers"),
     ],
 )
 def test_a_mesh_of_nothing_sensible_is_refused(wrong, told):

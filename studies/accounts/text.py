@@ -52,7 +52,7 @@ def errata(account: Account) -> str:
         f"Each line is a claim of the report, and its verdict was computed. {READ}",
     ]
     titles = {
-        Verdict.DIFFERS: "Printed and correct",
+        Verdict.DIFFERS: "What is printed, and what holds",
         Verdict.IMPOSSIBLE: "Impossible",
         Verdict.NOT_DETERMINED: "Not printed in the paper",
     }
