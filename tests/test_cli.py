@@ -256,7 +256,10 @@ WRONG_FILES = {
     "missing mass": (lambda text: text.replace("  mass: 1.2\n", "", 1), "platform.mass"),
     "negative inertia": (lambda text: text.replace("0.81, 0.81", "-0.81, 0.81"), "platform.inertia"),
     "limits crossed": (lambda text: text.replace("t_min: 0.5", "t_min: 70", 1), "cables[0]"),
-    "unknown carrier": (lambda text: text.replace("carrier: quad", "carrier: drone", 1), "cables[0].carrier"),
+    "unknown carrier": (
+        lambda text: text.replace("carrier: quad", "carrier: drone", 1),
+        "cables[0].carrier must be one of quad, got 'drone'",
+    ),
     "NaN": (lambda text: text.replace("[0.52, 0,", "[.nan, 0,"), "cables[0].anchor[0]"),
     "zero length": (
         lambda text: text.replace("anchor: [0.52, 0, -0.07]", "anchor: [0.125, 0.216506350946, -0.97]"),

@@ -168,7 +168,7 @@ def test_the_tutorial_does_what_it_claims(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("study", [flying, towing], ids=lambda study: study.PAPER.name)
 def test_errata_are_current(study):
-    """Of the claims that compute quickly, the page lists exactly those not reproduced; if not, run `make errata`."""
+    """Check that the page lists exactly the quick claims that are not reproduced; if not, run `make errata`."""
     sections = PAGES[f"docs/errata/{study.PAPER.name}.md"].split("\n## ")
     titles = {
         Verdict.DIFFERS: "What is printed",
