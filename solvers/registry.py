@@ -12,12 +12,12 @@ from ..tolerances import DOUBTFUL
 from . import compiled
 from .active_set import ActiveSet
 from .analytic_centre import AnalyticCentre
-from .boundary import careful_candidates
 from .centroid import Centroid
 from .certificate import Certificate, certify
 from .closed_form import ClosedForm
 from .direct_daqp import Daqp
 from .dykstra import Dykstra
+from .exact_arithmetic import exact_optimum
 from .improved_closed_form import ImprovedClosedForm
 from .linear_programs import LargestMargin, LeastSum, MinMax
 from .log_barrier import LogBarrier
@@ -34,7 +34,7 @@ from .standard_form import StandardForm, standard_form
 
 __all__ = ["methods", "solve"]
 
-_CAREFUL = "at the edge of what the cables can give, or of rounding: solved with limits moved by 1e-10 or less"
+_EXACT = "at the edge of what the cables can give, or of rounding: solved in exact arithmetic"
 
 _ACTIVE_SET = ActiveSet()
 _METHODS: dict[str, Method] = {
@@ -164,12 +164,9 @@ def _explain(problem: TensionProblem, form: StandardForm, method: Method, propos
     if certificate is not None:
         return _Judgement(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     if method.exact and not proposal.final:
-        for s in careful_candidates(problem, form):
-            candidate = form.tensions(problem, s)
-            if _gives_wrench(problem, candidate):
-                if is_optimal(form, candidate):
-                    return _Judgement(Status.OPTIMAL, candidate, detail=_CAREFUL)
-                useful = candidate if useful is None else useful
+        exact = exact_optimum(problem)
+        if _gives_wrench(problem, exact):
+            return _Judgement(Status.OPTIMAL, exact, detail=_EXACT)
     if useful is not None:
         return _Judgement(Status.INACCURATE, useful, detail="gives the wrench, but multipliers do not prove it optimal")
     return _Judgement(Status.FAILED if tensions is None else Status.INACCURATE, tensions, detail=proposal.detail)
