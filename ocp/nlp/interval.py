@@ -85,7 +85,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
     _tube_rows(scenario, _within(layout, h, columns, own.position), values, rows)
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, references, strict=True)]
     for index, limit in scenario.free_limits(mesh.shrink).items():
-        motion = [found[1 + index] for found in moving]
+        motion = [point[1 + index] for point in moving]
         jerk = [spread(scenario, index) @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
         offset = [spread(scenario, index) @ column[layout.a] for column in columns]
         total = _total(scenario, h, motion, offset, jerk)

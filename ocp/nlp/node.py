@@ -86,7 +86,7 @@ def _in_decisive_winds(
     if box is None:
         return []
     pose, velocity, _ = platform
-    found = []
+    pairs = []
     middle = aerodynamic_wrench(robot, pose, velocity, ca.DM(box.middle))
     R_A = rotation(carriers[0][0][3:6])
     for i, wind in enumerate(decisive_winds(box, robot, pose, velocity)):
@@ -94,8 +94,8 @@ def _in_decisive_winds(
         if scenario.relative:
             push = ca.vertcat(R_A.T @ push[0:3], R_A.T @ push[3:6])
         start = layout.wind_tensions.start + i * robot.m
-        found.append((robot.force_scale * x[start : start + robot.m], push))
-    return found
+        pairs.append((robot.force_scale * x[start : start + robot.m], push))
+    return pairs
 
 
 def _limit_rows(

@@ -65,9 +65,9 @@ class Program:
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Return the unknowns of each point, one row per point, zero where a point does not have one."""
-        found = np.zeros(len(self.shares) * self.layout.width)
-        found[self.order] = x
-        return found.reshape(-1, self.layout.width)
+        padded = np.zeros(len(self.shares) * self.layout.width)
+        padded[self.order] = x
+        return padded.reshape(-1, self.layout.width)
 
     def duration(self, x: np.ndarray) -> float:
         """Return the duration of a solution x [s]."""
@@ -77,10 +77,10 @@ class Program:
     def read(self, x: np.ndarray) -> Deviation:
         """Return the deviation of a solution x."""
         layout, columns, scheme = self.layout, self.columns(x), self.scenario.scheme
-        asked = scheme.balance_points(self.mesh.steps)
-        tensions = columns[asked, layout.tensions] * self.scenario.robot.force_scale
-        if len(asked) < len(columns):
-            tensions = np.stack([np.interp(self.shares, self.shares[asked], t) for t in tensions.T], axis=1)
+        at_nodes = scheme.balance_points(self.mesh.steps)
+        tensions = columns[at_nodes, layout.tensions] * self.scenario.robot.force_scale
+        if len(at_nodes) < len(columns):
+            tensions = np.stack([np.interp(self.shares, self.shares[at_nodes], t) for t in tensions.T], axis=1)
         q, v, a = (columns[:, part] for part in (layout.q, layout.v, layout.a))
         jerk = columns[:, layout.jerk] / self._step if scheme.smooth else None
         return Deviation(self.shares * self.duration(x), q, v, a, tensions, scheme, jerk)
@@ -122,7 +122,7 @@ class Program:
 def build(scenario: Scenario, mesh: Mesh) -> Program:
     """Build the nonlinear program of `scenario` on `mesh`."""
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
-    shares, asked = scheme.shares(steps), scheme.balance_points(steps)
+    shares, at_nodes = scheme.shares(steps), scheme.balance_points(steps)
     times = shares * scenario.duration
     parameters = ca.DM(_parameters(scenario, times))
     node, node_rows = node_function(scenario, mesh, layout)
@@ -131,8 +131,8 @@ def build(scenario: Scenario, mesh: Mesh) -> Program:
     unknowns = arrange(scenario, layout, steps, interval.flow)
     X, X_end = unknowns.columns, unknowns.ends
 
-    cost, node_values = node.map(len(asked))(_picked(X, asked), parameters[:, asked.tolist()])
-    weights = ca.DM(scheme.quadrature(steps)[asked]).T
+    cost, node_values = node.map(len(at_nodes))(_picked(X, at_nodes), parameters[:, at_nodes.tolist()])
+    weights = ca.DM(scheme.quadrature(steps)[at_nodes]).T
     groups, given = _groups(X, scheme.size), _groups(parameters, scheme.size)
     given_end = parameters[:, scheme.size :: scheme.size]
     interval_cost, interval_values = interval.function.map(steps)(groups, X_end, given, given_end)
@@ -140,7 +140,7 @@ def build(scenario: Scenario, mesh: Mesh) -> Program:
 
     first = interval.gaps if unknowns.gaps is not None else 0  # a program in stages has those as its gaps
     blocks = [
-        Block(node_values, node_rows, asked // scheme.size),
+        Block(node_values, node_rows, at_nodes // scheme.size),
         Block(interval_values[first:, :], interval.rows[first:], np.arange(steps)),
         *_single_rows(scenario, layout, X, X_end, steps),
     ]
@@ -188,25 +188,25 @@ def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
 
 def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
     """Return the rows that occur once: periodic ends, waypoints, start and end of the acceleration."""
-    found = _waypoint_rows(scenario, layout, X, X_end, steps)
+    blocks = _waypoint_rows(scenario, layout, X, X_end, steps)
     carriers: list[int] = []
     if getattr(scenario.task.base, "ends", None) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
         picked = [block * layout.n + i for block in range(layout.derivatives) for i in carriers]
         rows: list[Row] = [("periodic", 0.0, 0.0)] * len(picked)
-        found.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
+        blocks.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
     if not scenario.scheme.continuous and layout.n:
         k = steps - 1
         left = _polynomials(scenario, layout, X, X_end, steps, k).acceleration[-1]
         rows = [("acceleration", 0.0, 0.0)] * layout.n
-        found.append(Block(X_end[layout.a, k] - left, rows, np.array([k])))
+        blocks.append(Block(X_end[layout.a, k] - left, rows, np.array([k])))
     if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
         # Values at the nodes leave a cubic spline one freedom at each end, which would be used where nobody looks.
         rows = [("snap", 0.0, 0.0)] * len(ending)
         for k in (0, steps - 1):
             change = (X_end[layout.snap, k] - X[layout.snap, k])[ending]
-            found.append(Block(change, rows, np.array([k])))
-    return found
+            blocks.append(Block(change, rows, np.array([k])))
+    return blocks
 
 
 def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int, k: int) -> Points:
@@ -223,13 +223,13 @@ def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, s
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
         return []
-    found = []
+    blocks = []
     for share in path.knots(scenario.duration)[1:-1] / scenario.duration:
         k = min(int(share * steps), steps - 1)
         position = _polynomials(scenario, layout, X, X_end, steps, k).position
         rows: list[Row] = [("waypoint", 0.0, 0.0)] * len(platform)
-        found.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
-    return found
+        blocks.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
+    return blocks
 
 
 def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

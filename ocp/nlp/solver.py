@@ -110,7 +110,7 @@ class Solver:
         stages = program.stages
         # Of what `start` says it knows this much, by names of its own.
         words = {"mu_init": "mu_init", "warm_start_bound_push": "bound_push", "warm_start_bound_frac": "bound_frac"}
-        asked = {words[key]: value for key, value in start.items() if key in words}
+        warm = {words[key]: value for key, value in start.items() if key in words}
         return {
             "structure_detection": "manual",
             "N": len(stages.rows) - 1,
@@ -118,7 +118,7 @@ class Solver:
             "nu": stages.controls,
             "ng": stages.rows,
             "equality": (program.lower_g == program.upper_g).tolist(),
-            "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | asked,
+            "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | warm,
         }
 
     def solve(
