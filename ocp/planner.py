@@ -2,7 +2,7 @@
 
 The planner works in stages, and ends with the first that decides:
 
-1. rest along the path (`rest_margin`): where it is negative at an end with rest, no duration is possible;
+1. static check along the path (`rest_margin`): where it is negative at an end with rest, no duration is possible;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
 3. the nonlinear program (`program`), audited, and refined where the audit reports violations;
 4. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
@@ -193,18 +193,21 @@ def _message(left: Durations | None) -> str:
     if left is None:
         return ""
     if not left.exist:
-        return f"none with the path's own time law, shown {quantity(100 * left.at, '%', 3)} along it"
+        part = f"first {quantity(100 * left.at, '%', 3)}" if left.at else "start"
+        return f"none is feasible with the task's time law (decided by the {part} of the motion)"
     upper = "" if left.longest == float("inf") else f", at most {quantity(left.longest, 's')}"
-    return f"at least {quantity(left.shortest, 's')}{upper}, with the path's own time law"
+    return f"at least {quantity(left.shortest, 's')}{upper} with the task's time law"
 
 
 def _rest_along_the_path(search: Search) -> Plan | None:
     """Compute the margin of rest; return a plan only if the motion rests at an end where it provably cannot."""
-    with search.stage("rest along the path") as stage:
-        margin = rest_margin(search.scenario)
-        stage.message = margin.describe()
     span = search.scenario.duration_range
-    if search.scenario.count or span is None or margin.margin[[0, -1]].min() >= 0:
+    with search.stage("static check") as stage:
+        margin = rest_margin(search.scenario)
+        may_decide = not search.scenario.count and span is not None and margin.margin[[0, -1]].min() < 0
+        required = may_decide or margin.margin.min() >= 0
+        stage.message = margin.describe() if required else f"{margin.describe()}; not required here"
+    if span is None or not may_decide:
         return None
     slowest = search.scenario.lasting(span.max)
     proven = certified_at_rest(slowest, search.audit_motion(slowest, None, f"audit of {quantity(span.max, 's')}"))
@@ -257,13 +260,13 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     scenario = search.scenario
     steps = scenario.task.steps
     coarse = _coarse(search) if start is None else None
-    outcome = search.solve("program", Mesh(steps), start or coarse, coarser=coarse is not None)
+    outcome = search.solve("nonlinear program", Mesh(steps), start or coarse, coarser=coarse is not None)
     if not outcome.success and search.seconds_left > 0:
         closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
             return search.best()
-        outcome = search.solve("program", Mesh(steps), closest.deviation)
+        outcome = search.solve("nonlinear program", Mesh(steps), closest.deviation)
     _refine(search, outcome)
     return search.best()
 
@@ -282,5 +285,5 @@ def _refine(search: Search, outcome: Outcome) -> None:
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if audit.excess else shrink
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
-        outcome = search.solve("program", mesh, outcome.deviation)
+        outcome = search.solve("nonlinear program", mesh, outcome.deviation)
         audit = search.audit(outcome)

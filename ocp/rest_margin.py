@@ -46,9 +46,11 @@ class RestMargin:
         """Return one line for a person."""
         least, at = self.margin[self.worst], self.times[self.worst]
         if least >= 0:
-            return f"possible everywhere, capacity margin at least {quantity(least, 'N')} (at t = {at:.3f} s)"
-        share = f"{(self.margin < 0).sum()} of {len(self.margin)} places"
-        return f"impossible at {share}, short by up to {quantity(-least, 'N')} (at t = {at:.3f} s)"
+            margin = quantity(least, "N")
+            return f"rest possible everywhere on the initial motion, capacity margin at least {margin} (t = {at:.3f} s)"
+        share = f"{(self.margin < 0).sum()} of {len(self.margin)} poses"
+        short = quantity(-least, "N")
+        return f"rest impossible at {share} of the initial motion, short by up to {short} (t = {at:.3f} s)"
 
 
 def rest_margin(scenario: Scenario) -> RestMargin:

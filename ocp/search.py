@@ -11,7 +11,7 @@ from ..text import quantity
 from .audits.audit import Audit, audit
 from .nlp.program import build
 from .nlp.rows import Mesh
-from .nlp.solver import Outcome, Progress, Solver
+from .nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from .nlp.waiting import wait_for
 from .result import Plan
 from .stage import Stage
@@ -20,6 +20,16 @@ from .tasks.scenario import Deviation, Scenario
 from .violation import relative_violation
 
 __all__ = ["Search"]
+
+
+ENDS = {  # of a run of the solver, by its message; others are quoted
+    "Solve_Succeeded": "solved",
+    "Solved_To_Acceptable_Level": "solved with less accuracy",
+    "Infeasible_Problem_Detected": "no solution near the guess",
+    "Maximum_Iterations_Exceeded": "iteration limit reached",
+    TIME_LIMIT: "time limit reached",
+    SETTLED: "stopped improving",
+}
 
 
 class RunningStage:
@@ -65,7 +75,7 @@ class Search:
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh.
         """
-        with self.stage(f"{name} of {mesh.steps} steps") as stage:
+        with self.stage(f"{name}, {mesh.steps} steps") as stage:
             start = time.perf_counter()
             if mesh not in self._solvers:
                 self._solvers[mesh] = wait_for(lambda: Solver(build(self.scenario, mesh)))
@@ -76,9 +86,10 @@ class Search:
             outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
             self.build_s += built - start
             self.solve_s += time.perf_counter() - built
-            stage.message = f"{outcome.message}, {outcome.iterations} iterations"
+            ended = ENDS.get(outcome.message, f"stopped ({outcome.message})")
+            stage.message = f"{ended} {'in' if ended == 'solved' else 'after'} {outcome.iterations} iterations"
             if mesh.elastic:
-                stage.message += f", short by {quantity(outcome.slack, 'N', 3)}"
+                stage.message += f", short by {quantity(outcome.slack, 'N')}"
         return outcome
 
     def audit(self, outcome: Outcome) -> Audit:
@@ -115,7 +126,7 @@ def describe(audited: Audit) -> str:
     """Return the violations of an audit in short."""
     lines = []
     if audited.violation.max() > audited.tolerance:
-        short = quantity(audited.violation.max(), "N", 3)
+        short = quantity(audited.violation.max(), "N")
         lines.append(f"short by up to {short} at t = {audited.times[audited.worst]:.3f} s")
     if audited.excess:
         count = len(audited.excess)

@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-# A part of a direction that makes up less than this share of it is left out of its description.
-_LEAST_SHARE = 0.05
+_LEAST_PART = 0.05  # of a direction of length one: a smaller force or moment is left out of its description
+_VERTICAL = 0.99  # cosine from which on a force is called vertical
 
 
 class CertificateText(NamedTuple):
@@ -119,14 +119,15 @@ class Certificate:
     def text(self, up: ArrayLike | None = None) -> CertificateText:
         """Return direction, needed, available, short by and limits as text; cables are counted from 1.
 
-        Of six wrench rows the direction is given by its largest parts and their shares. A share is the square of a
-        component, moments divided by `length`: all shares sum up to 100 %.
+        Of six wrench rows the direction is given by a force and a moment, together of length one: "force (0.84, 0.49,
+        0.23)". A force or a moment below 0.05 is left out. Moments are divided by `length`; where one takes part the
+        text states it.
 
         Parameters
         ----------
         up :
-            The direction opposite to gravity in the frame of the wrench, shape (3,): a vertical force along one of the
-            axes is then marked "(up)" or "(down)". Default: none is marked.
+            The direction opposite to gravity in the frame of the wrench, shape (3,): a vertical force is then marked
+            "up" or "down". Default: none is marked.
 
         Raises
         ------
@@ -166,20 +167,17 @@ class Certificate:
     def _along(self, up: Array | None) -> str:
         """Return the direction as text."""
         if self.direction.size != 6:
-            return f"the wrench direction ({', '.join(f'{value + 0.0:.3f}' for value in self.direction)})"
-        parts = self.direction * np.repeat([1.0, self.length], 3)
-        shares = parts**2 / (parts @ parts)
-        pieces = []
-        for i in np.argsort(-shares, kind="stable"):
-            if shares[i] < _LEAST_SHARE:
-                continue
-            axis, sign = "xyz"[i % 3], "+" if parts[i] > 0.0 else "-"
-            sense = ""
-            if up is not None and i < 3 and abs(up[i]) > 0.99 * float(np.linalg.norm(up)) > 0.0:
-                sense = " (up)" if parts[i] * up[i] > 0.0 else " (down)"
-            kind = "force along" if i < 3 else "moment about"
-            pieces.append(f"{100 * shares[i]:.0f} % {kind} {sign}{axis}{sense}")
-        return ", ".join(pieces)
+            return f"the wrench direction {_vector(self.direction)}"
+        unit = self.direction * np.repeat([1.0, self.length], 3)
+        unit /= np.linalg.norm(unit)
+        force, moment = (float(np.linalg.norm(part)) >= _LEAST_PART for part in (unit[:3], unit[3:]))
+        text = ", ".join([f"force {_vector(unit[:3])}"] * force + [f"moment {_vector(unit[3:])}"] * moment)
+        if up is not None and float(np.linalg.norm(up)) > 0.0:
+            upright = float(unit[:3] @ up) / float(np.linalg.norm(up))
+            text += f", {'up' if upright > 0.0 else 'down'}" if abs(upright) > _VERTICAL else ""
+        if moment:
+            text += f"; moments divided by the characteristic length, {quantity(self.length, 'm')}"
+        return text
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON; time, span and wind only where they are set."""
@@ -200,6 +198,11 @@ class Certificate:
                 if value is not None
             },
         }
+
+
+def _vector(values: Array) -> str:
+    """Return the components of a direction with two decimals each."""
+    return f"({', '.join(f'{round(float(value), 2) + 0.0:.2f}' for value in values)})"
 
 
 def certify(problem: TensionProblem) -> Certificate | None:

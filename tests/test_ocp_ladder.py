@@ -116,7 +116,7 @@ def test_a_motion_that_is_too_fast_tells_a_duration_that_would_do():
     assert found.relaxed.possible == pytest.approx(shortest, rel=5e-3)
     assert found.relaxed.plan.feasible
     assert found.relaxed.plan.audit.passed
-    assert f"a duration of {found.relaxed.possible:.4g} s instead of" in found.report()
+    assert f"{found.relaxed.possible:.4g} s is the shortest with the task's time law" in found.report()
     assert plan(robot, {"path": LIFT, "duration": found.relaxed.possible}).feasible
 
 
@@ -137,7 +137,7 @@ def test_missing_spans_are_those_in_which_the_acceleration_is_too_large():
     assert first.at_max.tolist() == [0]
     assert second.at_min.tolist() == [0]
     told = found.report()
-    assert "Spans without tensions" in told
+    assert "Time spans with no feasible tensions" in told
     assert f"{first.span[0]:.3f}" in told
     assert len(found.to_dict()["infeasible_spans"]) == 2
     assert plan(robot, {"path": LIFT, "duration": 3.0}).infeasible_spans == ()
@@ -266,7 +266,7 @@ def test_wrong_starts_are_refused():
 
 def test_every_rung_is_told_with_its_time():
     found = plan(load("cogiro"), {"path": LINE, "duration": 3, "tube": TUBE, "steps": 10})
-    assert names(found)[:2] == ["rest along the path", "program of 10 steps"]
+    assert names(found)[:2] == ["static check", "nonlinear program, 10 steps"]
     assert names(found)[2] == "audit"
     for stage in found.stages:
         assert stage.seconds >= 0

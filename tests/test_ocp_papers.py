@@ -93,7 +93,7 @@ def test_paper_c_carries_its_load(name, drive, aim, steps):
         assert found.scenario.duration < 1.0 < towing_plans.SECONDS
     assert found.audit.to_dict()["drift"]["window_position"] < 1e-4
     assert found.audit.drift.position < 1e-3
-    assert "drift, whole plan" in found.report()
+    assert "open-loop simulation" in found.report()
 
 
 def test_drift_is_that_of_a_falling_mass():

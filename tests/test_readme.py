@@ -164,6 +164,8 @@ def test_the_tutorial_does_what_it_claims(tmp_path, monkeypatch):
     assert (names["hovering"].status, names["moving"].status) == ("infeasible", "feasible")
     assert names["w"] == pytest.approx([0, 0, 11.772, 0, 0, 0])
     assert 0 < names["reachable"].attrs["accepted"] < 20_000
+    for line in names["solution"].certificate.describe().splitlines():
+        assert f"\n    {line}\n" in PAGES[TUTORIAL]
 
 
 @pytest.mark.parametrize("study", [flying, towing], ids=lambda study: study.PAPER.name)

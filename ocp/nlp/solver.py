@@ -23,6 +23,7 @@ __all__ = ["Outcome", "Progress", "Solver"]
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
 PATIENCE = 30  # iterations without a better one
+TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 
 
@@ -170,7 +171,7 @@ class Solver:
                 progress(iterations, float(result["f"]), watch.infeasibility(result["g"].full().ravel()))
         met = program.violation(x, result["g"].full().ravel()) <= MET
         if watch.settled or watch.late:
-            message = "time limit" if watch.late else f"no better by {BETTER:.1%} in {PATIENCE} iterations"
+            message = TIME_LIMIT if watch.late else SETTLED
             if len(watch.best):
                 x, met = watch.best, True
         return Outcome(

@@ -49,14 +49,13 @@ def sections(plan: Plan) -> list[Section]:
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
-        Section("Stages", _stages(plan)),
         Section("Computation", _computation(plan)),
     ]
     return [section for section in every if section.facts]
 
 
 def spans_table(plan: Plan) -> Table | None:
-    """Return the table of the spans without tensions, with what is needed and available at the worst instant of each.
+    """Return the table of the time spans without tensions, with needed and available at the worst instant of each.
 
     None for a motion with fewer than two: a single one is described by the certificate of the plan.
     """
@@ -66,11 +65,19 @@ def spans_table(plan: Plan) -> Table | None:
         start, end = certificate.span or (certificate.time, certificate.time)
         times = tuple(f"{time:.3f}" for time in (start, end, certificate.time))
         numbers = (certificate.demand, certificate.support, certificate.shortfall)
-        along = text.along.partition(", ")[0]
-        rows.append((*times, along, *(quantity(number) for number in numbers), text.limits))
-    columns = ("from [s]", "to [s]", "worst at [s]", "along")
+        direction = text.along.partition("; ")[0]
+        rows.append((*times, direction, *(quantity(number) for number in numbers), text.limits))
+    columns = ("from [s]", "to [s]", "worst at [s]", "direction")
     columns += ("needed [N]", "available [N]", "short by [N]", "limits")
-    return Table("Spans without tensions", columns, rows) if len(rows) > 1 else None
+    return Table("Time spans with no feasible tensions", columns, rows) if len(rows) > 1 else None
+
+
+def stages_table(plan: Plan) -> Table | None:
+    """Return the table of the planner's stages; None if there is none. A stage without a message is left out."""
+    rows = [
+        (stage.name, quantity(stage.seconds, "s", digits=2), stage.message) for stage in plan.stages if stage.message
+    ]
+    return Table("Stages", ("stage", "computed in", "result"), rows) if rows else None
 
 
 def as_text(plan: Plan) -> str:
@@ -84,7 +91,8 @@ def as_text(plan: Plan) -> str:
         table = spans_table(plan) if index == 0 else None
         if table is not None:
             lines += _in_columns(table)
-    return "\n".join(lines)
+    stages = stages_table(plan)
+    return "\n".join(lines if stages is None else lines + _in_columns(stages))
 
 
 def _in_columns(table: Table) -> list[str]:
@@ -108,7 +116,7 @@ def _decisive(plan: Plan) -> str:
     certificate, count = plan.certificate, len(plan.audit.excess)
     exceeded = f"{count} other limit{'s' * (count > 1)} exceeded" if count else ""
     if certificate is None:
-        return exceeded or "see the solver's message"
+        return exceeded or "see the stages"
     short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
     if certificate.wind is not None:
         short += f" in wind {_wind(certificate.wind)}"
@@ -124,8 +132,7 @@ def _reasons(plan: Plan) -> list[Fact]:
         facts += [
             ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}"),
             *([("wind", _wind(certificate.wind))] if certificate.wind is not None else []),
-            ("along", text.along),
-            ("direction", _vector(certificate)),
+            ("direction", text.along),
             ("needed", text.needed),
             ("available", text.available),
             ("short by", text.short_by),
@@ -133,8 +140,11 @@ def _reasons(plan: Plan) -> list[Fact]:
         ]
     facts += [("limit exceeded", str(excess)) for excess in plan.audit.excess]
     if (relaxed := plan.relaxed) is not None:
-        requested, possible = (quantity(value, relaxed.unit) for value in (relaxed.requested, relaxed.possible))
-        facts.append(("feasible", f"with a {relaxed.name} of {possible} instead of {requested} (planned and audited)"))
+        possible = quantity(relaxed.possible, relaxed.unit)
+        longer = relaxed.possible > relaxed.requested
+        side, other = ("shortest", "; `towline time` computes the fastest time law") if longer else ("longest", "")
+        fact = f"{possible} is the {side} with the task's time law (audited){other}"
+        facts.append((f"feasible {relaxed.name}", fact))
     return facts
 
 
@@ -151,37 +161,31 @@ def _bounds(plan: Plan, certificate: Certificate) -> str:
     return "; ".join(limits) + (f", with the margin of {quantity(margin, 'N')}" if limits and margin else "")
 
 
-def _vector(certificate: Certificate) -> str:
-    direction = certificate.direction
-    if direction.size != 6:
-        return _listed(direction)
-    return f"force {_listed(direction[:3])}, moment {_listed(direction[3:])}/m"
-
-
 def _tensions(plan: Plan) -> list[Fact]:
     robot, audit = plan.scenario.robot, plan.audit
     exist = np.isfinite(audit.tensions).all(axis=1)
     facts: list[Fact] = []
     if not exist.all():
         without = audit.times[~exist]
-        share = f"{quantity(100 * (~exist).mean(), digits=3)} % of the time"
-        facts.append(("none inside limits", f"{share}, between t = {without[0]:.3f} s and t = {without[-1]:.3f} s"))
+        share = f"for {quantity(100 * (~exist).mean(), digits=3)} % of the motion"
+        facts.append(("no feasible tensions", f"{share}, first at {without[0]:.3f} s, last at {without[-1]:.3f} s"))
     if exist.any():
         times, values = audit.times[exist], audit.tensions[exist]
         inside = np.minimum(values - robot.t_min, robot.t_max - values)
 
-        def located(index: int, which: np.ndarray) -> str:
+        def located(index: int, which: np.ndarray, side: str = "") -> str:
             row, cable = np.unravel_index(index, which.shape)
-            return f"{quantity(which[row, cable], 'N')} in cable {cable + 1} at t = {times[row]:.3f} s"
+            return f"{quantity(which[row, cable], 'N')}{side} in cable {cable + 1} at t = {times[row]:.3f} s"
 
         nearest = np.unravel_index(int(inside.argmin()), inside.shape)
-        limit = "t_min" if values[nearest] - robot.t_min[nearest[1]] == inside[nearest] else "t_max"
+        above = values[nearest] - robot.t_min[nearest[1]] == inside[nearest]
+        side = " above t_min" if above else " below t_max"
         required = plan.scenario.task.margin
         also = f" ({quantity(required, 'N')} required)" * (required > 0)
         facts += [
             ("smallest", located(int(values.argmin()), values)),
             ("largest", located(int(values.argmax()), values)),
-            ("margin", f"{located(int(inside.argmin()), inside)}, from {limit}{also}"),
+            ("tension margin", f"{located(int(inside.argmin()), inside, side)}{also}"),
         ]
     limits = zip(robot.t_min, robot.t_max, strict=True)
     pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
@@ -260,43 +264,29 @@ def _audit(plan: Plan) -> list[Fact]:
     if not worst.startswith("0 "):
         worst += f" at t = {audit.times[audit.worst]:.3f} s"
     facts = [
-        ("rate", f"{quantity(audit.rate, 'Hz', digits=6)}, {quantity(len(audit.times))} instants"),
+        ("instants", f"{quantity(len(audit.times))}, one every {quantity(1e3 / audit.rate, 'ms')}"),
         ("worst violation", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
-        ("tensions, carriers", "computed by code that the planner does not use"),
     ]
     if names := list(dict.fromkeys(limit.name for limit in named_limits(plan.scenario).all)):
-        facts.append(
-            ("other limits", f"{', '.join(names)}: the planner's expressions, evaluated at the audit's instants")
-        )
+        facts.append(("other limits", ", ".join(names)))
     if (drift := audit.drift) is not None:
-        window = f"{_millimetres(drift.window_position)}, {quantity(drift.window_attitude * 1e3, 'mrad')}"
-        facts.append((f"drift in {quantity(drift.window, digits=2)} s", f"{window} at most, without feedback"))
-        whole = f"{_millimetres(drift.position)}, {quantity(drift.attitude * 1e3, 'mrad')}"
-        facts.append(("drift, whole plan", f"{whole} at most, without feedback"))
+        window = _error(drift.window_position, drift.window_attitude)
+        after = f"platform error after {quantity(drift.window, 's', digits=2)} with the planned tensions: {window}"
+        facts.append(("open-loop simulation", after))
+        facts.append(("", f"over the whole plan: {_error(drift.position, drift.attitude)}"))
     return facts
 
 
-def _stages(plan: Plan) -> list[Fact]:
-    """Return the messages of the planner's stages; a stage without a message is left out."""
-    return [
-        (stage.name, f"{stage.message} ({quantity(stage.seconds, 's', digits=2)})")
-        for stage in plan.stages
-        if stage.message
-    ]
+def _error(position: float, attitude: float) -> str:
+    """Return the largest error of a simulated platform, from [m] and [rad]."""
+    if not np.isfinite([position, attitude]).all():
+        return "the simulation diverges"
+    return f"at most {_millimetres(position)} and {quantity(attitude * 1e3, 'mrad')}"
 
 
 def _computation(plan: Plan) -> list[Fact]:
-    """Return times and solver of the nonlinear program; a plan that needed none has no facts."""
+    """Return the times for the nonlinear programs; a plan that needed none has no facts."""
     if plan.build_s == 0:
         return []
-    facts = [("build", quantity(plan.build_s, "s", digits=3)), ("solve", quantity(plan.solve_s, "s", digits=3))]
-    if plan.deviation is None:
-        return facts
-    starts = sum(row[0] == 0 for row in plan.iterates)
-    runs = f", run {starts} of {starts}" if starts > 1 else ""
-    return [*facts, ("solver", f"{quantity(plan.iterations)} iterations{runs}: {plan.message}")]
-
-
-def _listed(values: np.ndarray) -> str:
-    """Return the parts of a direction with three decimals each."""
-    return f"({', '.join(f'{round(float(value), 3) + 0.0:.3f}' for value in values)})"
+    parts = (("building programs", plan.build_s), ("solving programs", plan.solve_s))
+    return [(name, quantity(seconds, "s", digits=3)) for name, seconds in parts]

@@ -9,7 +9,7 @@ from ...figures import style
 from ...models.parsing import to_yaml
 from ..result import Plan
 from .drawings import drawings
-from .report import headline, sections, spans_table
+from .report import headline, sections, spans_table, stages_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,5 +30,6 @@ def page(plan: Plan, trajectory: xr.Dataset) -> str:
 
 def _tables(plan: Plan) -> list[str]:
     """Return the sections, with the spans without tensions after the first, which states why there is no plan."""
-    tables, spans = [html.facts(*section) for section in sections(plan)], spans_table(plan)
-    return tables if spans is None else [tables[0], html.columns(*spans), *tables[1:]]
+    tables, spans, stages = [html.facts(*section) for section in sections(plan)], spans_table(plan), stages_table(plan)
+    after_first = [] if spans is None else [html.columns(*spans)]
+    return [tables[0], *after_first, *tables[1:], *([] if stages is None else [html.columns(*stages)])]
