@@ -33,7 +33,7 @@ class Bottleneck(NamedTuple):
     seconds
         How long the motion takes there.
     limit
-        What is at its limit: "t_max in cables 2, 5", "platform speed".
+        What is at its limit: "t_max of cables 2, 5", "platform speed".
     """
 
     start: float
@@ -43,7 +43,7 @@ class Bottleneck(NamedTuple):
 
     def describe(self) -> str:
         """Return one line for a person."""
-        return f"s = {self.start:.3f} to {self.end:.3f}, {self.seconds:.3f} s: {self.limit}"
+        return f"s = {self.start:.3f} to {self.end:.3f} (for {self.seconds:.3f} s): {self.limit}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return {"from", "to", "seconds" [s], "limit"} for JSON."""
@@ -84,7 +84,7 @@ def _tensions(problem: TensionProblem) -> str:
     size = np.abs(pull).max(initial=0.0)
     at = {"t_min": np.flatnonzero(pull < -PULLS * size), "t_max": np.flatnonzero(pull > PULLS * size)}
     cables_at_limits = [
-        f"{name} in cable{'s' * (cables.size > 1)} {', '.join(str(cable + 1) for cable in cables)}"
+        f"{name} of cable{'s' * (cables.size > 1)} {', '.join(str(cable + 1) for cable in cables)}"
         for name, cables in at.items()
         if cables.size
     ]

@@ -92,6 +92,8 @@ class Timing:
         The tension problem at `at` for the speed and acceleration that come nearest; at the ends, for rest.
     blocked
         All grid points s at which there is such a proof.
+    name
+        Name of the task.
     """
 
     status: MotionStatus
@@ -106,6 +108,7 @@ class Timing:
     certificate: Certificate | None = field(default=None, repr=False)
     problem: TensionProblem | None = field(default=None, repr=False)
     blocked: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    name: str = "task"
 
     @property
     def feasible(self) -> bool:
@@ -199,18 +202,21 @@ class Timing:
 
     def report(self) -> str:
         """Return status, duration and bottlenecks, or the certificate, as text."""
-        head = f"{self.parametrised.robot.name}: timing {self.status.value.upper()}"
+        head, ends = (
+            f"{self.parametrised.robot.name}, {self.name}: {self.status.value.upper()}",
+            "0 at its start, 1 at its end",
+        )
         if self.feasible:
-            lines = [
-                head,
-                f"  {quantity(self.duration, 's', 6)}, audit: worst violation {quantity(self.violation, 'N', 3)}",
-            ]
-            lines += ["  What is at its limit, and for how long"]
+            lines = [f"{head}, shortest duration {quantity(self.duration, 's', 6)}"]
+            lines += [f"  audit: worst violation {quantity(self.violation, 'N', 3)}"]
+            lines += [f"  What is at its limit along the path (s = {ends})"]
             return "\n".join(lines + [f"    {each.describe()}" for each in self.bottlenecks])
-        lines = [head, f"  at s = {self.at:.4g}"]
-        if self.certificate is not None:
-            lines += [f"  {line}" for line in self.certificate.describe().splitlines()]
-        return "\n".join(lines)
+        place = f"s = {self.at:.4g}"
+        if self.certificate is None:
+            return f"{head}, the search ended at {place}\n  s is the fraction of the path, {ends}"
+        lines = [f"{head}, short by {quantity(self.certificate.shortfall, 'N')} at {place}"]
+        lines += [f"  {place} is the worst place of the path (s = {ends}); no time law is feasible there:"]
+        return "\n".join(lines + [f"    {line}" for line in self.certificate.describe().splitlines()])
 
     def timed(self, path: Curve) -> TimedPath:
         """Return a path of the platform or of a carrier with the time law.
@@ -275,7 +281,7 @@ def time_along(
     until = task.duration if isinstance(task.path, CirclePath) and isinstance(task.duration, float) else None
     still_air = None if task.wind is None else np.zeros(3)
     parametrised = ParametrisedPath(robot, _curve(task.path, alone=not moving), moving, until, still_air)
-    return _search(parametrised, _limits(parametrised, task.limits), task.margin, grid)
+    return replace(_search(parametrised, _limits(parametrised, task.limits), task.margin, grid), name=task.name)
 
 
 def _check(robot: Robot, task: Task) -> None:
