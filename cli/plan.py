@@ -43,7 +43,6 @@ def plan(
     ] = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or report why none exists."""
-    from ..figures.animation import check_film
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task
@@ -52,6 +51,8 @@ def plan(
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
     if animate is not None:
+        from ..figures.animation import check_film
+
         check_film(animate, speed, fps)
     for file in (target, report, animate, figures and figures / "path.png"):
         if file is not None:

@@ -389,7 +389,7 @@ def test_without_gravity():
     # With the ring at the height of the attachments the crossed cables pull outwards on all sides.
     found = plan(flying, {**task, "base": {"kind": "free"}})
     assert found.feasible, found.report()
-    judge(flying, found.trajectory)
+    judge(flying, found.trajectory, residual=found.audit.tolerance)  # flat crossed cables do not span all wrenches
     np.testing.assert_allclose(found.trajectory["carrier_pose"].values[:, 0, 2], -1 + 0.03 + 0.07, atol=1e-6)
 
 

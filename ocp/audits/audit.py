@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...solvers import Certificate, certify
 from ..tasks.path import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Deviation, Scenario
-from .checks import END_TOLERANCE, OF_TENSIONS, UNDERACTUATED_TOLERANCE, AuditedMotion, excesses
+from .checks import END_TOLERANCE, OF_TENSIONS, AuditedMotion, excesses
 from .drift import Drift, drift
 from .excess import Excess
 from .tensions import INDEPENDENT, TOLERANCE, Distribution, in_all_winds, scaled
@@ -111,9 +111,8 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
     _check_lengths(scenario, times, motion, carriers)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
     w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.wind)
-    few = _few_cables(scenario, A)
-    tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if few and scenario.count else TOLERANCE
-    distribute = Distribution(scenario, A, few, tolerance)
+    distribute = Distribution(scenario, A)
+    few, tolerance = distribute.few, distribute.tolerance
     result = distribute(w, _planned_tensions(deviation, times, robot.m))
     tensions, certificate = result.tensions, result.certificate
     if (box := scenario.wind_box) is not None:
@@ -134,7 +133,7 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         motion=motion,
         carriers=carriers,
         tensions=tensions,
-        tensions_unlimited=(np.linalg.pinv(A, rcond=1e-9) @ w[..., None])[..., 0],
+        tensions_unlimited=distribute.unlimited(w),
         violation=result.violation,
         tolerance=tolerance,
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
@@ -172,16 +171,6 @@ def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:
     A = scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
     values = np.linalg.svd(scaled(scenario, A), compute_uv=False)
     return scenario.robot.m > values.shape[1] or bool((values[:, -1] < INDEPENDENT * values[:, 0]).any())
-
-
-def _few_cables(scenario: Scenario, A: np.ndarray) -> bool:
-    """Return whether some wrench matrix of (n, 6, m) has fewer independent columns than the platform has freedoms."""
-    robot = scenario.robot
-    dof = len(robot.platform.dof)
-    if robot.m < dof:
-        return True
-    values = np.linalg.svd(scaled(scenario, A), compute_uv=False)
-    return bool((values[:, dof - 1] < INDEPENDENT * values[:, 0]).any())
 
 
 def _audits_per_output(scenario: Scenario) -> int:

@@ -17,12 +17,14 @@ from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ..tasks.path import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
+from .checks import UNDERACTUATED_TOLERANCE
 from .distance import distances
 
 __all__ = ["INDEPENDENT", "TOLERANCE", "AuditedTensions", "Distribution", "in_all_winds", "scaled"]
 
 TOLERANCE = 1e-6  # [N]
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
+RANK = 1e-9  # the same, below which nothing is given
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again
 NEAREST = 1e10  # weight of the wrench error beside the tensions: so large that these do not shift it
 INNER_WINDS = 8  # of a box, at each instant others
@@ -57,10 +59,21 @@ class Distribution:
     little. Inside the span nothing may be missed: there the limits count as for any robot.
     """
 
-    def __init__(self, scenario: Scenario, A: np.ndarray, few: bool, tolerance: float):
-        self.scenario, self.A, self.few, self.tolerance = scenario, A, few, tolerance
+    def __init__(self, scenario: Scenario, A: np.ndarray):
+        robot, dof = scenario.robot, len(scenario.robot.platform.dof)
+        self.scenario, self.A = scenario, A
         self._scaled_A = scaled(scenario, A)
-        self._inverse = np.linalg.pinv(self._scaled_A, rcond=INDEPENDENT if few else 1e-9)
+        # One decomposition for the rank and the inverses: nothing else in an audit takes as long.
+        U, sigma, Vt = np.linalg.svd(self._scaled_A, full_matrices=False)
+        self.few = robot.m < dof or bool((sigma[:, dof - 1] < INDEPENDENT * sigma[:, 0]).any())
+        self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if self.few and scenario.count else TOLERANCE
+        kept = sigma > (INDEPENDENT if self.few else RANK) * sigma[:, :1]
+        reciprocal = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=kept)
+        self._inverse = (Vt.swapaxes(1, 2) * reciprocal[:, None]) @ U.swapaxes(1, 2)  # (n, m, 6)
+
+    def unlimited(self, w: np.ndarray) -> np.ndarray:
+        """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""
+        return (self._inverse @ scaled(self.scenario, w)[..., None])[..., 0]
 
     def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
         """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
