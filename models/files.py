@@ -33,9 +33,10 @@ def load(name: str | os.PathLike[str]) -> Robot:
     if path.suffix in (".yaml", ".yml") or _exists(path):
         return read_yaml(path, Robot)
     close = difflib.get_close_matches(text, available(), n=1)
-    hint = f", did you mean {close[0]!r}?" if close else ""
-    known = ", ".join(available())
-    raise InputError(f"robot must be one of {known}, or the path of a YAML file, got {shown(text)}{hint}")
+    if close:
+        hint = f"did you mean {close[0]!r}? `towline robots` lists all"
+        raise InputError(f"no robot {shown(text)} in the library; {hint}")
+    raise InputError(f"no robot or file {shown(text)}; the library has {', '.join(available())}")
 
 
 def as_robot(robot: object) -> Robot:

@@ -54,7 +54,10 @@ def read_bytes(path: Path, what: str) -> bytes:
     """Return the content of `path`, or raise InputError if it cannot be read or is too large; `what` describes it."""
     where = printable(str(path))
     try:
-        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():
+        kind = path.stat().st_mode
+        if stat.S_ISDIR(kind):
+            raise InputError(f"{where} is a folder, not a file")
+        if not stat.S_ISREG(kind):
             raise InputError(f"{where} must be {what}, got a device or a pipe")
         with path.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
@@ -64,9 +67,11 @@ def read_bytes(path: Path, what: str) -> bytes:
         return content
     except InputError:
         raise
+    except FileNotFoundError:
+        raise InputError(f"{where}: no such file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{where}: cannot be read ({reason}); it must be a readable file") from None
+        raise InputError(f"{where}: cannot be read ({reason})") from None
 
 
 def parse_yaml(text: str, model: type[Model], where: str) -> Model:
@@ -97,12 +102,12 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
 
     A key that is not known comes before a missing one: it usually is the missing one, misspelt.
     """
-    details = _without_branches(error.errors(include_url=False))
+    details = _without_lengths(_without_branches(error.errors(include_url=False)))
     details = [_misspelt_kind(detail, model) for detail in details]
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # A list whose items are wrong is counted by pydantic once more as too short.
     others = [other for other in details[1:] if other["type"] != "too_short"]
-    more = f" (and {len(others)} more)" if others else ""
+    more = f"; {len(others)} more error{'s' * (len(others) > 1)}" if others else ""
     line = printable(_sentence(details[0], model))
     return (f"{where}: {line}" if where else line) + more
 
@@ -152,7 +157,7 @@ def _misspelt_kind(detail: Any, model: type[BaseModel]) -> Any:
 def _plainly(message: str) -> str:
     """Return pydantic's message without its preamble, as "must be ..." where it has that form."""
     message = message.removeprefix("Value error, ")
-    message = re.sub(r"^Input should ", "must ", message)
+    message = re.sub(r"^Input should ", "must ", message).replace("a valid tuple", "a list")
     return message[:1].lower() + message[1:]
 
 
@@ -189,6 +194,22 @@ def _without_branches(details: list[Any]) -> list[Any]:
             rest = [text.removeprefix("must be ") for text in rest]
             result.append(first | {"loc": place[:at], "msg": " or ".join([first_one, *rest])})
     return result
+
+
+def _without_lengths(details: list[Any]) -> list[Any]:
+    """Return pydantic's complaints with one for each list of numbers of the wrong length, not one for each number."""
+    result: dict[Any, Any] = {}
+    for number, detail in enumerate(details):
+        place, length = detail["loc"], None
+        if detail["type"] == "missing" and isinstance(place[-1], int):
+            place, length = place[:-1], place[-1] + 1
+        elif detail["type"] == "too_long":
+            length = detail["ctx"]["max_length"]
+        if length is None:
+            result[number] = detail
+        else:  # of missing numbers the last one has the largest index
+            result[place] = detail | {"type": "length", "loc": place, "msg": f"must be {length} numbers"}
+    return list(result.values())
 
 
 @cache

@@ -296,7 +296,7 @@ def test_wrong_robot_file_is_one_line_and_exit_code_2(case, tmp_path):
         (["tension", "wang-ctmrts", "--carrier-pose", "0 0 1 0 0 0"], "for each of 3 carriers"),
         (["tension", "wang-flying", "--method", "magic"], "active-set"),
         (["tension", "ipanema-1", "--wind", "1 0 0"], "has no platform.aero"),
-        (["plan", "wang-flying", "none.yaml"], "none.yaml: cannot be read"),
+        (["plan", "wang-flying", "none.yaml"], "none.yaml: no such file"),
         (["demo", "--out", "/proc/nowhere"], "cannot be written"),
     ],
 )

@@ -212,7 +212,7 @@ def test_margins_count_in_every_wind():
         ({"min": [1, 0, 0], "max": [0, 0, 0]}, "wind.min must be at most max, 0 m/s along x, got 1 m/s"),
         ({"min": [1, 0, 0]}, "wind.max is missing"),
         ({"min": [1, 0, 0], "max": [1, 0, 0], "mx": [1, 0, 0]}, "is not a known key, did you mean 'max'"),
-        ([1, 0], "wind[2] is missing"),
+        ([1, 0], "wind must be 3 numbers, got [1, 0]"),
         ([1, 0, "fast"], "wind[2] must be a number"),
         (3, "wind must be"),
     ],

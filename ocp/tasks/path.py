@@ -37,7 +37,9 @@ class Motion(NamedTuple):
 
 def _with_level_attitude(value: object) -> object:
     """Complete (x, y, z) to a level pose."""
-    return (*value, 0.0, 0.0, 0.0) if isinstance(value, list | tuple) and len(value) == 3 else value
+    if not isinstance(value, list | tuple) or len(value) not in (3, 6):
+        raise ValueError("must be 3 numbers (x y z) or 6 (x y z roll pitch yaw)")
+    return (*value, 0.0, 0.0, 0.0) if len(value) == 3 else value
 
 
 PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]

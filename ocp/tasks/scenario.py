@@ -397,10 +397,14 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
             free += [(index, coordinate) for coordinate in (*POSITION, 3, 4)]
         elif carrier.kind == "mobile" and robot.drive != "variable-length":
             free += [(index, coordinate) for coordinate in POSITION]
+    if not free and {carrier.kind for carrier in robot.carriers} == {"ground"}:
+        raise InputError(
+            f"{where}: base must be left out, got kind free: the carriers of robot {robot.name!r} are on the ground"
+        )
     if not free:
         raise InputError(
-            f"{where}: base.kind must be hold or given, got free: robot {robot.name!r} has no carrier that moves "
-            f"(drive: {robot.drive})"
+            f"{where}: base.kind must be hold or given, got free: only winches move robot {robot.name!r}, its carriers "
+            f"stay (drive: {robot.drive})"
         )
     return free
 

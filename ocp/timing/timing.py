@@ -202,10 +202,8 @@ class Timing:
 
     def report(self) -> str:
         """Return status, duration and bottlenecks, or the certificate, as text."""
-        head, ends = (
-            f"{self.parametrised.robot.name}, {self.name}: {self.status.value.upper()}",
-            "0 at its start, 1 at its end",
-        )
+        head = f"{self.parametrised.robot.name}, {self.name}: {self.status.value.upper()}"
+        ends = "0 at its start, 1 at its end"
         if self.feasible:
             lines = [f"{head}, shortest duration {quantity(self.duration, 's', 6)}"]
             lines += [f"  audit: worst violation {quantity(self.violation, 'N', 3)}"]
