@@ -19,14 +19,14 @@ def _bench() -> None:
 
 @app.command("tension", cls=Command)
 def tension(
-    count: Annotated[int, typer.Option(help="Random problems of each task.")] = 100,
-    repeats: Annotated[int, typer.Option(help="Turns of each contender at each task.")] = 5,
-    m: Annotated[str, typer.Option("--m", help="Numbers of cables.")] = "6,7,8,12",
-    limit: Annotated[float, typer.Option(help="Seconds that one contender may spend on one task.")] = 5.0,
+    count: Annotated[int, typer.Option(help="Random problems per task.")] = 100,
+    repeats: Annotated[int, typer.Option(help="Runs of each solver on each task.")] = 5,
+    m: Annotated[str, typer.Option("--m", help="Numbers of cables of the problems.")] = "6,7,8,12",
+    limit: Annotated[float, typer.Option(help="Longest time for one solver on one task [s].")] = 5.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for tension.md and tension.png.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Time every solver that is installed at tension distribution in a hot loop, with its accuracy and failures."""
+    """Measure the speed, accuracy and failures of every installed solver at tension distribution, on this machine."""
     from rich.console import Console
     from rich.progress import Progress
 

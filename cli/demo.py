@@ -18,7 +18,7 @@ def demo(
     """Plan a circle of the flying cable robot: impossible while the quadrotor hovers, feasible if it moves."""
     from ..studies.flying import circle as flying_circle
 
-    with watching("planning the circle with the base free", quiet=as_json) as progress:
+    with watching("planning the circle with a quadrotor that may move", quiet=as_json) as progress:
         result = flying_circle.run(folder, progress)
     written = [str(path) for path in (*result.pictures, *result.files)]
     if as_json:

@@ -18,7 +18,11 @@ def export(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="File to write; default: ROBOT.xml or ROBOT.c in this folder."),
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="File to write; default: ROBOT.xml or ROBOT.c in this folder, from the robot's `name`.",
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

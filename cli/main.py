@@ -2,7 +2,7 @@
 
 A command's module is imported only when the command runs or shows its help, so that `towline --help` starts at once.
 
-Exit codes: 0, the request holds; 1, it does not (infeasible, not found); 2, wrong input; 3, an error in towline itself;
+Exit codes: 0, the answer is yes (feasible, tensions exist); 1, it is no; 2, wrong input; 3, an error in towline itself;
 130, stopped by Ctrl-C.
 """
 
@@ -97,7 +97,8 @@ def _options(
 ) -> None:
     """Plan motions of cable robots and distribute the tensions of their cables.
 
-    The exit code is 0 if the request holds, 1 if it does not (infeasible, not found), and 2 for wrong input.
+    The exit code is 0 if the answer is yes (feasible, tensions exist), 1 if it is no, 2 for wrong input, 3 for an error
+    in towline itself, and 130 after Ctrl-C.
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())

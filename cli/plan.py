@@ -23,10 +23,20 @@ def plan(
     robot: RobotArgument,
     task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="NetCDF file to write; default: ROBOT-TASK.nc in this folder.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files. An "
+            "existing file is overwritten.",
+        ),
     ] = None,
     figures: Annotated[
-        Path | None, typer.Option("--figures", help="Folder to draw path, views, tensions, base and limits in.")
+        Path | None,
+        typer.Option(
+            "--figures",
+            help="Folder to draw in: path, views, tensions and, where they apply, carriers (base.png), limits and the "
+            "solver's convergence.",
+        ),
     ] = None,
     report: Annotated[
         Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, to open anywhere.")
@@ -34,8 +44,8 @@ def plan(
     animate: Annotated[
         Path | None, typer.Option("--animate", help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="Of the film: 1 is real time.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Frames a second of the film.")] = 20.0,
+    speed: Annotated[float, typer.Option(help="Speed of the film; 1 is real time.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Frames per second of the film.")] = 20.0,
     as_json: JsonOption = False,
     schema: Annotated[
         bool,

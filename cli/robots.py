@@ -101,7 +101,9 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
     from ..text import quantity, quantity_range, quantity_row
 
     of = f"of {len(robot.platform.dof)}"
-    rank = f"rank {result['rank']} {of} at home, {result['rank_level']} when level, {result['rank_tilted']} when tilted"
+    highest = f"{result['rank_level']} with the platform level, {result['rank_tilted']} tilted"
+    reason = f" ({result['reason']})" if result["reason"] else ""
+    rank = f"rank {result['rank']} {of} at home{reason}; highest rank near home: {highest}"
     lines = [
         f"{result['name']}: {result['cables']} cables; carriers: {_count(result['carriers'])}",
         f"  mass {quantity(result['mass'], 'kg')}, weight {quantity(result['weight'], 'N')}, "
@@ -109,7 +111,7 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
         f"  home ({quantity_row(result['home'])}) [m, rad], cable lengths there "
         f"{quantity_range(result['cable_lengths'], 'm')}",
         f"  tension limits: t_min {quantity_range(result['t_min'], 'N')}, t_max {quantity_range(result['t_max'], 'N')}",
-        f"  wrench matrix: {rank}" + (f": {result['reason']}" if result["reason"] else ""),
+        f"  wrench matrix: {rank}",
         f"  its singular values, moments divided by the characteristic length: "
         f"{quantity_row(result['singular_values'])}",
         *_rest(at_home),

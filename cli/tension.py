@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from ..solvers import TensionProblem, TensionSolution
 
 SIX = "x y z roll pitch yaw"
+# Those of `solvers.methods`, which takes longer to load than help may.
+METHODS = (
+    "active-set, daqp, qp, min-norm, closed-form, improved-closed-form, centroid, 1-norm, 2-norm, dykstra, least-sum, "
+    "largest-margin, min-max, log-barrier, analytic-centre, p-norm, soft-wrench"
+)
 
 
 def tension(
@@ -35,12 +40,17 @@ def tension(
         ),
     ] = None,
     wind: Annotated[
-        str | None, typer.Option(metavar="'x y z'", help="Velocity of the air in {G} [m/s]; default: no air.")
+        str | None,
+        typer.Option(
+            metavar="'x y z'",
+            help="Velocity of the air in {G} [m/s]; default: no aerodynamic forces. '0 0 0' is still air, with drag on "
+            "a moving platform.",
+        ),
     ] = None,
     method: Annotated[
-        str, typer.Option(metavar="NAME", help="The method whose result decides the exit code.")
+        str, typer.Option(metavar="NAME", help=f"Method whose result decides the exit code: {METHODS}.")
     ] = "active-set",
-    backend: Annotated[str | None, typer.Option(metavar="NAME", help="QP solver of the method qp.")] = None,
+    backend: Annotated[str | None, typer.Option(metavar="NAME", help="QP solver that the method qp uses.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the cable tensions at one pose and motion, by every method.

@@ -12,18 +12,26 @@ from .options import JsonOption, RobotArgument, print_json
 
 def time(
     robot: RobotArgument,
-    task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML); its duration is ignored.")],
+    task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Task file to write, of the timed motion; default: ROBOT-TASK-timed.yaml."),
+        typer.Option(
+            "--out",
+            help="Task file to write; default: ROBOT-TASK-timed.yaml in this folder, from the `name` keys of both "
+            "files. An existing file is overwritten.",
+        ),
     ] = None,
-    grid: Annotated[int, typer.Option(help="Intervals of the path to start with.")] = 200,
+    grid: Annotated[int, typer.Option(help="Number of intervals of the path at first; refined if necessary.")] = 200,
     as_json: JsonOption = False,
 ) -> None:
     """Find the fastest motion along a task's path with every tension inside its limits; exit code 1 if there is none.
 
-    The task gives the path, the places or paths of the carriers, the margin, still air, and the limits of platform and
-    cable speed and of carrier speed and acceleration. `towline plan` audits the file that is written, as any task.
+    Of the task it uses `path`, `base` (hold or given), `margin`, and of `limits` platform_speed, cable_speed,
+    carrier_speed and carrier_acceleration; of `duration` only that of a circle. With `wind: [0, 0, 0]` the drag of
+    still air counts; without `wind` there are no aerodynamic forces. Any other wind or limit, a tube and a free base
+    are refused.
+
+    The result is a task file with the timed motion; `towline plan` can audit it like any other task.
     """
     from ..models import load
     from ..ocp import read_task, time_along

@@ -21,52 +21,83 @@ if TYPE_CHECKING:
     from ..workspace.run import Progress
 
 
+# Those of `workspace.Condition.kinds`, which takes longer to load than help may.
+CONDITIONS = (
+    "all, any, dynamic, equilibrium-posture, exists-placement, force-balance, interference, lengths, margin, "
+    "static-equilibrium, wrench-closure, wrench-feasible, wrench-with-tolerance"
+)
+
+
 def workspace(
     robot: RobotArgument,
     condition: Annotated[
         list[str] | None,
         typer.Option(
-            help="A kind, or JSON with a kind and its keys; of several all must hold. Default: static-equilibrium."
+            help="Condition that a pose must fulfil: its kind, or JSON with the kind and its keys, such as "
+            f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
+            "Default: static-equilibrium."
         ),
     ] = None,
     box: Annotated[
-        str | None, typer.Option(help="Positions [m]: 'x y z; x y z', minima; maxima. Default: a box about the robot.")
+        str | None,
+        typer.Option(
+            help="Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors."
+        ),
     ] = None,
     attitude: Annotated[
-        str | None, typer.Option(help="'roll pitch yaw' [rad], or minima; maxima. Default: that of home.")
+        str | None,
+        typer.Option(
+            help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: that of home."
+        ),
     ] = None,
     carriers: Annotated[
-        str, typer.Option(help="home; or reach: mobile carriers anywhere in their reach boxes.")
+        str,
+        typer.Option(help="Where the carriers are: home, or reach (mobile carriers anywhere in their reach boxes)."),
     ] = "home",
     lengths: Annotated[
         str | None,
-        typer.Option(help="'min max' of three cable lengths [m], from which positions follow; instead of --box."),
+        typer.Option(
+            help="Range 'min max' of the lengths of three cables [m]; the positions follow from them. Instead of --box."
+        ),
     ] = None,
     samples: Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")] = 60_000,
-    method: Annotated[str, typer.Option(help="random, sobol, halton, grid or adaptive.")] = "random",
+    method: Annotated[str, typer.Option(help="How to sample: random, sobol, halton, grid or adaptive.")] = "random",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     size: Annotated[
         float | None,
-        typer.Option(help="With the method adaptive: edge of the smallest cells [m]. Default: as the samples allow."),
+        typer.Option(
+            help="Edge of the smallest cells of the method adaptive [m]. Default: as small as the samples allow."
+        ),
     ] = None,
     workers: Annotated[int, typer.Option(help="Number of processes on this machine.")] = 1,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, tcp://host:8786 (extra cluster)."),
+        typer.Option(
+            metavar="ADDRESS",
+            help="Dask scheduler to use instead of --workers, such as tcp://host:8786 (extra cluster).",
+        ),
     ] = None,
     checkpoint: Annotated[
-        Path | None, typer.Option("--checkpoint", help="New file to which results are appended, to be resumed later.")
+        Path | None,
+        typer.Option(
+            "--checkpoint",
+            help="File in which to store progress; must not exist. Continue later with --resume.",
+        ),
     ] = None,
     resume: Annotated[
         Path | None,
         typer.Option("--resume", metavar="FILE", help="Checkpoint to continue, or to create if there is none."),
     ] = None,
     keep: Annotated[
-        str, typer.Option(help="Which samples the file contains, a million at most: accepted, all or none.")
+        str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")
     ] = "accepted",
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="NetCDF file or .zarr folder to write. Default: ROBOT-workspace.nc in this folder."),
+        typer.Option(
+            "--out",
+            help="NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: "
+            "ROBOT-workspace.nc in this folder, from the robot's `name`.",
+        ),
     ] = None,
     figure: Annotated[
         Path | None, typer.Option("--figure", help="PNG file for a picture of the positions reached.")
@@ -275,5 +306,4 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None) -> No
     if accepted:
         for name, (least, most) in summary["bounds"].items():
             typer.echo(f"  {name} from {quantity(least)} to {quantity(most, 'm')}")
-    rate = quantity(summary["poses_per_s"], "poses/s", digits=3)
-    typer.echo(f"  {rate}, {quantity(summary['seconds'], 's', digits=3)} with start-up")
+    typer.echo(f"  {quantity(summary['seconds'], 's', digits=3)} in total, start-up included")

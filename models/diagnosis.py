@@ -136,8 +136,8 @@ def _implausible(robot: Robot) -> list[str]:
     if gyration > 2 * robot.length:
         mass, reach = quantity(robot.platform.mass, "kg"), quantity(robot.length, "m", 2)
         warnings.append(
-            f"platform.inertia: {quantity(largest, 'kg m^2', 3)} at {mass} is a gyration radius of "
-            f"{quantity(gyration, 'm', 2)}, but no attachment is farther than {reach} from the CoM"
+            f"platform.inertia: {quantity(largest, 'kg m^2', 3)} at {mass} gives a radius of gyration of "
+            f"{quantity(gyration, 'm', 2)}, although no attachment is farther than {reach} from the CoM"
         )
     if robot.m >= 3 and not _com_between_attachments(robot):
         warnings.append(

@@ -60,8 +60,8 @@ def test_robots_lists_and_diagnoses():
         assert name in listed.stdout
     printed = run("robots", "wang-flying-printed")
     assert printed.returncode == 0
-    assert "rank 3 of 6 at home, 3 when level" in printed.stdout
-    assert "all cable lines meet in one point" in printed.stdout
+    assert "rank 3 of 6 at home (all cable lines meet in one point" in printed.stdout
+    assert "; highest rank near home: 3 with the platform level, 5 tilted\n" in printed.stdout
     found = json.loads(run("robots", "wang-flying-printed", "--json").stdout)
     assert (found["rank"], found["rank_level"]) == (3, 3)
     assert json.loads(run("robots", "--schema").stdout)["title"] == "Robot"

@@ -10,6 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from towline import methods
+from towline.cli.tension import METHODS
+from towline.cli.workspace import CONDITIONS
+from towline.workspace import Condition
+
 TOWLINE = Path(sys.executable).with_name("towline")
 ROBOT = """\
 name: hanging-mass
@@ -62,7 +67,7 @@ def test_text_figure_and_conditions_that_all_have_to_hold(folder):
     assert done.returncode == 0, done.stderr
     assert "hanging-mass: " in done.stdout
     assert "of 60 000 samples accepted" in done.stdout
-    assert "interval of Clopper and Pearson at 95%" in done.stdout
+    assert "(95 % confidence interval of Clopper and Pearson)" in done.stdout
     assert (folder / "f.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads(xr.load_dataset(folder / "w.nc").attrs["condition"])["kind"] == "all"
 
@@ -83,6 +88,12 @@ def test_the_boundary_and_a_zarr_folder(folder):
         2,
         "towline: --out must be a new .zarr folder or a NetCDF file, got w.zarr, which exists\n",
     )
+
+
+def test_help_lists_every_condition_and_method():
+    """The names are written out, so that help need not load what they name."""
+    assert CONDITIONS.split(", ") == sorted(Condition.kinds)
+    assert METHODS.split(", ") == list(methods())
 
 
 def test_nowhere_is_exit_code_1(folder):

@@ -225,7 +225,7 @@ def test_diagnosis_of_the_printed_pairing():
     # The lines A_i B_i run from radius 0.52 at z = -0.07 to 0.25 at z = -0.97: they meet where the radius is zero.
     meeting = -0.97 - 0.9 * 0.25 / (0.52 - 0.25)
     assert f"meet in one point, (0, 0, {meeting:.4g}) m" in diagnosis.reason
-    assert any("gyration radius" in warning for warning in diagnosis.warnings)
+    assert any("radius of gyration" in warning for warning in diagnosis.warnings)
 
 
 def test_diagnosis_of_other_robots():

@@ -122,7 +122,8 @@ def _measures(
         about = "no interval: a grid is not random; it can be off by half a layer of cells along the boundary"
     else:
         value, ends = accepted / tried, share_interval(accepted, tried)
-        about = f"interval of Clopper and Pearson at {LEVEL:.0%}, for independent samples"
+        about = f"{100 * LEVEL:g} % confidence interval of Clopper and Pearson"
+        about += f"; for {method} the error is usually smaller" * (method in ("sobol", "halton"))
     unit = {"units": domain.measure_unit}
     return {
         "volume": ((), whole * value, unit),

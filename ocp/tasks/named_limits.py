@@ -49,7 +49,7 @@ class Limit(NamedTuple):
     scale
         A typical size in this unit.
     soft
-        Amount beyond the bounds that costs one, or None if the limit is hard.
+        Excess that adds one to the objective, or None if the limit is hard.
     cosine
         Whether values and bounds are cosines of the angle that `unit` is of: they have derivatives where it is zero.
     """

@@ -92,10 +92,10 @@ AnyBase = Annotated[HoldBase | GivenBase | FreeBase, Field(discriminator="kind")
 
 
 class Objective(Part):
-    """The terms of the cost: each number is the amount of its quantity that costs one (Bryson's rule).
+    """The terms of the cost: each number is the amount of its quantity that adds one to the cost (Bryson's rule).
 
-    The cost is the mean over time of sum |quantity / number|^2. A term applies only where its quantity is free to
-    choose.
+    The cost is the mean over time of sum |quantity / number|^2, so a larger number makes a term less important. A term
+    applies only where its quantity is free to choose.
     """
 
     tension: Positive | None = Field(
@@ -112,7 +112,7 @@ class Objective(Part):
     )
     tension_rate: Positive | None = Field(default=None, description="rate of each tension [N/s]; default: no cost")
     time: Positive | None = Field(
-        default=None, description="duration that costs one, not squared [s]; default: no cost"
+        default=None, description="duration that adds one to the cost, not squared [s]; default: no cost"
     )
     margin: Positive | None = Field(
         default=None,
@@ -129,13 +129,17 @@ class Task(Part):
     duration: Positive | PositiveRange | None = Field(
         default=None, description="[s], or a range from which the planner chooses; default: the path's own"
     )
-    base: AnyBase = Field(default=HoldBase(kind="hold"), description="motion of the carriers: hold, given or free")
+    base: AnyBase = Field(
+        default=HoldBase(kind="hold"),
+        description="what the carriers do: hold (stay), given (follow paths) or free (move as the planner chooses)",
+    )
     tube: Tube = Tube()
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
     wind: Vector3 | WindBox | None = Field(
         default=None,
-        description="wind on the platform, constant, in {G} [m/s]; or a box {min, max}: tensions exist for the motion "
-        "in every wind of the box, and the planned tensions are those in its middle; default: no air",
+        description="wind on the platform, constant, in {G} [m/s], or a range {min, max}: tensions exist for every "
+        "wind velocity in the range, and the planned tensions are those for its middle; default: no aerodynamic "
+        "forces; [0, 0, 0] is still air, with drag on a moving platform",
     )
     limits: TaskLimits = TaskLimits()
     steps: int = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")

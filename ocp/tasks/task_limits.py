@@ -71,7 +71,7 @@ class TaskLimits(Part):
     Attributes
     ----------
     soft :
-        By name of a limit, how much beyond it costs as much as one of the objective's numbers, in the limit's unit.
+        By name of a limit, the excess that adds one to the objective, in the limit's unit; twice the excess adds four.
         The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
         carrier_turn_acceleration, carrier_reach, thrust, torque.
     """
@@ -104,7 +104,8 @@ class TaskLimits(Part):
     )
     keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="places to keep out of")
     soft: dict[str, Positive] = Field(
-        default={}, description="by the name of a limit, the amount beyond it that costs one"
+        default={},
+        description="by the name of a limit, the excess that adds one to the objective; twice the excess adds four",
     )
 
     @model_validator(mode="after")
