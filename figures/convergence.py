@@ -36,7 +36,7 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
     """
     canvas = style.figure(5.0, 4.4)
     above = style.axes(canvas, "", "infeasibility [-]", (2, 1, 1))
-    below = style.axes(canvas, "iteration, all runs counted through", "objective [-]", (2, 1, 2))
+    below = style.axes(canvas, "iteration (all solver runs)", "objective [-]", (2, 1, 2))
     parts = runs(iterates)
     starts = np.cumsum([0, *(len(part) for part in parts)])
     for index, (part, start) in enumerate(zip(parts, starts, strict=False)):

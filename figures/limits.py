@@ -72,7 +72,7 @@ def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]
     near = [bound for bound in bounds if low - size <= bound <= high + size]
     for bound in near:
         ax.axhline(bound, **style.LIMIT)
-    notes.append(_as_text(quantity) + ("" if near or not bounds else " (far)"))
+    notes.append(_as_text(quantity) + ("" if near or not bounds else " (outside the plot)"))
     middle, shown = (low + high) / 2, [low, high, *near]
     ax.set_ylim(min(*shown, middle - size / 2) - 0.1 * size, max(*shown, middle + size / 2) + 0.1 * size)
     ax.margins(x=0.01)
@@ -82,8 +82,7 @@ def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]
 def _as_text(quantity: Limited) -> str:
     low, high, unit = quantity.low, quantity.high, quantity.unit
     if low == high:
-        return f"{low:g} {unit}"
-    if low == -high:
-        return f"at most {high:g} {unit} in both directions"
-    parts = [f"{word} {bound:g} {unit}" for word, bound in (("at least", low), ("at most", high)) if np.isfinite(bound)]
-    return ", ".join(parts)
+        return f"exactly {low:g} {unit}"
+    if np.isfinite(low) and np.isfinite(high):
+        return f"limits {low:g} {unit} and {high:g} {unit}"
+    return f"lower limit {low:g} {unit}" if np.isfinite(low) else f"limit {high:g} {unit}"

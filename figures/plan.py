@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..text import quantity
 from . import style
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
     ]
     for ax, (title, trajectory) in zip(panels, trajectories.items(), strict=True):
         notes = _draw_tensions(ax, trajectory)
-        ax.set_title("\n".join([*([title] if title else []), "; ".join(notes)]), fontsize=9)
+        ax.set_title("\n".join([*([title] if title else []), *notes]), fontsize=9)
     style.legend_below(canvas, panels[0])
     return canvas
 
@@ -66,7 +67,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
 def base_offset(trajectory: xr.Dataset) -> Figure:
     """Draw the horizontal distance of each carrier from the platform, and its height above it."""
     canvas = style.figure()
-    ax = style.axes(canvas, "time [s]", "carrier from platform [m]")
+    ax = style.axes(canvas, "time [s]", "carrier position\nrelative to platform [m]")
     time = trajectory["time"].values
     trajectory = trajectory.isel(carrier=trajectory["carrier_kind"].values != "ground")
     apart = trajectory["carrier_pose"].values[:, :, :3] - trajectory["pose"].values[:, None, :3]
@@ -92,8 +93,8 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
         ax.plot(time, np.where(missing, unlimited[:, index], np.nan), **look, linewidth=0.8)
     if missing.any():
         ax.fill_between(time, 0, 1, where=missing, color="#eeeeee", transform=ax.get_xaxis_transform(), step="mid")
-        shortfall = float(np.nanmax(trajectory["violation"].values))
-        notes.append(f"grey: none inside the limits, short by up to {shortfall:.2f} N")
+        shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N")
+        notes.append(f"grey: no tensions inside the limits; shortfall up to {shortfall}")
     return notes + _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 
 
@@ -107,7 +108,7 @@ def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> list[st
             _draw_limit(ax, high, f"t_max = {high:g} N", above=False)
         else:
             far.append(f"{high:g}")
-    return [f"t_max = {', '.join(far)} N"] if far else []
+    return [f"t_max = {', '.join(far)} N (outside the plot)"] if far else []
 
 
 def _draw_limit(ax: Axes, value: float, text: str, above: bool) -> None:

@@ -25,7 +25,7 @@ __all__ = ["Search"]
 ENDS = {  # of a run of the solver, by its message; others are quoted
     "Solve_Succeeded": "solved",
     "Solved_To_Acceptable_Level": "solved with less accuracy",
-    "Infeasible_Problem_Detected": "no solution near the guess",
+    "Infeasible_Problem_Detected": "no solution found",
     "Maximum_Iterations_Exceeded": "iteration limit reached",
     TIME_LIMIT: "time limit reached",
     SETTLED: "stopped improving",

@@ -33,7 +33,7 @@ def drawings(plan: Plan, trajectory: xr.Dataset) -> dict[str, Drawing]:
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
     if (trajectory["carrier_kind"] != "ground").any():
-        drawn["base"] = Drawing("Offset of the carriers from the platform", plan_figures.base_offset(trajectory))
+        drawn["base"] = Drawing("Carriers relative to the platform", plan_figures.base_offset(trajectory))
     rows = output_rows(plan)
     if quantities := limited(plan, rows):
         drawn["limits"] = Drawing("Other limits", limits(plan.audit.times[rows], quantities))

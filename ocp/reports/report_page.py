@@ -23,7 +23,10 @@ def page(plan: Plan, trajectory: xr.Dataset) -> str:
     robot, task, status = plan.scenario.robot, plan.scenario.task, plan.status.value
     decisive = headline(plan).partition(f"{status.upper()}, ")[2]
     pictures = [html.picture(drawing) for drawing in drawings(plan, trajectory).values()]
-    files = [html.file("The robot's file", to_yaml(robot)), html.file("The task", to_yaml(task))]
+    files = [
+        html.file("The robot's file", to_yaml(robot)),
+        html.file("The task with all keys (frame: world is {G})", to_yaml(task)),
+    ]
     parts = [*_tables(plan), *pictures, *files]
     return html.page(f"{robot.name}: {task.name}", status, decisive, COLOURS[status], parts)
 

@@ -2,7 +2,7 @@
 
 The platform follows a horizontal circle of r = 1 m, 1 m below the point [50, 50, 100] m, at 0.2 pi rad/s. All anchors
 lie within 0.52 m of the quadrotor's axis, so the CoM cannot be 1 m beside it: with the paper's own parameters cables
-would have to push. With the base free (acceleration up to 3 m/s^2) the platform follows the same circle with every
+would have to push. With the quadrotor free (acceleration up to 3 m/s^2) the platform follows the same circle with every
 cable taut.
 """
 
@@ -55,7 +55,7 @@ def run(folder: Path, progress: Progress | None = None) -> FlyingCircle:
     hovering_task, free_task = tasks()
     hovering, free = plan(robot, hovering_task), plan(robot, free_task, progress)
     files = [p.save(folder / f"{p.scenario.task.name}.nc") for p in (hovering, free)]
-    both = {"quadrotor hovering: infeasible": hovering.trajectory, "base free: feasible": free.trajectory}
+    both = {"quadrotor hovering: infeasible": hovering.trajectory, "quadrotor free to move: feasible": free.trajectory}
     drawings = {
         "path": figures.path(free.trajectory),
         "tensions": figures.tensions_side_by_side(both),
