@@ -36,7 +36,7 @@ ROBOT = "wang-flying"
 MOST = 3.0  # acceleration of the base [m/s^2]
 OFFSET, JERK = 10.0, 10.0  # base away from the hovering point [m], and its jerk [m/s^3], that cost as much as 1 m/s^2
 ACCURACY = {"print_level": 0, "sb": "yes", "tol": 1e-8, "constr_viol_tol": 1e-9}
-FIRST = ACCURACY | {"mu_init": 1e-2}  # the guess is near: IPOPT's own 0.1 takes more iterations
+FIRST = ACCURACY | {"mu_init": 1e-3}  # the guess is near: IPOPT's own 0.1 takes more iterations
 AGAIN = ACCURACY | {
     "mu_init": 1e-6,
     "warm_start_init_point": "yes",

@@ -13,7 +13,7 @@ from ..tasks import bernstein
 from ..tasks.bernstein import Values
 from ..tasks.scenario import ATTITUDE, POSITION, CarrierLimits, Scenario
 from .layout import Layout
-from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, spread, stretch
+from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, reference_symbols, spread, stretch
 
 JUMP = 0.05  # of an interval: how long a jump of the acceleration counts
 
@@ -58,14 +58,18 @@ def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, column
     return Points(bernstein.integral(h, first[layout.q], speed), speed, acceleration)
 
 
-def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
-    """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points."""
+def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray) -> Interval:
+    """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points.
+
+    The functions are for the nodes of these `references`, (18 (1 + c), nodes).
+    """
     robot, scheme = scenario.robot, scenario.scheme
     wide = 18 * (1 + len(robot.carriers))
     x, x_end = ca.SX.sym("x", layout.width * scheme.size), ca.SX.sym("x_end", layout.width)
-    parameters, parameters_end = ca.SX.sym("p", wide * scheme.size), ca.SX.sym("p_end", wide)
+    parameters, given_references = reference_symbols("p", np.tile(references, (scheme.size, 1)))
+    parameters_end, given_end = reference_symbols("p_end", references)
     columns = [*ca.vertsplit(x, layout.width), x_end]
-    references = [*ca.vertsplit(parameters, wide), parameters_end]
+    referred = [*ca.vertsplit(given_references, wide), given_end]
     given = scenario.duration / mesh.steps
     h = given * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
@@ -83,7 +87,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout) -> Interval:
     cost += _rate_rows(scenario, mesh, layout, h, columns, values, rows)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     _tube_rows(scenario, _within(layout, h, columns, own.position), values, rows)
-    moving = [motions(scenario, layout, *pair) for pair in zip(columns, references, strict=True)]
+    moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
     for index, limit in scenario.free_limits(mesh.shrink).items():
         motion = [point[1 + index] for point in moving]
         jerk = [spread(scenario, index) @ column[layout.jerk] / given for column in columns] if scheme.smooth else None

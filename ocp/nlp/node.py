@@ -11,7 +11,7 @@ from ..tasks.named_limits import named_limits
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
-from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions
+from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, reference_symbols
 
 __all__ = ["node_function"]
 
@@ -19,12 +19,17 @@ SLACK_COST = 1e2  # of a missing wrench as large as the weight
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
 
-def node_function(scenario: Scenario, mesh: Mesh, layout: Layout) -> tuple[ca.Function, list[Row]]:
-    """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant."""
+def node_function(
+    scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray
+) -> tuple[ca.Function, list[Row]]:
+    """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
+
+    The function is for the nodes of these `references`, (18 (1 + c), nodes).
+    """
     robot, dynamics = scenario.robot, scenario.dynamics
     x = ca.SX.sym("x", layout.width)
-    parameters = ca.SX.sym("p", 18 * (1 + len(robot.carriers)))
-    platform, *carriers = motions(scenario, layout, x, parameters)
+    parameters, reference = reference_symbols("p", references)
+    platform, *carriers = motions(scenario, layout, x, reference)
     tensions = robot.force_scale * x[layout.tensions]
     wind = scenario.wind
     pose_rows = [ca.vertcat(*(carrier[k].T for carrier in carriers)) for k in range(3)]

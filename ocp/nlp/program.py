@@ -124,9 +124,10 @@ def build(scenario: Scenario, mesh: Mesh) -> Program:
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
     shares, at_nodes = scheme.shares(steps), scheme.balance_points(steps)
     times = shares * scenario.duration
-    parameters = ca.DM(_parameters(scenario, times))
-    node, node_rows = node_function(scenario, mesh, layout)
-    interval = interval_of(scenario, mesh, layout)
+    references = _parameters(scenario, times)
+    parameters = ca.DM(references)
+    node, node_rows = node_function(scenario, mesh, layout, references)
+    interval = interval_of(scenario, mesh, layout, references)
     arrange = stage_by_stage if scenario.task.solver == "fatrop" else all_at_once
     unknowns = arrange(scenario, layout, steps, interval.flow)
     X, X_end = unknowns.columns, unknowns.ends

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import casadi as ca
+import numpy as np
 
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import DURATION, Layout
 
-__all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "spread", "stretch"]
+__all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "reference_symbols", "spread", "stretch"]
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
@@ -53,6 +54,20 @@ def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
     long.
     """
     return {"cse": True, "is_diff_in": [i < unknown for i in range(inputs)]}
+
+
+def reference_symbols(name: str, references: np.ndarray) -> tuple[ca.SX, ca.SX]:
+    """Return symbols for one column of `references` (k, points), and the same with what is constant as numbers.
+
+    A node's rotation at a constant angle is then no rotation: on a level path the derivatives are three times cheaper.
+    """
+    symbols = ca.SX.sym(name, len(references))
+    constant = np.ptp(references, axis=1) == 0.0
+    values = [
+        ca.SX(float(row[0])) if fixed else symbols[i]
+        for i, (row, fixed) in enumerate(zip(references, constant, strict=True))
+    ]
+    return symbols, ca.vertcat(*values)
 
 
 def spread(scenario: Scenario, owner: int | None) -> ca.DM:

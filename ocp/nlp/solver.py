@@ -252,18 +252,23 @@ class _Watch(ca.Callback):
         size = self._sizes.get({"lam_x": "x", "lam_g": "g"}.get(name, name), 0)
         return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
 
-    def eval(self, arg: Sequence[ca.DM]) -> list[int]:
-        x, g, objective = arg[0].full().ravel(), arg[2].full().ravel(), float(arg[1])
+    def has_eval_buffer(self) -> bool:
+        return True  # without copies: as DM each argument takes longer than all that is done here
+
+    def eval_buffer(self, arg: Sequence[memoryview], res: Sequence[memoryview]) -> int:
+        x, f, g, _, lam_g, _ = (np.frombuffer(each) if each is not None else np.zeros(0) for each in arg)
+        objective = float(f[0])
         self._keep(x, g, objective)
         # What making up for what g misses would change, to first order.
         missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
-        if objective + arg[4].full().ravel() @ missed < self._better():
+        if objective + lam_g @ missed < self._better():
             self._since = self._iteration
         if self._progress is not None:
             self.errands.put(partial(self._progress, self._iteration, objective, self.infeasibility(g)))
         self._iteration += 1
         self.late = time.perf_counter() > self._deadline
-        return [int(self.abandoned or self.settled or self.late)]
+        np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.late
+        return 0
 
     def _better(self) -> float:
         """Return the objective below which it is worth going on."""
@@ -275,4 +280,4 @@ class _Watch(ca.Callback):
             return
         if objective < self._better():
             self._mark = objective
-        self.best, self._objective = x, objective
+        self.best, self._objective = x.copy(), objective
