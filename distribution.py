@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from .errors import InputError
 from .inputs import real_array
-from .models.robot import LARGEST, Robot
+from .models.part import LARGEST
+from .models.robot import Robot
 from .solvers.problem import TensionProblem
 from .solvers.solution import TensionSolution
 

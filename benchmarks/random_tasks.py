@@ -175,7 +175,7 @@ def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray) -> bool:
 def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
     """Return carriers at rest at home, or one carrier that moves along a given path."""
     carrier = robot.carriers[0]
-    if carrier.kind != "prescribed" or rng.random() < 0.5:
+    if carrier.confined or carrier.efforts or rng.random() < 0.5:
         return {"kind": "hold"}
     start = robot.carrier_home[0]
     end = start + np.r_[rng.uniform(-1, 1, 3), 0.0, 0.0, 0.0]
@@ -185,8 +185,8 @@ def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
 
 def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
     """Return free carriers where the robot has some that can move: always for quadrotors, mostly for others."""
-    kinds = {carrier.kind for carrier in robot.carriers}
-    if "quadrotor" in kinds or (kinds & {"prescribed", "mobile"} and rng.random() < 0.8):
+    held, movable = (any(values) for values in zip(*((c.efforts, c.moves) for c in robot.carriers), strict=True))
+    if held or (movable and rng.random() < 0.8):
         return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}
     return {"kind": "hold"}
 

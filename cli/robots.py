@@ -142,10 +142,8 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
     from ..figures import robot as figure
     from ..figures import style
     from ..models import Dynamics
-    from ..models.robot import MobileCarrier
     from ..workspace import hints
 
-    reach = [carrier.reach for carrier in robot.carriers if isinstance(carrier, MobileCarrier)]
     positions, feasible = hints(Dynamics(robot))
     sketch = figure.RobotSketch(
         title=robot.name,
@@ -154,7 +152,7 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
         com=robot.home_com,
         carriers=robot.carrier_home[:, :3],
         names=[carrier.name for carrier in robot.carriers],
-        boxes=[(np.array(box.min), np.array(box.max)) for box in reach],
+        boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
         tensions=at_home.tensions,
         positions=positions,
         feasible=feasible,

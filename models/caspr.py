@@ -33,7 +33,8 @@ from defusedxml.ElementTree import DefusedXMLParser, ParseError
 from ..errors import InputError
 from ..inputs import shown
 from .parsing import read_bytes, validate
-from .robot import COORDINATES, LARGEST, Cable, Coordinate, Platform, Robot, inertia_matrix
+from .part import COORDINATES, LARGEST, Coordinate, inertia_matrix
+from .robot import Cable, Platform, Robot
 from .rotation import rotation
 
 # What each joint's q moves, in the order of q; both spatial ones turn freely; each writes the angles in its own form.

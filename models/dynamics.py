@@ -20,7 +20,7 @@ from .cables.pulley import Exit
 from .files import as_robot
 from .functions import Functions
 from .relative_dynamics import RelativeDynamics
-from .robot import QuadrotorCarrier, Robot
+from .robot import Robot
 
 
 def dynamics_of(robot: Robot) -> Dynamics:
@@ -465,15 +465,10 @@ class Dynamics:
         A, run = self.wrench_matrix(pose, carriers), _run(robot, pose, carriers)
         accelerations = []
         for index, carrier in enumerate(robot.carriers):
-            if isinstance(carrier, QuadrotorCarrier):
-                at, rate = carriers[index, :].T, rates[index, :].T
-                pull = forward.pull_on_carrier(robot, index, run, at, tensions)
-                inputs = (thrust[index], torque[index, :].T)
-                accelerations.append(
-                    forward.quadrotor_acceleration(carrier, np.array(robot.gravity), at, rate, *inputs, pull).T
-                )
-            else:
-                accelerations.append(ca.SX.zeros(1, 6))
+            at, rate = carriers[index, :].T, rates[index, :].T
+            pull = forward.pull_on_carrier(robot, index, run, at, tensions)
+            own = carrier.acceleration(at, rate, thrust[index], torque[index, :].T, pull, np.array(robot.gravity))
+            accelerations.append(ca.SX.zeros(1, 6) if own is None else own.T)
         acceleration = forward.platform_acceleration(robot, pose, velocity, A @ tensions)
         outputs = [acceleration, ca.vertcat(*accelerations)]
         return ca.Function(

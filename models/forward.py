@@ -1,14 +1,13 @@
-"""Forward dynamics: accelerations from tensions, of the platform alone and together with quadrotor carriers.
+"""Forward dynamics: accelerations from tensions, of the platform, and the pull of its cables on the carriers.
 
 The wrench that a motion needs is affine in the accelerations, w = M(q) ddq + h(q, dq), so
 
     platform   M ddq = A t + W_e - h
-    quadrotor  m_Q (ddx_Q - g) = f R_Q e_z - sum_i t_i u_i
-               I_Q alpha_Q + omega_Q x I_Q omega_Q = tau - sum_i (c_i x R_Q^T u_i) t_i       (in its own axes)
+    carrier    F = - sum_i t_i u_i,   M = - sum_i (c_i x R_Q^T u_i) t_i       (M in its own axes)
 
-for thrust f along its z axis, torque tau, and the cables i that it carries, which leave it at c_i: what pulls the
-platform pulls the quadrotor back. Coordinates are (x, y, z, roll, pitch, yaw) and their derivatives. Source: Newton
-and Euler.
+for the pull (F, M) of the cables i that a carrier holds, which leave it at c_i: what pulls the platform pulls the
+carrier back (`rigid_motion` has how a quadrotor moves with it). Coordinates are (x, y, z, roll, pitch, yaw) and their
+derivatives. Source: Newton and Euler.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ import numpy as np
 
 from . import rigid_body
 from .cables.pulley import Exit
-from .robot import QuadrotorCarrier, Robot, inertia_matrix
-from .rotation import Matrix, inverse_rate_matrix, rate_matrix, rate_matrix_derivative, rotation
+from .robot import Robot
+from .rotation import Matrix, rate_matrix, rotation
 
 
 def mass_matrix(robot: Robot, pose: Matrix) -> Matrix:
@@ -45,38 +44,6 @@ def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: 
     for column, row in enumerate(rows):
         chosen[row, column] = 1
     return chosen @ moving
-
-
-def quadrotor_acceleration(
-    carrier: QuadrotorCarrier,
-    gravity: np.ndarray,
-    pose: Matrix,
-    velocity: Matrix,
-    thrust: Matrix,
-    torque: Matrix,
-    pull: Matrix,
-) -> Matrix:
-    """Return ddq, (6, 1), of a quadrotor carrier.
-
-    Parameters
-    ----------
-    pose, velocity
-        (6, 1) each, of its frame in {G}.
-    thrust
-        Total thrust f along its z axis [N].
-    torque
-        tau about its axes, (3, 1) [N m].
-    pull
-        Force in {G} [N] and moment about its CoM in its own axes [N m] of its cables, (6, 1).
-    """
-    angles, rates = pose[3:6], velocity[3:6]
-    R = rotation(angles)
-    acceleration = ca.DM(gravity) + (R[:, 2] * thrust + pull[0:3]) / carrier.mass
-    inertia = ca.DM(inertia_matrix(carrier.inertia))
-    Omega = rate_matrix(angles) @ rates
-    alpha = ca.DM(np.linalg.inv(inertia.full())) @ (torque + pull[3:6] - ca.cross(Omega, inertia @ Omega))
-    angular = inverse_rate_matrix(angles) @ (alpha - rate_matrix_derivative(angles, rates) @ rates)
-    return ca.vertcat(acceleration, angular)
 
 
 def pull_on_carrier(robot: Robot, index: int, run: Exit, carrier_pose: Matrix, tensions: Matrix) -> Matrix:

@@ -1,10 +1,10 @@
 """A robot as a MuJoCo model (MJCF): platform and carriers as bodies, cables as spatial tendons with a motor each.
 
     carrier of kind   is in MuJoCo
-    ground            sites of the world
+    ground            a body fixed to the world
     prescribed        a mocap body: set data.mocap_pos and data.mocap_quat
     mobile            a mocap body, set in the same fields
-    quadrotor         a free body with a thrust motor along its z axis and three torque motors
+    quadrotor         a free body with a motor an actuator: thrust along its z axis, and three torques
 
 The motor of a cable takes its tension [N] as control, inside its limits; positive pulls. The platform has a free joint,
 or, if some of its coordinates cannot move, a joint for each that can. Air, elasticity and reach boxes are left out.
@@ -19,7 +19,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import InputError
-from .robot import COORDINATES, QuadrotorCarrier, Robot, inertia_matrix
+from .part import COORDINATES, inertia_matrix
+from .robot import Robot
 
 SMALLEST_INERTIA = 1e-14  # [kg m^2], just above what MuJoCo refuses
 
@@ -64,8 +65,8 @@ def _check(robot: Robot) -> None:
             raise InputError(f"carriers[{index}].name must not be 'platform', which is the platform's name in MuJoCo")
     bodies = {"platform": robot.inertia} if robot.platform.inertia else {}
     for index, carrier in enumerate(robot.carriers):
-        if isinstance(carrier, QuadrotorCarrier):
-            bodies[f"carriers[{index}]"] = inertia_matrix(carrier.inertia)
+        if carrier.body is not None:
+            bodies[f"carriers[{index}]"] = inertia_matrix(carrier.body.inertia)
     for name, inertia in bodies.items():
         moments = np.linalg.eigvalsh(inertia)
         if moments[2] > moments[0] + moments[1] + 1e-12 or moments[0] < SMALLEST_INERTIA:
@@ -79,27 +80,23 @@ def _check(robot: Robot) -> None:
 
 def _add_carriers(robot: Robot, world: ET.Element, motors: ET.Element) -> None:
     for index, carrier in enumerate(robot.carriers):
-        if carrier.kind == "ground":
+        if not carrier.moves:
             body = ET.SubElement(
                 world, "body", name=carrier.name, pos=_text(carrier.home[:3]), euler=_euler(carrier.home)
             )
-        elif isinstance(carrier, QuadrotorCarrier):
-            body = _body(world, carrier.name, carrier.home)
-            ET.SubElement(body, "freejoint", name=carrier.name)
-            _add_inertia(body, (0.0, 0.0, 0.0), carrier.mass, carrier.inertia)
-            site = f"{carrier.name} centre"  # no part of a robot has a blank in its name
-            ET.SubElement(body, "site", name=site, size="0.02")
-            limits = _text((carrier.thrust_min, carrier.thrust_max))
-            thrust = {"site": site, "gear": "0 0 1 0 0 0", "ctrlrange": limits}
-            ET.SubElement(motors, "motor", {"name": f"{carrier.name} thrust", **thrust})
-            for axis, (letter, most) in enumerate(zip("xyz", carrier.torque_max, strict=True)):
-                gear = [0.0] * 6
-                gear[3 + axis] = 1.0
-                torque = {"site": site, "gear": _text(gear), "ctrlrange": _text((-most, most))}
-                ET.SubElement(motors, "motor", {"name": f"{carrier.name} torque {letter}", **torque})
-        else:
+        elif carrier.body is None:
             body = _body(world, carrier.name, carrier.home)
             body.set("mocap", "true")
+        else:
+            body = _body(world, carrier.name, carrier.home)
+            ET.SubElement(body, "freejoint", name=carrier.name)
+            _add_inertia(body, (0.0, 0.0, 0.0), *carrier.body)
+            site = f"{carrier.name} centre"  # no part of a robot has a blank in its name
+            ET.SubElement(body, "site", name=site, size="0.02")
+            for actuator in carrier.actuators:
+                limits = _text((actuator.low, actuator.high))
+                motor = {"site": site, "gear": _text(actuator.wrench), "ctrlrange": limits}
+                ET.SubElement(motors, "motor", {"name": f"{carrier.name} {actuator.name}", **motor})
         for cable, owner in enumerate(robot.carrier_of_cable, start=1):
             if owner == index:
                 ET.SubElement(body, "site", name=f"anchor{cable}", pos=_text(robot.anchors[cable - 1]), size="0.01")

@@ -7,7 +7,6 @@ import io
 import re
 import stat
 import warnings
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +18,7 @@ from ruamel.yaml.events import AliasEvent
 
 from ..errors import InputError
 from ..inputs import LONGEST_TEXT, printable, shown
+from .part import json_schema
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 Model = TypeVar("Model", bound=BaseModel)
@@ -85,7 +85,7 @@ def parse_yaml(text: str, model: type[Model], where: str) -> Model:
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise InputError(f"{where}: is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
-        raise InputError(f"{where}: must hold a mapping with {_keys(_schema(model))}, got {shown(data)}")
+        raise InputError(f"{where}: must hold a mapping with {_keys(json_schema(model))}, got {shown(data)}")
     return validate(data, model, where)
 
 
@@ -115,7 +115,7 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
 def _sentence(detail: Any, model: type[BaseModel]) -> str:
     """Return "field must be ..., got ..." for one complaint of pydantic."""
     place, kind, value, context = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
-    field, holder = _walk(place, _schema(model))
+    field, holder = _walk(place, json_schema(model))
     key = str(place[-1]) if place else ""
     field = printable(field, LONGEST_TEXT // 2)  # leaves enough of the line for what is wrong with it
     if kind == "extra_forbidden":
@@ -212,11 +212,6 @@ def _without_lengths(details: list[Any]) -> list[Any]:
     return list(result.values())
 
 
-@cache
-def _schema(model: type[BaseModel]) -> dict[str, Any]:
-    return model.model_json_schema()
-
-
 class _PlainComposer(Composer):
     """Refuses aliases and tags, which no file of towline needs.
 
@@ -295,9 +290,9 @@ def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str,
 
 def _schema_at(location: tuple[int | str, ...], model: type[BaseModel]) -> dict[str, Any]:
     """Return the schema of what stands at a place."""
-    node = _schema(model)
+    node = json_schema(model)
     for part in location:
-        node = _step(node, part, _schema(model))
+        node = _step(node, part, json_schema(model))
     return node
 
 

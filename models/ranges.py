@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from .robot import Finite, Part, Positive
+from .part import Finite, Part, Positive
 
 __all__ = ["PositiveRange", "Range"]
 

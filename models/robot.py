@@ -7,75 +7,35 @@ pitch, yaw) with R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    field_validator,
-    model_validator,
+from pydantic import Field, field_validator, model_validator
+
+from . import points
+from .carriers import AnyCarrier
+from .part import (
+    COORDINATES,
+    BodyInertia,
+    Coordinate,
+    Name,
+    NonNegative,
+    Part,
+    Pose,
+    Positive,
+    Vector3,
+    inertia_matrix,
 )
 
-from ..errors import InputError
-from . import points
-
-LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
-
-
-def _plain_number(value: Any) -> Any:
-    if isinstance(value, bool | str):
-        raise ValueError("must be a number")
-    return value
-
-
-Finite = Annotated[float, BeforeValidator(_plain_number), Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, le=LARGEST, allow_inf_nan=False)]
-NonNegative = Annotated[float, BeforeValidator(_plain_number), Field(ge=0, le=LARGEST, allow_inf_nan=False)]
-Vector3 = tuple[Finite, Finite, Finite]
-Pose = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
-Inertia = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
-Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-
-AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class Part(BaseModel):
-    """The base of all parts: they are frozen, and an unknown key is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    def __init__(self, /, **fields: Any):
-        """Check the fields, with the errors of `model_validate`."""
-        from .parsing import one_line
-
-        try:
-            super().__init__(**fields)
-        except ValidationError as error:
-            raise InputError(one_line(error, type(self).__name__.lower(), type(self))) from None
-
-    # As of pydantic's own: parts inside of parts are checked without a call of it, so that errors keep their place.
-    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
-
-    @classmethod
-    def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """Check a mapping as pydantic does, with the errors of towline.
-
-        Raises
-        ------
-        InputError
-            In one line that names the field, the value and what is accepted.
-        """
-        from .parsing import one_line
-
-        try:
-            return super().model_validate(obj, **options)
-        except ValidationError as error:
-            raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
+# Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
+# or with fewer axes, the reactions of what is locked would enter them.
+TURNING_DOF: tuple[tuple[Coordinate, ...], ...] = (
+    COORDINATES,
+    ("x", "z", "pitch"),
+    ("x", "y", "yaw"),
+    ("y", "z", "roll"),
+    ("x", "y", "z", "yaw"),
+)
 
 
 class Aero(Part):
@@ -92,29 +52,6 @@ class Aero(Part):
     form: Literal["signed", "printed"] = Field(
         default="signed", description="signed: V abs(V), as drag acts; printed: V^2, never negative, as in paper F"
     )
-
-
-def _check_positive_definite(inertia: Inertia) -> Inertia:
-    smallest = float(np.linalg.eigvalsh(inertia_matrix(inertia))[0])
-    if not smallest > 0:
-        raise ValueError(
-            f"must be positive definite (all principal moments > 0 kg m^2; the smallest moment is {smallest:g})"
-        )
-    return inertia
-
-
-BodyInertia = Annotated[Inertia, AfterValidator(_check_positive_definite)]
-Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
-COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
-# Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
-# or with fewer axes, the reactions of what is locked would enter them.
-TURNING_DOF: tuple[tuple[Coordinate, ...], ...] = (
-    COORDINATES,
-    ("x", "z", "pitch"),
-    ("x", "y", "yaw"),
-    ("y", "z", "roll"),
-    ("x", "y", "z", "yaw"),
-)
 
 
 class Platform(Part):
@@ -163,85 +100,6 @@ class Platform(Part):
             angles = ", ".join(f"{self.home[COORDINATES.index(name)]:g}" for name in locked)
             raise ValueError(f"home must have 0 rad for {', '.join(locked)}, which cannot move, got {angles}")
         return self
-
-
-class Carrier(Part):
-    """A body that holds anchors. The anchors of its cables are fixed in its frame."""
-
-    name: Name
-    home: Pose = Field(default=AT_ORIGIN, description="pose of the carrier frame in {G} at rest [m, rad]")
-
-
-class GroundCarrier(Carrier):
-    """A frame on the ground: it never moves."""
-
-    kind: Literal["ground"]
-
-
-class PrescribedCarrier(Carrier):
-    """A base whose motion is given from outside and disturbs the platform (paper F's quadrotor)."""
-
-    kind: Literal["prescribed"]
-
-
-class Box(Part):
-    """A box along the axes of {G}, from its lowest to its highest corner [m]."""
-
-    min: Vector3
-    max: Vector3
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
-            if low > high:
-                raise ValueError(f"min must not exceed max, {high:g} m along {axis}, got {low:g} m")
-        return self
-
-
-class MobileCarrier(Carrier):
-    """A robot end that moves inside a reach box (paper C): a point, its orientation stays as at home."""
-
-    kind: Literal["mobile"]
-    reach: Box = Field(description="where the carrier's origin may be, in {G} [m]")
-    speed_max: Positive = Field(description="[m/s]")
-    acceleration_max: Positive = Field(description="[m/s^2]")
-
-    @model_validator(mode="after")
-    def _home_in_reach(self) -> Self:
-        for axis, low, at, high in zip("xyz", self.reach.min, self.home[:3], self.reach.max, strict=True):
-            if not low <= at <= high:
-                raise ValueError(f"home must lie in reach, from {low:g} m to {high:g} m along {axis}, got {at:g} m")
-        return self
-
-
-class QuadrotorCarrier(Carrier):
-    """A flying robot that feels its cables: rigid body, thrust along its z axis, torques about its axes.
-
-    Its frame sits in its CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
-    """
-
-    kind: Literal["quadrotor"]
-    mass: Positive = Field(description="[kg]")
-    inertia: BodyInertia = Field(description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]")
-    thrust_min: NonNegative = Field(default=0.0, description="smallest total thrust [N]")
-    thrust_max: Positive = Field(description="largest total thrust [N]")
-    torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
-    tilt_max: Positive = Field(
-        default=0.6, description="largest angle of its z axis to the vertical [rad]; for planners"
-    )
-    speed_max: Positive = Field(default=10.0, description="[m/s]; for planners")
-    acceleration_max: Positive = Field(default=10.0, description="[m/s^2]; for planners")
-
-    @model_validator(mode="after")
-    def _thrusts_in_order(self) -> Self:
-        if self.thrust_min >= self.thrust_max:
-            raise ValueError(f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N")
-        return self
-
-
-AnyCarrier = Annotated[
-    GroundCarrier | PrescribedCarrier | MobileCarrier | QuadrotorCarrier, Field(discriminator="kind")
-]
 
 
 class Pulley(Part):
@@ -447,9 +305,3 @@ class Robot(Part):
         """Return the length that scales moments to forces [m]: the largest distance of an attachment from the CoM."""
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)
         return float(arms.max()) if arms.max() > 0 else 1.0
-
-
-def inertia_matrix(inertia: Inertia) -> np.ndarray:
-    """Return the symmetric matrix of (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2]."""
-    xx, yy, zz, xy, xz, yz = inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # (3, 3)

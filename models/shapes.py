@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from .robot import Part, Positive, Vector3
+from .part import Part, Positive, Vector3
 
 __all__ = ["Block", "Capsule", "Sphere"]
 

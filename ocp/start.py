@@ -10,7 +10,7 @@ from pydantic import Field
 from ..errors import InputError
 from ..inputs import shown
 from ..models.parsing import validate
-from ..models.robot import Part
+from ..models.part import Part
 from .nlp.guess import initial_guess
 from .result import Plan
 from .tasks.path import AnyPath, PathBase, RestPath

@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, available, load
 from towline.models.mjcf import to_mjcf
-from towline.models.robot import COORDINATES, Pulley
+from towline.models.part import COORDINATES
+from towline.models.robot import Pulley
 
 mujoco = pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
 

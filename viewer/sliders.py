@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..models import Robot
-from ..models.robot import COORDINATES, MobileCarrier, QuadrotorCarrier
+from ..models.part import COORDINATES
 from .geometry import Geometry
 
 TURN = 1.0  # [rad] to each side of home
@@ -44,9 +44,9 @@ class Slider(NamedTuple):
 def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
     """Return the sliders of the platform, then those of each carrier.
 
-    The platform can move through the box around the robot and a little beyond. Mobile carriers can move through their
-    reach boxes, unless the drive mode fixes them. Flying carriers can move by half the robot's size to each side, and
-    tilt up to the limit of the robot file.
+    The platform can move through the box around the robot and a little beyond. Carriers can move through their
+    reach boxes, unless the drive mode fixes them. Those without one can move by half the robot's size to each side,
+    and tilt up to the limit of the robot file.
     """
     home = robot.home
     found = []
@@ -59,14 +59,15 @@ def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
                 low, high = extent.low[coordinate] - beyond, extent.high[coordinate] + beyond
             found.append(_slider(None, coordinate, low, high, at))
     for index, carrier in enumerate(robot.carriers):
-        if isinstance(carrier, MobileCarrier):
-            if robot.drive != "variable-length":
-                ends = zip(carrier.reach.min, carrier.reach.max, strict=True)
-                found += [_slider(index, k, low, high, carrier.home[k]) for k, (low, high) in enumerate(ends)]
-        elif carrier.kind != "ground":
-            tilt = carrier.tilt_max if isinstance(carrier, QuadrotorCarrier) else TILT
-            spans = [geometry.extent.size / 2] * 3 + [tilt, tilt, TURN]
-            found += [_slider(index, k, at - spans[k], at + spans[k], at) for k, at in enumerate(carrier.home)]
+        limits = carrier.motion_limits
+        tilt = limits.tilt or TILT
+        spans = [geometry.extent.size / 2] * 3 + [tilt, tilt, TURN]
+        for k in carrier.free_coordinates(robot.drive):
+            at = carrier.home[k]
+            low, high = at - spans[k], at + spans[k]
+            if limits.reach is not None and k < 3:
+                low, high = limits.reach.min[k], limits.reach.max[k]
+            found.append(_slider(index, k, low, high, at))
     return [slider for slider in found if slider.high > slider.low]
 
 

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from ..figures import style
 from ..figures.hull import faces
 from ..figures.robot import box_edges
-from ..models.robot import MobileCarrier
 from ..text import quantity
 from . import words
 from .colours import place, rgb, shades
@@ -139,7 +138,7 @@ class Stage:
             position=floor,
         )
         scene.add_frame("/G", axes_length=0.08 * self._size, axes_radius=0.004 * self._size, origin_radius=0.0)
-        boxes = [carrier.reach for carrier in self._robot.carriers if isinstance(carrier, MobileCarrier)]
+        boxes = [box for carrier in self._robot.carriers for box in carrier.drawing.boxes]
         edges = [edge for box in boxes for edge in box_edges(np.array(box.min), np.array(box.max))]
         self._lines("/reach", edges, rgb(style.colour(3)))
         if subject.replay is not None:
@@ -184,14 +183,14 @@ class Stage:
         scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=0.012 * size, point_shape="circle")
         self._carriers: list[viser.FrameHandle | None] = []
         for index, carrier in enumerate(robot.carriers):
-            if carrier.kind == "ground":
+            if not carrier.drawing.body:
                 self._carriers.append(None)
                 continue
             name = f"/carriers/{carrier.name}"
-            turns = carrier.kind != "mobile"
+            axes = carrier.drawing.axes
             self._carriers.append(
                 scene.add_frame(
-                    name, turns, axes_length=0.05 * size, axes_radius=0.003 * size, origin_radius=0.008 * size
+                    name, axes, axes_length=0.05 * size, axes_radius=0.003 * size, origin_radius=0.008 * size
                 )
             )
             self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..figures import style
 from ..models import Robot
-from ..models.robot import COORDINATES
+from ..models.part import COORDINATES
 from ..text import quantity, quantity_range
 from .colours import NO_TENSION, place, shades
 from .instant import Instant, arrow
@@ -103,7 +103,7 @@ def legend(subject: Subject, cell: float) -> str:
     marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
     marks += [("path of the platform", style.colour(0))] if subject.replay else []
     marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
-    marks += [("reach of a carrier", style.colour(3))] if any(c.kind == "mobile" for c in robot.carriers) else []
+    marks += [("reach of a carrier", style.colour(3))] if any(c.drawing.boxes for c in robot.carriers) else []
     marks += [("direction of the wrench that is missing (its force)", style.colour(1))]
     marks += subject.cloud.legend if subject.cloud else []
     rows = [f'<div><span style="color:{hue}">&#9632;</span> {escape(name)}</div>' for name, hue in marks]

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 from ..errors import InputError
 from ..inputs import required, shown
 from ..models import Robot
-from ..models.robot import Part
+from ..models.part import Part
 from .places import Places, check_places
 
 __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]

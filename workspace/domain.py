@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs import shown
 from ..models import Robot
-from ..models.robot import COORDINATES, Box
+from ..models.part import COORDINATES, Box
 from .places import Places
 from .region import AngleBox, Region, reach_boxes, surrounding_box
 from .three_cable_pose import three_cable_pose

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..models import Robot
+from ..models.part import Box, Name, Part, Vector3
 from ..models.ranges import PositiveRange
-from ..models.robot import Box, MobileCarrier, Name, Part, Vector3
 
 
 class AngleBox(Part):
@@ -80,5 +80,6 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
 
 
 def reach_boxes(robot: Robot) -> dict[str, Box]:
-    """Return the reach boxes of the mobile carriers, by name."""
-    return {carrier.name: carrier.reach for carrier in robot.carriers if isinstance(carrier, MobileCarrier)}
+    """Return the reach boxes of the carriers that have one, by name."""
+    boxes = {carrier.name: carrier.motion_limits.reach for carrier in robot.carriers}
+    return {name: box for name, box in boxes.items() if box is not None}

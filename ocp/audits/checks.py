@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...models.robot import COORDINATES
+from ...models.part import COORDINATES
 from ..tasks.named_limits import named_limits
 from ..tasks.path import Motion, WaypointPath
 from ..tasks.scenario import Deviation, Scenario

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...distribution import wrench_problem
-from ...models.robot import Vector3
+from ...models.part import Vector3
 from ...solvers import Certificate, certify
 from ..tasks.scenario import Scenario
 from .audit import Audit

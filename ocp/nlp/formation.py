@@ -115,7 +115,7 @@ def _across(platform: Motion) -> np.ndarray:
 def _loose(scenario: Scenario) -> list[int]:
     """Return the carriers that keep their places about the platform rather than in {G}."""
     free = {owner for owner, _ in scenario.owners() if owner is not None}
-    return [i for i in free if scenario.robot.carriers[i].kind in ("prescribed", "quadrotor")]
+    return [i for i in free if not scenario.robot.carriers[i].confined]
 
 
 def _span(scenario: Scenario) -> np.ndarray:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...models.robot import QuadrotorCarrier
 from ..tasks.scenario import POSITION, Deviation, Scenario
 from .formation import clear_formation
 
@@ -27,7 +26,7 @@ def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
         guess = _about_home(scenario, nodes)
     else:
         guess = _in_formation(scenario, formation.motion(nodes), nodes)
-    if any(isinstance(scenario.robot.carriers[index], QuadrotorCarrier) for index, _ in scenario.carrier_free):
+    if any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free):
         for _ in range(ATTITUDES_MEET):
             guess = _tilted(scenario, _pulled(scenario, guess))
     return _pulled(scenario, guess)
@@ -42,7 +41,7 @@ def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         if owner is None or scenario.relative or coordinate not in POSITION:
             continue
-        if robot.carriers[owner].kind in ("prescribed", "quadrotor"):
+        if not robot.carriers[owner].confined:
             offset = robot.carrier_home[owner, coordinate] - robot.home[coordinate]
             q[:, column] = platform.pose[:, coordinate] + offset - carriers[owner].pose[:, coordinate]
             v[:, column] = platform.velocity[:, coordinate] - carriers[owner].velocity[:, coordinate]
@@ -82,7 +81,7 @@ def _pulled(scenario: Scenario, guess: Deviation) -> Deviation:
 
 
 def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
-    """Return the motion with each quadrotor's thrust along the force that its motion and its cables need."""
+    """Return the motion with each carrier tilted as its efforts balance its motion and its cables."""
     robot = scenario.robot
     A, _ = _balance(scenario, guess)
     _, carriers = scenario.motion(guess.nodes, guess)
@@ -91,22 +90,13 @@ def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         if owner is None or coordinate not in (3, 4):
             continue
-        carrier = robot.carriers[owner]
-        if not isinstance(carrier, QuadrotorCarrier):
-            continue
         cables = robot.carrier_of_cable == owner
         pull = -np.einsum("nij,nj->ni", A[:, :3, cables], guess.tensions[:, cables])
-        needed = carrier.mass * (carriers.acceleration[:, owner, :3] - robot.gravity) - pull
-        roll, pitch = _pointing(needed, carriers.pose[:, owner, 5])
-        q[:, column] = (roll if coordinate == 3 else pitch) - references[owner].pose[:, coordinate]
+        motion = carriers.pose[:, owner], carriers.acceleration[:, owner]
+        tilt = robot.carriers[owner].balanced_tilt(*motion, pull, np.array(robot.gravity))
+        if tilt is not None:
+            q[:, column] = tilt[:, coordinate - 3] - references[owner].pose[:, coordinate]
     return _spline(scenario, guess.nodes, q)
-
-
-def _pointing(force: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return roll r and pitch p, (n,), for which z, (sin p cos r, -sin r, cos p cos r) but for yaw, is along force."""
-    x = np.cos(yaw) * force[:, 0] + np.sin(yaw) * force[:, 1]
-    y = -np.sin(yaw) * force[:, 0] + np.cos(yaw) * force[:, 1]
-    return -np.arcsin(y / np.linalg.norm(force, axis=1)), np.arctan2(x, force[:, 2])
 
 
 def _balance(scenario: Scenario, guess: Deviation) -> tuple[np.ndarray, np.ndarray]:

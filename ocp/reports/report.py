@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models.robot import Vector3
+from ...models.part import Vector3
 from ...solvers import Certificate
 from ...text import quantity, quantity_row
 from ..result import Plan
@@ -234,7 +234,7 @@ def _carriers(plan: Plan) -> list[Fact]:
     facts = []
     motion, times = plan.audit.carriers, plan.audit.times
     for index, carrier in enumerate(plan.scenario.robot.carriers):
-        if carrier.kind == "ground":
+        if not carrier.moves:
             continue
         limit = plan.scenario.limits.get(index)
         speed, acceleration = (

@@ -6,7 +6,6 @@ import numpy as np
 
 from ...figures.animation import Scene
 from ...figures.robot import box_edges
-from ...models.robot import MobileCarrier
 from ..result import Plan
 from ..tasks.task_limits import AnyKeepOut, Block, Sphere
 
@@ -21,7 +20,7 @@ def scene(plan: Plan, times: np.ndarray) -> Scene:
     rows = np.clip(np.round(times / step).astype(int), 0, len(audit.times) - 1)
     poses, carriers = audit.motion.pose[rows], audit.carriers.pose[rows]
     of_cable = robot.carrier_of_cable
-    shown = [index for index, carrier in enumerate(robot.carriers) if carrier.kind != "ground"]
+    shown = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.body]
     anchors, attachments = plan.scenario.dynamics.points(poses, carriers)
     return Scene(
         title=f"{robot.name}, {plan.scenario.task.name}: {plan.status.value}",
@@ -32,7 +31,7 @@ def scene(plan: Plan, times: np.ndarray) -> Scene:
         carriers=carriers[:, shown, :3],
         names=[robot.carriers[index].name for index in shown],
         bodies=[np.flatnonzero(of_cable == index) for index in shown],
-        boxes=[(np.array(c.reach.min), np.array(c.reach.max)) for c in robot.carriers if isinstance(c, MobileCarrier)],
+        boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
         obstacles=[outline(place) for place in plan.scenario.task.limits.keep_out if place.frame == "world"],
         tensions=audit.tensions[rows],
         t_min=robot.t_min,

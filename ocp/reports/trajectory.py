@@ -7,7 +7,7 @@ import json
 import numpy as np
 
 from ...models.parsing import to_yaml
-from ...models.robot import COORDINATES
+from ...models.part import COORDINATES
 from ...netcdf import Contents, Variable
 from ..result import Plan
 

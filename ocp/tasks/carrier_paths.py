@@ -32,8 +32,9 @@ def by_index(robot: Robot, paths: Mapping[str, Framed], field: str) -> dict[int,
     for name, path in paths.items():
         if name not in names:
             raise InputError(f"{field} must name carriers of the robot ({', '.join(names)}), got {name!r}")
-        if robot.carriers[names.index(name)].kind == "ground":
-            raise InputError(f"{field} must name carriers that move, got {name!r}, which is of kind ground")
+        carrier = robot.carriers[names.index(name)]
+        if not carrier.moves:
+            raise InputError(f"{field} must name carriers that move, got {name!r}, which is of kind {carrier.kind}")
         if path.frame != "world":
             raise InputError(f"{field}.{name}.frame must be world, got {path.frame!r}")
         paths_by_index[names.index(name)] = path

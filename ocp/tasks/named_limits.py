@@ -18,8 +18,7 @@ import numpy as np
 from ...models import Robot, kinematics
 from ...models.cables.pulley import Exit
 from ...models.forward import pull_on_carrier
-from ...models.robot import QuadrotorCarrier, inertia_matrix
-from ...models.rotation import body_acceleration, body_rate, rotation
+from ...models.rotation import body_rate, rotation
 from .clearance import between_cables, between_points, cable_outside, point_outside
 from .scenario import Scenario
 from .task_limits import KeepOut
@@ -141,9 +140,12 @@ def _all(scenario: Scenario, state: State) -> list[Limit]:
     limits = [*_of_cables(scenario, state), *_of_platform(scenario, state)]
     limits += [*_of_carriers(scenario, state), *_soft_of_carriers(scenario, state)]
     limits += [limit for place in scenario.task.limits.keep_out for limit in _of_place(state, place)]
-    for index, carrier in enumerate(scenario.robot.carriers):
-        if isinstance(carrier, QuadrotorCarrier):
-            limits += _of_quadrotor(state, index, carrier)
+    limits += [
+        limit
+        for index, carrier in enumerate(scenario.robot.carriers)
+        if carrier.efforts
+        for limit in _of_efforts(state, index)
+    ]
     return [_softened(limit, scenario.task.limits.soft) for limit in limits]
 
 
@@ -280,7 +282,7 @@ def _of_place(state: State, place: KeepOut) -> list[Limit]:
             [
                 (point_outside(place, carriers[:, i]), carrier.name)
                 for i, carrier in enumerate(robot.carriers)
-                if carrier.kind != "ground"
+                if carrier.moves
             ],
         ),
         (
@@ -298,21 +300,19 @@ def _of_place(state: State, place: KeepOut) -> list[Limit]:
     return limits
 
 
-def _of_quadrotor(state: State, index: int, carrier: QuadrotorCarrier) -> list[Limit]:
-    """Limit the thrust and torque that motion and cables require; the thrust has no part across its axis."""
-    pose, velocity, acceleration = state.carriers[index]
-    pull = pull_on_carrier(state.robot, index, state.run, pose, state.tensions)
-    R = rotation(pose[3:6])
-    thrust = R.T @ (carrier.mass * (acceleration[:3] - ca.DM(state.robot.gravity)) - pull[:3])
-    inertia = ca.DM(inertia_matrix(carrier.inertia))
-    Omega = body_rate(pose[3:6], velocity[3:6])
-    alpha = body_acceleration(pose[3:6], velocity[3:6], acceleration[3:6])
-    torque = inertia @ alpha + ca.cross(Omega, inertia @ Omega) - pull[3:6]
-    name, weight = carrier.name, state.robot.force_scale
-    limits = [
-        Limit("thrust", "N", thrust[2], carrier.thrust_min, carrier.thrust_max, [name], carrier.thrust_max),
-        Limit("force across the thrust", "N", thrust[:2], 0.0, 0.0, [f"{name} x", f"{name} y"], weight),
+def _of_efforts(state: State, index: int) -> list[Limit]:
+    """Limit the efforts that motion and cables require of a carrier."""
+    carrier, motion = state.robot.carriers[index], state.carriers[index]
+    pull = pull_on_carrier(state.robot, index, state.run, motion[0], state.tensions)
+    return [
+        Limit(
+            effort.name,
+            effort.unit,
+            effort.values,
+            effort.low,
+            effort.high,
+            [f"{carrier.name} {axis}".rstrip() for axis in effort.axes],
+            effort.scale or state.robot.force_scale,
+        )
+        for effort in carrier.required_effort(*motion, pull, np.array(state.robot.gravity))
     ]
-    for axis, most in zip(range(3), carrier.torque_max, strict=True):
-        limits.append(Limit("torque", "N m", torque[axis], -most, most, [f"{name} {'xyz'[axis]}"], most))
-    return limits

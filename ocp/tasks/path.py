@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import override
 
-from ...models.robot import Finite, NonNegative, Part, Pose, Positive, Vector3
+from ...models.part import Finite, NonNegative, Part, Pose, Positive, Vector3
 
 
 class Motion(NamedTuple):

@@ -15,8 +15,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...models import Dynamics, Robot
+from ...models.carriers import MotionLimits
+from ...models.part import Vector3
 from ...models.ranges import PositiveRange
-from ...models.robot import MobileCarrier, QuadrotorCarrier, Vector3
 from .carrier_paths import by_index
 from .clearance import point_outside
 from .path import AnyPath, Motion, RestPath
@@ -281,26 +282,25 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
 def _feels_no_tensions(robot: Robot, where: str) -> None:
     """Refuse a box of winds where other tensions are another motion."""
     for carrier in robot.carriers:
-        if carrier.kind == "quadrotor":
+        if carrier.efforts:
             raise InputError(
                 f"{where}: wind must be one wind, (x, y, z) [m/s], got a box: carrier {carrier.name!r} of kind "
-                "quadrotor moves with the pull of its cables, so that no motion is the same in every wind"
+                f"{carrier.kind} moves with the pull of its cables, so that no motion is the same in every wind"
             )
 
 
 def _fit_limits(robot: Robot, task: Task, where: str) -> None:
     """Refuse soft limits of carriers that the robot does not have, and a body nearer to cables than they may be."""
-    kinds = {carrier.kind for carrier in robot.carriers}
     for name in task.limits.soft:
-        if name in ("thrust", "torque") and "quadrotor" not in kinds:
+        if name in ("thrust", "torque") and not any(name in carrier.efforts for carrier in robot.carriers):
             raise InputError(
                 f"{where}: limits.soft must not name {name!r}, a limit of quadrotors: {robot.name!r} has none"
             )
-        if name == "carrier_reach" and "mobile" not in kinds:
+        if name == "carrier_reach" and all(carrier.motion_limits.reach is None for carrier in robot.carriers):
             raise InputError(
                 f"{where}: limits.soft must not name {name!r}, a limit of mobile carriers: {robot.name!r} has none"
             )
-        if name.startswith("carrier_") and name in OF_CARRIERS and kinds == {"ground"}:
+        if name.startswith("carrier_") and name in OF_CARRIERS and not any(carrier.moves for carrier in robot.carriers):
             raise InputError(
                 f"{where}: limits.soft must not name {name!r}, a limit of moving carriers: {robot.name!r} has none"
             )
@@ -389,14 +389,11 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
     """Return the (carrier, coordinate) pairs that the planner chooses."""
     if not isinstance(base, FreeBase):
         return []
-    free: list[tuple[int, int]] = []
-    for index, carrier in enumerate(robot.carriers):
-        if carrier.kind == "prescribed":
-            free += [(index, coordinate) for coordinate in (*POSITION, *([3, 4] if base.tilt_max > 0 else []))]
-        elif carrier.kind == "quadrotor":
-            free += [(index, coordinate) for coordinate in (*POSITION, 3, 4)]
-        elif carrier.kind == "mobile" and robot.drive != "variable-length":
-            free += [(index, coordinate) for coordinate in POSITION]
+    free = [
+        (index, coordinate)
+        for index, carrier in enumerate(robot.carriers)
+        for coordinate in carrier.planned_coordinates(robot.drive, tilts=base.tilt_max > 0)
+    ]
     if not free and {carrier.kind for carrier in robot.carriers} == {"ground"}:
         raise InputError(
             f"{where}: base must be left out, got kind free: the carriers of robot {robot.name!r} are on the ground"
@@ -418,36 +415,19 @@ def _limits(robot: Robot, task: Task) -> dict[int, CarrierLimits]:
         speed, acceleration = _tighter(speed, free.speed_max), _tighter(acceleration, free.acceleration_max)
     limited = free is not None or speed is not None or acceleration is not None
     for index, carrier in enumerate(robot.carriers):
-        if isinstance(carrier, MobileCarrier):
-            limits[index] = CarrierLimits(
-                acceleration=_tighter(acceleration, carrier.acceleration_max),
-                speed=_tighter(speed, carrier.speed_max),
-                low=np.array(carrier.reach.min),
-                high=np.array(carrier.reach.max),
-                tilt=None,
-                turn_acceleration=None,
-                attitude=np.array(carrier.home[3:]),
-            )
-        elif isinstance(carrier, QuadrotorCarrier):
-            limits[index] = CarrierLimits(
-                acceleration=_tighter(acceleration, carrier.acceleration_max),
-                speed=_tighter(speed, carrier.speed_max),
-                low=np.full(3, -np.inf),
-                high=np.full(3, np.inf),
-                tilt=_tighter(free.tilt_max or None if free else None, carrier.tilt_max),
-                turn_acceleration=free.turn_acceleration_max if free else None,
-                attitude=None,
-            )
-        elif limited and carrier.kind == "prescribed":
-            limits[index] = CarrierLimits(
-                acceleration=acceleration,
-                speed=speed,
-                low=np.full(3, -np.inf),
-                high=np.full(3, np.inf),
-                tilt=free.tilt_max or None if free else None,
-                turn_acceleration=free.turn_acceleration_max if free else None,
-                attitude=None,
-            )
+        own = carrier.motion_limits
+        if not carrier.moves or (own == MotionLimits() and not limited):
+            continue
+        turns = free if not carrier.keeps_attitude else None
+        limits[index] = CarrierLimits(
+            acceleration=_tighter(acceleration, own.acceleration),
+            speed=_tighter(speed, own.speed),
+            low=np.full(3, -np.inf) if own.reach is None else np.array(own.reach.min),
+            high=np.full(3, np.inf) if own.reach is None else np.array(own.reach.max),
+            tilt=_tighter(turns.tilt_max or None if turns else None, own.tilt),
+            turn_acceleration=turns.turn_acceleration_max if turns else None,
+            attitude=np.array(carrier.home[3:]) if carrier.keeps_attitude else None,
+        )
     return limits
 
 

@@ -11,8 +11,8 @@ from pydantic import Field
 from ...errors import InputError
 from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
 from ...models.ranges import PositiveRange
-from ...models.robot import Name, NonNegative, Part, Pose, Positive, Vector3
 from .path import AnyPath
 from .scheme import SchemeName
 from .task_limits import TaskLimits

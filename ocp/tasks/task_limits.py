@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...models import shapes
+from ...models.part import Box, NonNegative, Part, Positive
 from ...models.ranges import Range
-from ...models.robot import Box, NonNegative, Part, Positive
 
 Distance = Annotated[NonNegative | None, Field(description="least distance [m]; null: no limit")]
 

@@ -25,8 +25,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...models import Robot
+from ...models.part import Part, Vector3
 from ...models.rigid_body import com_velocity
-from ...models.robot import Aero, Part, Vector3
+from ...models.robot import Aero
 
 __all__ = ["WindBox", "as_wind", "choices", "decisive_winds", "decisive_winds_at", "inner_winds"]
 

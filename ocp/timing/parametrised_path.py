@@ -21,7 +21,7 @@ import numpy as np
 from ...errors import InputError
 from ...models import Dynamics, Robot
 from ...models.batch import call
-from ...models.robot import COORDINATES, MobileCarrier
+from ...models.part import COORDINATES
 from ..tasks.path import CirclePath, Curve, Motion, RestPath
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
@@ -62,7 +62,7 @@ class ParametrisedPath:
     Parameters
     ----------
     robot
-        Its carriers are of kind ground, prescribed or mobile.
+        Its carriers require no effort of their own: kinds ground, prescribed and mobile.
     path
         Of the platform, in {G} or in the frame of the only carrier.
     carriers
@@ -90,10 +90,11 @@ class ParametrisedPath:
         self.dynamics = Dynamics(robot)
         self.relative = self._frame()
         for carrier in robot.carriers:
-            if carrier.kind == "quadrotor":
+            if carrier.efforts:
                 raise InputError(
                     "robot must have carriers of kind ground, prescribed or mobile to time a path, got "
-                    f"{robot.name!r} with {carrier.name!r} of kind quadrotor, whose thrust a path does not determine"
+                    f"{robot.name!r} with {carrier.name!r} of kind {carrier.kind}, whose {carrier.efforts[0]} a path "
+                    "does not determine"
                 )
         self._check_geometry()
 
@@ -206,17 +207,17 @@ class ParametrisedPath:
             longer = np.abs(lengths - robot.fixed_lengths).max(axis=1) > LENGTH_TOLERANCE
             _refuse(s, longer, "path must keep the cable lengths that the drive fixes", "another length")
         for index, carrier in enumerate(robot.carriers):
-            if not isinstance(carrier, MobileCarrier):
-                continue
-            pose, name = carriers.pose[:, index], carrier.name
-            low, high = np.array(carrier.reach.min), np.array(carrier.reach.max)
-            outside = np.maximum(low - pose[:, :3], pose[:, :3] - high).max(axis=1) > SAME
-            _refuse(s, outside, f"base must keep carrier {name!r} inside its reach box", "a position outside")
-            turned = np.abs(pose[:, 3:] - carrier.home[3:]).max(axis=1) > SAME
-            _refuse(s, turned, f"base must keep mobile carrier {name!r} in its home attitude", "another attitude")
-            moved = np.abs(pose[:, :3] - pose[0, :3]).max(axis=1) > SAME
-            if robot.drive == "variable-length":
-                must = f"base must keep carrier {name!r} at rest, since the robot's drive is variable-length"
+            pose, name, reach = carriers.pose[:, index], carrier.name, carrier.motion_limits.reach
+            if reach is not None:
+                low, high = np.array(reach.min), np.array(reach.max)
+                outside = np.maximum(low - pose[:, :3], pose[:, :3] - high).max(axis=1) > SAME
+                _refuse(s, outside, f"base must keep carrier {name!r} inside its reach box", "a position outside")
+            if carrier.keeps_attitude:
+                turned = np.abs(pose[:, 3:] - carrier.home[3:]).max(axis=1) > SAME
+                _refuse(s, turned, f"base must keep carrier {name!r} in its home attitude", "another attitude")
+            if not carrier.free_coordinates(robot.drive):
+                moved = np.abs(pose[:, :3] - pose[0, :3]).max(axis=1) > SAME
+                must = f"base must keep carrier {name!r} at rest, since the robot's drive is {robot.drive}"
                 _refuse(s, moved, must, "a motion")
 
     def _check_that_it_moves(self, s: np.ndarray, platform: Motion, carriers: Motion) -> None:

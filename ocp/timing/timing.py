@@ -23,7 +23,6 @@ from ...inputs import file_path, real_array, required, shown, whole_number
 from ...models import Robot
 from ...models.files import as_robot
 from ...models.parsing import to_yaml
-from ...models.robot import MobileCarrier
 from ...solvers import Certificate, TensionProblem, certify, solve_batch
 from ...text import quantity
 from ...writing import whole_file
@@ -337,14 +336,13 @@ def _curve(path: AnyPath, *, alone: bool) -> Curve:
 
 
 def _limits(parametrised: ParametrisedPath, limits: TaskLimits) -> PathLimits:
-    """Return the limits of the task and those of the mobile carriers that move."""
+    """Return the limits of the task and those of the carriers that move."""
     speed = dict.fromkeys(parametrised.moving, limits.carrier_speed or np.inf)
     acceleration = dict.fromkeys(parametrised.moving, limits.carrier_acceleration or np.inf)
     for index in parametrised.moving:
-        carrier = parametrised.robot.carriers[index]
-        if isinstance(carrier, MobileCarrier):
-            speed[index] = min(speed[index], carrier.speed_max)
-            acceleration[index] = min(acceleration[index], carrier.acceleration_max)
+        own = parametrised.robot.carriers[index].motion_limits
+        speed[index] = min(speed[index], own.speed or np.inf)
+        acceleration[index] = min(acceleration[index], own.acceleration or np.inf)
     of_cables = np.full(parametrised.robot.m, limits.cable_speed or np.inf)
     return PathLimits(limits.platform_speed or np.inf, of_cables, speed, acceleration)
 

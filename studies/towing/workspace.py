@@ -28,8 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...models import Robot
-from ...models.robot import Box, MobileCarrier
 from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, load_kernels
+from ...workspace.region import reach_boxes
 from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
 from .plans import DRIVES, Drive, robot
@@ -142,7 +142,7 @@ def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
 
 def reach(system: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the reach boxes, (3, 3) each [m]."""
-    boxes: list[Box] = [carrier.reach for carrier in system.carriers if isinstance(carrier, MobileCarrier)]
+    boxes = reach_boxes(system).values()
     return np.array([box.min for box in boxes]), np.array([box.max for box in boxes])
 
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ...models import Robot
 from ...models.dynamics import dynamics_of
-from ...models.robot import Finite
+from ...models.part import Finite
 from ..condition import Condition
 from ..feasibility import feasible, too_few_cables
 from ..places import Places

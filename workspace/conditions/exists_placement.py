@@ -16,10 +16,11 @@ from pydantic import Field
 
 from ...errors import InputError
 from ...models import Robot
+from ...models.part import NonNegative
 from ...models.points import anchors, attachments
-from ...models.robot import MobileCarrier, NonNegative
 from ..condition import AnyCondition, Condition
 from ..places import Places
+from ..region import reach_boxes
 
 __all__ = ["ExistsPlacement"]
 
@@ -46,9 +47,8 @@ class ExistsPlacement(Condition):
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of the placements")
 
     def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        mobile = [i for i, carrier in enumerate(robot.carriers) if isinstance(carrier, MobileCarrier)]
-        if robot.drive == "variable-length":
-            mobile = []
+        boxes = reach_boxes(robot)
+        mobile = [i for i, c in enumerate(robot.carriers) if c.name in boxes and c.free_coordinates(robot.drive)]
         if not mobile and not self.turn:
             raise InputError(
                 "exists-placement must have turn > 0, or a robot with mobile carriers and a drive other than "
@@ -101,7 +101,8 @@ class ExistsPlacement(Condition):
         pose, carriers = places.pose.copy(), places.carriers.copy()
         if self.turn:
             pose[:, 3:] += self.turn * (2.0 * shares[:, -3:] - 1.0) * robot.dof_mask[3:]
-        boxes = {i: carrier.reach for i, carrier in enumerate(robot.carriers) if isinstance(carrier, MobileCarrier)}
+        reach = reach_boxes(robot)
+        boxes = {i: reach[robot.carriers[i].name] for i in mobile}
         for k, i in enumerate(mobile):
             low, high = np.array(boxes[i].min), np.array(boxes[i].max)
             carriers[:, i, :3] = low + shares[:, 3 * k : 3 * k + 3] * (high - low)

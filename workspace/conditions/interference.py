@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
+from ...models.part import Box, NonNegative, Positive
 from ...models.points import anchors, attachments, in_frame
-from ...models.robot import Box, NonNegative, Positive
 from ...models.shapes import Block, Capsule, Sphere
 from ..condition import Condition
 from ..places import Places

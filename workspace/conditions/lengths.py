@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from ...errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
-from ...models.robot import NonNegative, Positive
+from ...models.part import NonNegative, Positive
 from ..condition import Condition
 from ..places import Places
 

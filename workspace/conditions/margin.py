@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
-from ...models.robot import Finite
+from ...models.part import Finite
 from ...solvers.available_wrench import facets
 from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, too_few_cables, wrench_matrices, wrench_rows

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...models import Robot
-from ...models.robot import Finite
+from ...models.part import Finite
 from ..condition import Condition
 from ..feasibility import feasible, rest_wrench, shortfall, too_few_cables
 from ..places import Places

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
-from ...models.robot import NonNegative
+from ...models.part import NonNegative
 from ...solvers import solve_batch
 from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows

@@ -1,0 +1,382 @@
+"""Carriers: the bodies that hold the anchors of cables, each kind a class that answers all questions about itself.
+
+No other file depends on the kind of a carrier. A further kind is a subclass of `Carrier` with a field `kind`: robots
+and robot files take it as soon as the class is defined. Coordinates are counted as in a pose: 0 to 5 are x, y, z, roll,
+pitch and yaw.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache, reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
+
+import numpy as np
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+from ..errors import InputError
+from .part import (
+    AT_ORIGIN,
+    BodyInertia,
+    Box,
+    Finite,
+    Inertia,
+    Name,
+    NonNegative,
+    Part,
+    Pose,
+    Positive,
+    inertia_matrix,
+    json_schema,
+)
+
+if TYPE_CHECKING:
+    from .rotation import Matrix
+
+__all__ = [
+    "Actuator",
+    "AnyCarrier",
+    "Box",
+    "Carrier",
+    "Drawing",
+    "Drive",
+    "Effort",
+    "Finite",
+    "GroundCarrier",
+    "MobileCarrier",
+    "MotionLimits",
+    "Positive",
+    "PrescribedCarrier",
+    "QuadrotorCarrier",
+    "RigidBody",
+]
+
+Drive = Literal["both", "fixed-length", "variable-length"]
+POSITION, TILT, YAW = (0, 1, 2), (3, 4), (5,)
+
+
+class MotionLimits(NamedTuple):
+    """The limits of a carrier's own motion; default: no limit."""
+
+    speed: float | None = None  # [m/s]
+    acceleration: float | None = None  # [m/s^2]
+    tilt: float | None = None  # of its z axis to the vertical [rad]
+    reach: Box | None = None  # where its origin may be, in {G} [m]
+
+
+class RigidBody(NamedTuple):
+    """The mass of a body [kg], and its inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]."""
+
+    mass: float
+    inertia: Inertia
+
+
+class Actuator(NamedTuple):
+    """An actuator of a carrier: force [N] and moment [N m] for each unit of its command, in the carrier's axes."""
+
+    name: str
+    wrench: tuple[float, ...]  # (6,)
+    low: float  # of the command
+    high: float
+
+
+class Effort(NamedTuple):
+    """An effort that a motion requires of a carrier, with the range that it has."""
+
+    name: str
+    unit: str
+    values: Matrix  # (k, 1)
+    low: float
+    high: float
+    axes: tuple[str, ...] = ("",)  # (k,) names of the values, if there are several
+    scale: float | None = None  # a typical size; default: the robot's scale of forces
+
+
+class Drawing(NamedTuple):
+    """What figures and viewer draw of a carrier beside its anchors."""
+
+    body: bool  # at its pose, with its name and path
+    axes: bool  # of its frame, since it turns
+    boxes: tuple[Box, ...]  # around it in {G} [m]
+
+
+class Carrier(Part):
+    """A body that holds anchors. The anchors of its cables are fixed in its frame.
+
+    This base describes a carrier that never moves. A kind of its own overrides what differs.
+    """
+
+    efforts: ClassVar[tuple[str, ...]] = ()  # names of what must hold it, against gravity and the pull of its cables
+
+    name: Name
+    home: Pose = Field(default=AT_ORIGIN, description="pose of the carrier frame in {G} at rest [m, rad]")
+    kind: Any  # a Literal in each class
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Make robots take the kind that the subclass names."""
+        super().__pydantic_init_subclass__(**options)
+        for kind in get_args(cls.model_fields["kind"].annotation):
+            known = _KINDS.get(kind, cls)
+            if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+                raise InputError(f"kind must differ from that of {known.__name__}, got {kind!r} for {cls.__name__}")
+            _KINDS[kind] = cls
+            json_schema.cache_clear()
+
+    def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
+        """Return the coordinates in which it can move with a drive of the robot; the others stay as at home."""
+        return ()
+
+    def planned_coordinates(self, drive: Drive, tilts: bool = True) -> tuple[int, ...]:
+        """Return the free coordinates that a planner chooses: no yaw, and no roll and pitch without `tilts`."""
+        return tuple(i for i in self.free_coordinates(drive) if i in POSITION or (tilts and i in TILT))
+
+    @property
+    def moves(self) -> bool:
+        """Return whether it can move at all, with some drive."""
+        return bool(self.free_coordinates("both"))
+
+    @property
+    def keeps_attitude(self) -> bool:
+        """Return whether it never turns."""
+        return all(i in POSITION for i in self.free_coordinates("both"))
+
+    @property
+    def motion_limits(self) -> MotionLimits:
+        """Return the limits of its own motion."""
+        return MotionLimits()
+
+    @property
+    def confined(self) -> bool:
+        """Return whether its place is bounded: it has a reach, or never moves. Others follow the platform anywhere."""
+        return not self.moves or self.motion_limits.reach is not None
+
+    @property
+    def body(self) -> RigidBody | None:
+        """Return mass and inertia if forces determine its motion, or None if its motion is imposed on it."""
+        return None
+
+    @property
+    def actuators(self) -> tuple[Actuator, ...]:
+        """Return the actuators that move its body."""
+        return ()
+
+    def required_effort(
+        self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray
+    ) -> tuple[Effort, ...]:
+        """Return the efforts that a motion requires of it; none if its motion is imposed.
+
+        Parameters
+        ----------
+        pose, velocity, acceleration
+            (6, 1) each, of its frame in {G}.
+        pull
+            Force in {G} [N] and moment about its CoM in its own axes [N m] of its cables, (6, 1).
+        gravity
+            (3,) in {G} [m/s^2].
+        """
+        return ()
+
+    def acceleration(
+        self, pose: Matrix, velocity: Matrix, thrust: Matrix, torque: Matrix, pull: Matrix, gravity: np.ndarray
+    ) -> Matrix | None:
+        """Return the acceleration of its pose, (6, 1), that thrust and torque give it, or None if it is imposed.
+
+        Parameters
+        ----------
+        pose, velocity, pull, gravity
+            As in `required_effort`.
+        thrust, torque
+            (1, 1) along its z axis, and (3, 1) about its axes.
+        """
+        return None
+
+    def balanced_tilt(
+        self, pose: np.ndarray, acceleration: np.ndarray, pull: np.ndarray, gravity: np.ndarray
+    ) -> np.ndarray | None:
+        """Return roll and pitch, (n, 2) [rad], with which its efforts balance a motion, or None if any tilt does.
+
+        Parameters
+        ----------
+        pose, acceleration
+            (n, 6) each, of its frame in {G}.
+        pull
+            Force of its cables in {G}, (n, 3) [N].
+        gravity
+            (3,) in {G} [m/s^2].
+        """
+        return None
+
+    @property
+    def drawing(self) -> Drawing:
+        """Return what figures and viewer draw of it."""
+        reach = self.motion_limits.reach
+        return Drawing(self.moves, not self.keeps_attitude, () if reach is None else (reach,))
+
+
+_KINDS: dict[str, type[Carrier]] = {}  # by the value of the field `kind`
+
+
+class GroundCarrier(Carrier):
+    """A frame on the ground: it never moves."""
+
+    kind: Literal["ground"]
+
+
+class PrescribedCarrier(Carrier):
+    """A base whose motion is given from outside and disturbs the platform (paper F's quadrotor)."""
+
+    kind: Literal["prescribed"]
+
+    def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
+        """Return all six."""
+        return (*POSITION, *TILT, *YAW)
+
+
+class MobileCarrier(Carrier):
+    """A robot end that moves inside a reach box (paper C): a point, its orientation stays as at home."""
+
+    kind: Literal["mobile"]
+    reach: Box = Field(description="where the carrier's origin may be, in {G} [m]")
+    speed_max: Positive = Field(description="[m/s]")
+    acceleration_max: Positive = Field(description="[m/s^2]")
+
+    @model_validator(mode="after")
+    def _home_in_reach(self) -> Self:
+        for axis, low, at, high in zip("xyz", self.reach.min, self.home[:3], self.reach.max, strict=True):
+            if not low <= at <= high:
+                raise ValueError(f"home must lie in reach, from {low:g} m to {high:g} m along {axis}, got {at:g} m")
+        return self
+
+    def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
+        """Return its position, unless winches alone move the platform."""
+        return () if drive == "variable-length" else POSITION
+
+    @property
+    def motion_limits(self) -> MotionLimits:
+        """Return the limits of the file."""
+        return MotionLimits(speed=self.speed_max, acceleration=self.acceleration_max, reach=self.reach)
+
+
+class QuadrotorCarrier(Carrier):
+    """A flying robot that feels its cables: rigid body, thrust along its z axis, torques about its axes.
+
+    Its frame sits in its CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
+    """
+
+    efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force across the thrust")
+
+    kind: Literal["quadrotor"]
+    mass: Positive = Field(description="[kg]")
+    inertia: BodyInertia = Field(description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]")
+    thrust_min: NonNegative = Field(default=0.0, description="smallest total thrust [N]")
+    thrust_max: Positive = Field(description="largest total thrust [N]")
+    torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
+    tilt_max: Positive = Field(
+        default=0.6, description="largest angle of its z axis to the vertical [rad]; for planners"
+    )
+    speed_max: Positive = Field(default=10.0, description="[m/s]; for planners")
+    acceleration_max: Positive = Field(default=10.0, description="[m/s^2]; for planners")
+
+    @model_validator(mode="after")
+    def _thrusts_in_order(self) -> Self:
+        if self.thrust_min >= self.thrust_max:
+            raise ValueError(f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N")
+        return self
+
+    def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
+        """Return all six."""
+        return (*POSITION, *TILT, *YAW)
+
+    def planned_coordinates(self, drive: Drive, tilts: bool = True) -> tuple[int, ...]:
+        """Return position and tilt: it tilts in every task, since its thrust must point along the force it gives."""
+        return (*POSITION, *TILT)
+
+    @property
+    def motion_limits(self) -> MotionLimits:
+        """Return the limits of the file."""
+        return MotionLimits(speed=self.speed_max, acceleration=self.acceleration_max, tilt=self.tilt_max)
+
+    @property
+    def body(self) -> RigidBody:
+        """Return mass and inertia of the file."""
+        return RigidBody(self.mass, self.inertia)
+
+    @property
+    def actuators(self) -> tuple[Actuator, ...]:
+        """Return its thrust, and a torque about each axis."""
+        turning = [tuple(float(i == 3 + axis) for i in range(6)) for axis in range(3)]
+        return (
+            Actuator("thrust", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0), self.thrust_min, self.thrust_max),
+            *(
+                Actuator(f"torque {letter}", wrench, -most, most)
+                for letter, wrench, most in zip("xyz", turning, self.torque_max, strict=True)
+            ),
+        )
+
+    def required_effort(
+        self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray
+    ) -> tuple[Effort, ...]:
+        """Return thrust and torque, and the force across the thrust, of which it has none."""
+        from . import rigid_motion  # loads CasADi
+
+        force, torque = rigid_motion.required_wrench(
+            self.mass, inertia_matrix(self.inertia), pose, velocity, acceleration, pull, gravity
+        )
+        return (
+            Effort("thrust", "N", force[2], self.thrust_min, self.thrust_max, scale=self.thrust_max),
+            Effort("force across the thrust", "N", force[:2], 0.0, 0.0, ("x", "y")),
+            *(
+                Effort("torque", "N m", torque[axis], -most, most, ("xyz"[axis],), most)
+                for axis, most in enumerate(self.torque_max)
+            ),
+        )
+
+    def acceleration(
+        self, pose: Matrix, velocity: Matrix, thrust: Matrix, torque: Matrix, pull: Matrix, gravity: np.ndarray
+    ) -> Matrix:
+        """Return the acceleration of its pose, (6, 1), that thrust [N] and torque [N m] give it."""
+        from . import rigid_motion  # loads CasADi
+
+        return rigid_motion.acceleration(
+            self.mass, inertia_matrix(self.inertia), pose, velocity, thrust, torque, pull, gravity
+        )
+
+    def balanced_tilt(
+        self, pose: np.ndarray, acceleration: np.ndarray, pull: np.ndarray, gravity: np.ndarray
+    ) -> np.ndarray:
+        """Return roll r and pitch p, (n, 2) [rad], for which the z axis is along the force that it must give.
+
+        At yaw zero that axis is (sin p cos r, -sin r, cos p cos r).
+        """
+        force, yaw = self.mass * (acceleration[:, :3] - gravity) - pull, pose[:, 5]
+        x = np.cos(yaw) * force[:, 0] + np.sin(yaw) * force[:, 1]
+        y = -np.sin(yaw) * force[:, 0] + np.cos(yaw) * force[:, 1]
+        return np.stack([-np.arcsin(y / np.linalg.norm(force, axis=1)), np.arctan2(x, force[:, 2])], axis=1)
+
+
+@lru_cache(maxsize=1)
+def _adapter(classes: tuple[type[Carrier], ...]) -> TypeAdapter[Carrier]:
+    """Return the check of a carrier of one of these classes, chosen by its kind."""
+    one: Any = reduce(or_, classes)
+    return TypeAdapter(Annotated[one, Field(discriminator="kind")])  # pyright: ignore[reportArgumentType, reportInvalidTypeForm]
+
+
+class _ByKind:
+    """The check of a carrier of any kind that is known when the check is made."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return a check that chooses the class by the kind."""
+        return core_schema.no_info_plain_validator_function(_check)
+
+    def __get_pydantic_json_schema__(self, _: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the alternatives, one a kind."""
+        return handler(_adapter(tuple(_KINDS.values())).core_schema)
+
+
+def _check(value: Any) -> Carrier:
+    return _adapter(tuple(_KINDS.values())).validator.validate_python(value)
+
+
+AnyCarrier = Annotated[Carrier, _ByKind()]

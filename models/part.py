@@ -1,0 +1,109 @@
+"""`Part`: the base of everything that a file describes, and the types of its fields, each with its unit checks.
+
+SI units throughout: metres, kilograms, seconds, newtons, radians. Poses are (x, y, z, roll, pitch, yaw) with
+R = Rz(yaw) Ry(pitch) Rx(roll).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from ..errors import InputError
+
+LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
+
+
+def _plain_number(value: Any) -> Any:
+    if isinstance(value, bool | str):
+        raise ValueError("must be a number")
+    return value
+
+
+Finite = Annotated[float, BeforeValidator(_plain_number), Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, BeforeValidator(_plain_number), Field(ge=0, le=LARGEST, allow_inf_nan=False)]
+Vector3 = tuple[Finite, Finite, Finite]
+Pose = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+Inertia = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+
+Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
+COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+
+AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Part(BaseModel):
+    """The base of all parts: they are frozen, and an unknown key is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, /, **fields: Any):
+        """Check the fields, with the errors of `model_validate`."""
+        from .parsing import one_line
+
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise InputError(one_line(error, type(self).__name__.lower(), type(self))) from None
+
+    # As of pydantic's own: parts inside of parts are checked without a call of it, so that errors keep their place.
+    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """Check a mapping as pydantic does, with the errors of towline.
+
+        Raises
+        ------
+        InputError
+            In one line that names the field, the value and what is accepted.
+        """
+        from .parsing import one_line
+
+        try:
+            return super().model_validate(obj, **options)
+        except ValidationError as error:
+            raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
+
+
+class Box(Part):
+    """A box along the axes of {G}, from its lowest to its highest corner [m]."""
+
+    min: Vector3
+    max: Vector3
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+            if low > high:
+                raise ValueError(f"min must not exceed max, {high:g} m along {axis}, got {low:g} m")
+        return self
+
+
+def inertia_matrix(inertia: Inertia) -> np.ndarray:
+    """Return the symmetric matrix of (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2]."""
+    xx, yy, zz, xy, xz, yz = inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # (3, 3)
+
+
+def _check_positive_definite(inertia: Inertia) -> Inertia:
+    smallest = float(np.linalg.eigvalsh(inertia_matrix(inertia))[0])
+    if not smallest > 0:
+        raise ValueError(
+            f"must be positive definite (all principal moments > 0 kg m^2; the smallest moment is {smallest:g})"
+        )
+    return inertia
+
+
+BodyInertia = Annotated[Inertia, AfterValidator(_check_positive_definite)]
+
+
+@cache
+def json_schema(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON Schema of a model, computed once; another kind of carrier empties the cache."""
+    return model.model_json_schema()
