@@ -394,7 +394,7 @@ def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: s
         for index, carrier in enumerate(robot.carriers)
         for coordinate in carrier.planned_coordinates(robot.drive, tilts=base.tilt_max > 0)
     ]
-    if not free and {carrier.kind for carrier in robot.carriers} == {"ground"}:
+    if not any(carrier.moves for carrier in robot.carriers):
         raise InputError(
             f"{where}: base must be left out, got kind free: the carriers of robot {robot.name!r} are on the ground"
         )
