@@ -43,10 +43,10 @@ def readout(instant: Instant, robot: Robot) -> str:
 
 
 def _margins(instant: Instant) -> list[str]:
-    """Return the smallest margin of the tensions and the capacity margin."""
+    """Return the tension margin and the capacity margin."""
     lines = []
     if np.isfinite(instant.margin):
-        lines.append(f"smallest margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
+        lines.append(f"tension margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
     if np.isfinite(instant.reserve):
         lines.append(f"capacity margin {quantity(instant.reserve, 'N')}")
     return lines
@@ -80,7 +80,7 @@ def caption(instant: Instant) -> str:
     """Return time, status, margin or shortfall in two or three lines of plain text, for the scene."""
     lines = [instant.status if instant.time is None else f"t = {instant.time:.2f} s, {instant.status}"]
     if np.isfinite(instant.margin):
-        lines.append(f"smallest margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
+        lines.append(f"tension margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
     if instant.certificate is not None:
         lines.append(shortfall(instant))
     return "\n".join(lines)
