@@ -268,7 +268,7 @@ def _audit(plan: Plan) -> list[Fact]:
         ("worst violation", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
     ]
     if names := list(dict.fromkeys(limit.name for limit in named_limits(plan.scenario).all)):
-        facts.append(("other limits", ", ".join(names)))
+        facts.append(("also checked", ", ".join(names)))
     if (drift := audit.drift) is not None:
         window = _error(drift.window_position, drift.window_attitude)
         after = f"platform error after {quantity(drift.window, 's', digits=2)} with the planned tensions: {window}"
