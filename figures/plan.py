@@ -26,7 +26,7 @@ def path(trajectory: xr.Dataset) -> Figure:
     carriers = trajectory["carrier_pose"].values[:, :, :3]
     ax.plot(*position.T, color=style.colour(0), label="platform")
     for index, name in enumerate(trajectory["carrier"].values):
-        if trajectory["carrier_kind"].values[index] == "ground":
+        if not trajectory["carrier_moves"].values[index]:
             continue  # cables hang from all over it: `views` has them
         label, drawn = str(name), style.colour(index + 1)
         if np.ptp(carriers[:, index], axis=0).max() < 1e-9:
@@ -37,7 +37,7 @@ def path(trajectory: xr.Dataset) -> Figure:
             ax.plot(*np.stack([position[row], carriers[row, index]]).T, color="#bbbbbb", linewidth=0.6)
     ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
     name_axes(ax)
-    moving = trajectory["carrier_kind"].values != "ground"
+    moving = trajectory["carrier_moves"].values
     equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
     ax.legend(fontsize="small", loc="upper left")
     return canvas
@@ -69,7 +69,7 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
     canvas = style.figure()
     ax = style.axes(canvas, "time [s]", "carrier position\nrelative to platform [m]")
     time = trajectory["time"].values
-    trajectory = trajectory.isel(carrier=trajectory["carrier_kind"].values != "ground")
+    trajectory = trajectory.isel(carrier=trajectory["carrier_moves"].values)
     apart = trajectory["carrier_pose"].values[:, :, :3] - trajectory["pose"].values[:, None, :3]
     sideways = np.linalg.norm(apart[:, :, :2], axis=2)
     highest = float(max(sideways.max(), apart[:, :, 2].max()))

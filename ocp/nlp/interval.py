@@ -93,7 +93,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         jerk = [spread(scenario, index) @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
         offset = [spread(scenario, index) @ column[layout.a] for column in columns]
         total = _total(scenario, h, motion, offset, jerk)
-        _carrier_rows(scenario, robot.carriers[index].name, limit, total, values, rows)
+        _carrier_rows(scenario, index, limit, total, values, rows)
     inputs = [x, x_end, parameters, parameters_end]
     function = ca.Function("interval", inputs, [cost, ca.vertcat(*values)], differentiated(4, 2))
     return Interval(function, flow, rows, gaps)
@@ -246,12 +246,14 @@ def _total(
 
 
 def _carrier_rows(
-    scenario: Scenario, name: str, limit: CarrierLimits, total: Points, values: list[ca.SX], rows: list[Row]
+    scenario: Scenario, index: int, limit: CarrierLimits, total: Points, values: list[ca.SX], rows: list[Row]
 ) -> None:
+    name = scenario.robot.carriers[index].name
     if np.isfinite(limit.low).all():
+        chosen = [axis for axis in POSITION if (index, axis) in scenario.carrier_free]  # the others are constant
         for point in total.position:
-            values.append(point[0:3])
-            rows += [(f"{name} reach", low, high) for low, high in zip(limit.low, limit.high, strict=True)]
+            values.append(point[chosen])
+            rows += [(f"{name} reach", limit.low[axis], limit.high[axis]) for axis in chosen]
     if limit.speed is not None:
         for speed in total.speed:
             values.append(ca.sumsqr(speed[0:3]) / limit.speed**2)

@@ -32,7 +32,7 @@ def drawings(plan: Plan, trajectory: xr.Dataset) -> dict[str, Drawing]:
         "views": Drawing("From above and from the side", views(scene(plan, times))),
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
-    if (trajectory["carrier_kind"] != "ground").any():
+    if trajectory["carrier_moves"].any():
         drawn["base"] = Drawing("Carriers relative to the platform", plan_figures.base_offset(trajectory))
     rows = output_rows(plan)
     if quantities := limited(plan, rows):

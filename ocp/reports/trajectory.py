@@ -53,6 +53,7 @@ def trajectory(plan: Plan) -> Contents:
         "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
         "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),
         "carrier_kind": Variable(("carrier",), np.array([carrier.kind for carrier in robot.carriers])),
+        "carrier_moves": Variable(("carrier",), np.array([carrier.moves for carrier in robot.carriers])),
         "cable": Variable(("cable",), np.arange(1, robot.m + 1)),
     }
     return Contents(variables, coordinates, attributes)
