@@ -26,7 +26,7 @@ def tension(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for tension.md and tension.png.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure the speed, accuracy and failures of every installed solver at tension distribution, on this machine."""
+    """Measure speed, accuracy and failures of every installed solver."""
     from rich.console import Console
     from rich.progress import Progress
 

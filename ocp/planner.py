@@ -183,7 +183,7 @@ def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relax
     if near < left.shortest or near > LONGEST * requested:
         return None
     longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
-    audit = search.audit_motion(longer, None, f"audit of {quantity(near, 's')}")
+    audit = search.audit_motion(longer, None, f"audit, duration {quantity(near, 's')}")
     if not audit.passed:
         return None
     return Relaxed("duration", "s", requested, near, Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0))
@@ -210,7 +210,8 @@ def _rest_along_the_path(search: Search) -> Plan | None:
     if span is None or not may_decide:
         return None
     slowest = search.scenario.lasting(span.max)
-    proven = certified_at_rest(slowest, search.audit_motion(slowest, None, f"audit of {quantity(span.max, 's')}"))
+    audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
+    proven = certified_at_rest(slowest, audit)
     return None if proven is None else Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
@@ -239,7 +240,7 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
         return None, own
     # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
     slowest = scenario.lasting(span.max)
-    audit = search.audit_motion(slowest, None, f"audit of {quantity(span.max, 's')}")
+    audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
     relaxed = _longer(search, slowest, left)

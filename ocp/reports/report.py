@@ -143,7 +143,7 @@ def _reasons(plan: Plan) -> list[Fact]:
         possible = quantity(relaxed.possible, relaxed.unit)
         longer = relaxed.possible > relaxed.requested
         side, other = ("shortest", "; `towline time` computes the fastest time law") if longer else ("longest", "")
-        fact = f"{possible} is the {side} with the task's time law (audited){other}"
+        fact = f"{possible} (audited), about the {side} with the task's time law{other}"
         facts.append((f"feasible {relaxed.name}", fact))
     return facts
 
