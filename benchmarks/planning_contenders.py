@@ -26,7 +26,8 @@ from ..models import Robot, load
 from ..models.rotation import inverse_rate_matrix, rotation
 from ..ocp import Planner, Task
 from ..ocp.audits.audit import Audit, audit
-from ..ocp.tasks.scenario import Deviation, lay_out
+from ..ocp.tasks.deviation import Deviation
+from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.scheme import SCHEMES
 from ..studies.flying.circle import HOVER, tasks
 

@@ -22,7 +22,7 @@ from ..ocp.audits.audit import audit
 from ..ocp.nlp.program import build
 from ..ocp.nlp.rows import Mesh
 from ..ocp.nlp.solver import Solver
-from ..ocp.tasks.scenario import lay_out
+from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.scheme import SCHEMES
 from ..studies.flying.circle import tasks
 from ..studies.towing import plans as towing_plans

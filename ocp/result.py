@@ -18,7 +18,8 @@ from .audits.audit import Audit
 from .audits.infeasible_spans import infeasible_spans
 from .stage import Stage
 from .status import MotionStatus
-from .tasks.scenario import Deviation, Scenario
+from .tasks.deviation import Deviation
+from .tasks.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray as xr

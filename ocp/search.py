@@ -16,7 +16,8 @@ from .nlp.waiting import wait_for
 from .result import Plan
 from .stage import Stage
 from .status import MotionStatus
-from .tasks.scenario import Deviation, Scenario
+from .tasks.deviation import Deviation
+from .tasks.scenario import Scenario
 from .violation import relative_violation
 
 __all__ = ["Search"]

@@ -13,8 +13,9 @@ from ..models.parsing import validate
 from ..models.part import Part
 from .nlp.guess import initial_guess
 from .result import Plan
+from .tasks.deviation import Deviation
 from .tasks.path import AnyPath, PathBase, RestPath
-from .tasks.scenario import Deviation, Scenario
+from .tasks.scenario import Scenario
 from .timing.timing import Timing
 
 __all__ = ["deviation_from"]

@@ -15,8 +15,9 @@ from towline.models.statics import equilibria
 from towline.ocp import MotionStatus, Task, plan, read_task, search
 from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
+from towline.ocp.tasks.deviation import Deviation
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
-from towline.ocp.tasks.scenario import Deviation, lay_out
 from towline.ocp.violation import relative_violation
 
 GRAVITY = 9.81

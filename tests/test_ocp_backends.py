@@ -9,7 +9,7 @@ from towline.models import load
 from towline.ocp import Planner, plan
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
-from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 from towline.studies.flying import circle as flying_circle
 from towline.studies.towing import plans as towing_plans

@@ -7,7 +7,7 @@ from towline.models import load
 from towline.ocp import plan
 from towline.ocp.nlp.formation import clear_formation
 from towline.ocp.nlp.guess import initial_guess
-from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 
 HALF_SLOT, HALF_WALL = 0.5, 0.2  # [m]

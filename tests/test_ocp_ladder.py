@@ -14,7 +14,7 @@ from towline.ocp.cost import cost
 from towline.ocp.durations import durations
 from towline.ocp.rest_margin import rest_margin
 from towline.ocp.start import deviation_from
-from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 from towline.ocp.time_law import fastest
 from towline.solvers import capacity_margin

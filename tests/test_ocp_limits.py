@@ -10,9 +10,8 @@ from hypothesis.extra.numpy import arrays
 from towline.errors import InputError
 from towline.models import load
 from towline.ocp import plan
-from towline.ocp.tasks.clearance import between_cables, cable_outside, point_outside
-from towline.ocp.tasks.named_limits import named_limits
-from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.limits.clearance import between_cables, cable_outside, point_outside
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 
@@ -99,15 +98,13 @@ def test_winch_speeds_are_differences_of_lengths():
     path = {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.3]}
     found = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 9.0, "platform_speed": 9.0}})
     seen = found.audit
-    all_limits = named_limits(found.scenario)
-    assert [limit.name for limit in all_limits.all] == ["cable_speed", "platform_speed"]
+    limits = [limit for limit in found.scenario.limits if not limit.name.startswith("tube")]
+    assert [limit.name for limit in limits] == ["cable_speed", "platform_speed"]
     lengths = found.scenario.dynamics.cable_lengths(seen.motion.pose, seen.carriers.pose)
     by_difference = np.gradient(lengths, seen.times, axis=0)[1:-1]
-    bodies = [np.hstack(seen.motion), np.hstack([part[:, 0] for part in seen.carriers])]
-    values = all_limits.function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T[1:-1]
-    np.testing.assert_allclose(values[:, :8], by_difference, atol=1e-4)
-    speed = np.hypot(np.linalg.norm(seen.motion.velocity[1:-1, :3], axis=1), 1e-3 * 9.0)  # round at zero
-    np.testing.assert_allclose(values[:, 8], speed, atol=1e-8)
+    cables, platform = seen.limited[:2]
+    np.testing.assert_allclose(cables[1:-1], by_difference, atol=1e-4)
+    np.testing.assert_allclose(platform[:, 0], np.linalg.norm(seen.motion.velocity[:, :3], axis=1), atol=1e-8)
     slow = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 0.5}})
     assert not slow.feasible
     assert [excess.limit for excess in slow.audit.excess] == ["cable_speed"]
@@ -145,10 +142,10 @@ def test_quadrotors_move_as_forward_dynamics_moves_them():
     found = plan(robot, task | {"base": {"kind": "free", "ends": "rest"}})
     assert found.feasible, found.report()
     seen, scenario = found.audit, found.scenario
-    names = [limit.name for limit in named_limits(scenario).all]
-    assert names == ["thrust", "force across the thrust", "torque", "torque", "torque"]
-    bodies = [np.hstack(seen.motion), np.hstack([part[:, 0] for part in seen.carriers])]
-    asked = named_limits(scenario).function.map(len(seen.times))(*(b.T for b in bodies), seen.tensions.T).full().T
+    names = [limit.name for limit in scenario.limits]
+    first = names.index("thrust")
+    assert names[first : first + 5] == ["thrust", "force across the thrust", "torque", "torque", "torque"]
+    asked = np.hstack(seen.limited[first : first + 5])
     carrier = robot.carriers[0]
     assert asked[:, 0].max() <= carrier.thrust_max
     assert np.abs(asked[:, 3:]).max() <= max(carrier.torque_max)

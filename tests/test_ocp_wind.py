@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, plan
-from towline.ocp.tasks.scenario import lay_out
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.wind_set import WindBox, decisive_winds_at, inner_winds
 from towline.solvers import TensionProblem, certify

@@ -13,7 +13,8 @@ from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
 from ..ocp.reports.scene import outline
-from ..ocp.tasks.scenario import Scenario, lay_out
+from ..ocp.tasks.lay_out import lay_out
+from ..ocp.tasks.scenario import Scenario
 from ..solvers import Certificate, certify
 from .geometry import Extent, Geometry
 from .instant import Instant, least_distance

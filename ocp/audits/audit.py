@@ -14,9 +14,10 @@ import numpy as np
 from ...distribution import wrench_problem
 from ...errors import InputError
 from ...solvers import Certificate, certify
+from ..tasks.deviation import Deviation
 from ..tasks.path import Motion
-from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Deviation, Scenario
-from .checks import END_TOLERANCE, OF_TENSIONS, AuditedMotion, excesses
+from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
+from .checks import END_TOLERANCE, AuditedMotion, excesses
 from .drift import Drift, drift
 from .excess import Excess
 from .tensions import INDEPENDENT, TOLERANCE, Distribution, in_all_winds, scaled
@@ -44,9 +45,11 @@ class Audit:
     tracking_error
         Distance from the path at each time [m].
     excess
-        Other limits that are exceeded (carriers, tube, ends, lengths, those of `limits`), empty if none.
+        Other limits that are exceeded (those of `limits`, ends, fixed lengths, ...), empty if none.
     soft_excess
         Soft limits that are exceeded, empty if none.
+    limited
+        What each of the scenario's limits bounds, (n, k) in its unit, in their order.
     certificate
         The certificate with the largest shortfall, with its time, and its wind if the task has a box of winds; None if
         there is none.
@@ -66,6 +69,7 @@ class Audit:
     tracking_error: np.ndarray  # (n,)
     excess: list[Excess] = field(default_factory=list)
     soft_excess: list[Excess] = field(default_factory=list)
+    limited: list[np.ndarray] = field(default_factory=list)
     certificate: Certificate | None = None
     drift: Drift | None = None
 
@@ -120,12 +124,14 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
     if certificate is not None and result.row is not None:
         certificate = replace(certificate, time=float(times[result.row]))
     off_path = scenario.off_path(times, motion, carriers)
-    exceeded = excesses(AuditedMotion(scenario, deviation, times, motion, carriers, tensions, off_path))
+    audited = AuditedMotion(scenario, deviation, times, motion, carriers, tensions, off_path)
+    limited = audited.limited()
+    exceeded = excesses(audited, limited)
     if result.beyond > TOLERANCE and result.row is not None:
         why = "wrench error of tensions inside their limits less the margin"
         at = float(times[result.row])
         exceeded.append(Excess("tensions", "platform", at, result.beyond, 0.0, "N", "exactly", why))
-    soft = scenario.task.limits.soft
+    soft = {limit.name for limit in scenario.limits if limit.soft is not None}
     followed = few and np.isfinite(tensions).all()
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
@@ -139,6 +145,7 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
         excess=[excess for excess in exceeded if excess.limit not in soft],
         soft_excess=[excess for excess in exceeded if excess.limit in soft],
+        limited=limited,
         certificate=certificate,
         drift=drift(scenario, times, motion, carriers, tensions) if followed else None,
     )
@@ -166,7 +173,8 @@ def certified_at_rest(scenario: Scenario, audit: Audit) -> Audit | None:
 
 def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:
     """Return whether the same motion with other tensions may pass, if this audit did not."""
-    if audit.violation.max() > audit.tolerance or not {excess.limit for excess in audit.excess} <= OF_TENSIONS:
+    exceeded = {excess.limit for excess in audit.excess}
+    if audit.violation.max() > audit.tolerance or not exceeded <= scenario.limits.of_tensions:
         return False
     A = scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
     values = np.linalg.svd(scaled(scenario, A), compute_uv=False)

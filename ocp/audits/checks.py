@@ -1,8 +1,9 @@
 """Check all that a motion must keep beside its tensions: each limit on its own, from the motion alone, densely.
 
 Each check returns the limits that are exceeded, each at its worst instant (`Excess`); an empty list means that all are
-kept. The expressions of `named_limits` are the same as the nonlinear program's, evaluated here on the dense grid; all
-else is computed by NumPy, from the task's own numbers and by differences, and shares nothing with the program.
+kept. The formula of a limit is the one that the nonlinear program has (`limits`), evaluated here on the dense grid in
+the limit's own unit, with no use of the program's points; all else is computed by NumPy, from the task's own numbers
+and by differences, and shares nothing with the program.
 """
 
 from __future__ import annotations
@@ -12,27 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...models.part import COORDINATES
-from ..tasks.named_limits import named_limits
+from ..tasks.deviation import Deviation
 from ..tasks.path import Motion, WaypointPath
-from ..tasks.scenario import Deviation, Scenario
+from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 from ..tasks.task import FreeBase
 from .excess import Excess
 
-__all__ = ["END_TOLERANCE", "LIMIT_TOLERANCE", "OF_TENSIONS", "UNDERACTUATED_TOLERANCE", "AuditedMotion", "excesses"]
+__all__ = ["END_TOLERANCE", "UNDERACTUATED_TOLERANCE", "AuditedMotion", "excesses"]
 
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
-LIMIT_TOLERANCE = 1e-6  # relative, of the carriers' own limits
-PATH_TOLERANCE = 1e-7  # [m, rad], of the tube, its ends and its waypoints
+PATH_TOLERANCE = 1e-7  # [m, rad], of ends and waypoints
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers and platform start and end
-RATE_TOLERANCE = 1e-3  # relative, of tension rates: the audited tensions are the planned ones but for the wrench's rest
+STILL_TOLERANCE = 1e-6  # [m/s, m/s^2, rad], of carriers that keep their place or attitude
 LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 DURATION_TOLERANCE = 1e-7  # relative
-ANGLE_TOLERANCE = 1e-6  # [rad]
 JUMP_TOLERANCE = 1e-6  # [m, rad]; ten times that of speeds [m/s, rad/s]: programs meet their equations to 1e-8
 STEP = 1e-5  # [s], of differences
-
-# Limits that depend on which tensions give the wrench: where cables are redundant others may keep them.
-OF_TENSIONS = frozenset({"tension_rate", "thrust", "torque", "force across the thrust"})
 
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
@@ -49,48 +45,57 @@ class AuditedMotion:
     tensions: np.ndarray  # (n, m) [N], nan where there are none
     off_path: np.ndarray  # (n, 6) [m, rad], along the path's axes
 
+    def limited(self) -> list[np.ndarray]:
+        """Return what each limit bounds over time, (n, k), in its unit."""
+        carriers = zip(*(np.moveaxis(part, 1, 0) for part in self.carriers), strict=True)
+        bodies = [np.hstack(parts) for parts in (self.motion, *carriers)]
+        return self.scenario.limits.over(self.times, bodies, self.tensions, self.off_path)
 
-def excesses(audited: AuditedMotion) -> list[Excess]:
-    """Return all limits that are exceeded, hard and soft."""
-    checks = (_carriers, _lengths, _tube, _tube_ends, _waypoints, _base_ends, _locked, _duration, _jumps, _tension_rate)
-    return [excess for check in (*checks, _named_limits) for excess in check(audited)]
+
+def excesses(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
+    """Return all limits that are exceeded, hard and soft; `limited` is that of the motion."""
+    checks = (_still, _lengths, _tube_ends, _waypoints, _base_ends, _locked, _duration, _jumps)
+    exceeded = _limits(audited, limited)
+    return exceeded + [excess for check in checks for excess in check(audited)]
 
 
-def _carriers(audited: AuditedMotion) -> list[Excess]:
-    """Check the hard limits of carriers; the soft ones are among `named_limits`."""
-    exceeded = []
-    robot, soft, times = audited.scenario.robot, audited.scenario.task.limits.soft, audited.times
-    for index, limit in audited.scenario.limits.items():
-        name = robot.carriers[index].name
-        pose, velocity, acceleration = (part[:, index] for part in audited.carriers)
-        tilt = np.arccos(np.clip(np.cos(pose[:, 3]) * np.cos(pose[:, 4]), -1, 1))
-        checks = {
-            "carrier_acceleration": (np.linalg.norm(acceleration[:, :3], axis=1), limit.acceleration, "m/s^2"),
-            "carrier_speed": (np.linalg.norm(velocity[:, :3], axis=1), limit.speed, "m/s"),
-            "carrier_tilt": (tilt, limit.tilt, "rad"),
-            "carrier_turn_acceleration": (np.abs(acceleration[:, 3:5]).max(axis=1), limit.turn_acceleration, "rad/s^2"),
-        }
-        for quantity, (values, bound, unit) in checks.items():
-            if quantity in soft or bound is None:
-                continue
-            row = int(values.argmax())
-            # Programs bound the cosine, which resolves a small angle to no better than this.
-            spare = ANGLE_TOLERANCE if quantity == "carrier_tilt" else bound * LIMIT_TOLERANCE
-            if not values[row] <= bound + spare:
-                exceeded.append(Excess(quantity, name, float(times[row]), float(values[row]), bound, unit))
-        if "carrier_reach" not in soft:
-            for axis in range(3):
-                about = f"{name} {'xyz'[axis]}"
-                exceeded += _outside(audited, "carrier_reach", about, pose[:, axis], limit.low[axis], limit.high[axis])
-        if limit.attitude is None:
+def _limits(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
+    """Check the limits of task, robot and carriers, hard and soft."""
+    limits, exceeded = audited.scenario.limits, []
+    # A limit of tensions is not checked where there are none; any other value that is nan exceeds its limit.
+    there = np.where(np.isfinite(audited.tensions).all(axis=1, keepdims=True), 0.0, np.nan)
+    for limit, values in zip(limits, limited, strict=True):
+        beyond = np.maximum(limit.low - values, values - limit.high)
+        unchecked = np.isnan(limit.over(audited.times, there)) if limit.name in limits.of_tensions else False
+        beyond = np.where(np.isnan(beyond), np.where(unchecked, -np.inf, np.inf), beyond)
+        if beyond.max() <= limit.tolerance:
             continue
-        if robot.drive == "variable-length":
+        row, which = np.unravel_index(beyond.argmax(), beyond.shape)
+        value = float(values[row, which])
+        side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
+        time, about = float(audited.times[row]), limit.about(int(which))
+        side = "exactly" if limit.is_equation else side
+        exceeded.append(Excess(limit.name, about, time, value, bound, limit.unit, side))
+    return exceeded
+
+
+def _still(audited: AuditedMotion) -> list[Excess]:
+    """Check that carriers keep the coordinates that they cannot change, and their place if only winches move."""
+    robot, exceeded = audited.scenario.robot, []
+    for index, carrier in enumerate(robot.carriers):
+        if not carrier.moves:
+            continue
+        pose, velocity, acceleration = (part[:, index] for part in audited.carriers)
+        if not carrier.free_coordinates(robot.drive):
             moves = np.maximum(np.abs(velocity).max(axis=1), np.abs(acceleration).max(axis=1))
-            why = "with the drive variable-length only winches move"
-            exceeded += _above(audited, "drive", name, moves, LIMIT_TOLERANCE, "m/s", why)
-        turned = np.abs(pose[:, 3:] - limit.attitude).max(axis=1)
-        why = "a mobile carrier keeps its attitude"
-        exceeded += _above(audited, "carrier_attitude", name, turned, LIMIT_TOLERANCE, "rad", why)
+            why = f"with the drive {robot.drive} only winches move"
+            exceeded += _above(audited, "drive", carrier.name, moves, STILL_TOLERANCE, "m/s", why)
+        free, why = carrier.free_coordinates("both"), f"a carrier of kind {carrier.kind} cannot change it"
+        for limit, coordinates, unit in (("carrier_position", POSITION, "m"), ("carrier_attitude", ATTITUDE, "rad")):
+            kept = [i for i in coordinates if i not in free]
+            if kept:
+                off = np.abs(pose[:, kept] - np.array(carrier.home)[kept]).max(axis=1)
+                exceeded += _above(audited, limit, carrier.name, off, STILL_TOLERANCE, unit, why)
     return exceeded
 
 
@@ -102,25 +107,6 @@ def _above(
     if values[row] <= tolerance:
         return []
     return [Excess(limit, about, float(audited.times[row]), float(values[row]), 0.0, unit, "exactly", why)]
-
-
-def _outside(
-    audited: AuditedMotion,
-    limit: str,
-    about: str,
-    values: np.ndarray,
-    low: float,
-    high: float,
-    tolerance: float = LIMIT_TOLERANCE,
-) -> list[Excess]:
-    """Check that values (n,) [m] never leave a range."""
-    beyond = np.maximum(low - values, values - high)
-    row = int(beyond.argmax())
-    if beyond[row] <= tolerance:
-        return []
-    value = float(values[row])
-    side, bound = ("at least", low) if value < low else ("at most", high)
-    return [Excess(limit, about, float(audited.times[row]), value, float(bound), "m", side)]
 
 
 def _lengths(audited: AuditedMotion) -> list[Excess]:
@@ -135,21 +121,6 @@ def _lengths(audited: AuditedMotion) -> list[Excess]:
         row, why = int(off[:, i].argmax()), "with the drive fixed-length it stays"
         facts = (float(audited.times[row]), float(lengths[row, i]), float(kept[i]), "m", "exactly", why)
         exceeded.append(Excess("cable_length", f"cable {i + 1}", *facts))
-    return exceeded
-
-
-def _tube(audited: AuditedMotion) -> list[Excess]:
-    """Check that the platform stays in its tube."""
-    tube, exceeded = audited.scenario.task.tube, []
-    away, turned = np.linalg.norm(audited.off_path[:, :3], axis=1), np.abs(audited.off_path[:, 3:]).max(axis=1)
-    for limit, values, bound, unit in (
-        ("tube.position", away, tube.radius, "m"),
-        ("tube.attitude", turned, tube.turn, "rad"),
-    ):
-        row = int(values.argmax())
-        if not values[row] <= bound + PATH_TOLERANCE:
-            facts = (float(audited.times[row]), float(values[row]), bound, unit)
-            exceeded.append(Excess(limit, "platform", *facts))
     return exceeded
 
 
@@ -273,49 +244,4 @@ def _jumps(audited: AuditedMotion) -> list[Excess]:
             if not jump[row] <= tolerance:
                 facts = (float(inner[row]), float(jump[row]), 0.0, unit, "exactly", "a jump of place or speed")
                 exceeded.append(Excess("motion", name, *facts))
-    return exceeded
-
-
-def _tension_rate(audited: AuditedMotion) -> list[Excess]:
-    """Check how fast the tensions change."""
-    most = audited.scenario.task.limits.tension_rate
-    rates = np.abs(np.diff(audited.tensions, axis=0)) / np.diff(audited.times)[:, None]
-    if most is None or not np.nanmax(rates, initial=0.0) > most * (1 + RATE_TOLERANCE):
-        return []
-    row, cable = np.unravel_index(np.nanargmax(rates), rates.shape)
-    return [
-        Excess("tension_rate", f"cable {cable + 1}", float(audited.times[row]), float(rates[row, cable]), most, "N/s")
-    ]
-
-
-def _named_limits(audited: AuditedMotion) -> list[Excess]:
-    """Check the limits of `named_limits` on the dense grid."""
-    named = named_limits(audited.scenario)
-    if not named.all:
-        return []
-    carriers, exceeded = audited.carriers, []
-    bodies = [
-        np.hstack(part) for part in (audited.motion, *zip(*(np.moveaxis(p, 1, 0) for p in carriers), strict=True))
-    ]
-    values = named.function.map(len(audited.times))(*(body.T for body in bodies), audited.tensions.T).full().T
-    there = np.isfinite(audited.tensions).all(axis=1, keepdims=True)
-    at = 0
-    for limit in named.all:
-        mine = values[:, at : at + len(limit.labels)]
-        at += len(limit.labels)
-        beyond = np.maximum(limit.low - mine, mine - limit.high)
-        # Without tensions what depends on them is not checked; any other nan exceeds its limit.
-        beyond = np.where(np.isnan(beyond), np.where(there, np.inf, -np.inf), beyond)
-        tolerance = UNDERACTUATED_TOLERANCE if limit.equation else LIMIT_TOLERANCE
-        if beyond.max() <= tolerance * limit.scale:
-            continue
-        row, which = np.unravel_index(beyond.argmax(), beyond.shape)
-        value, time = float(mine[row, which]), float(audited.times[row])
-        side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
-        if limit.equation:
-            side = "exactly"
-        elif limit.cosine:
-            value, bound = (float(np.arccos(np.clip(number, -1, 1))) for number in (value, bound))
-            side = "at most"
-        exceeded.append(Excess(limit.name, limit.labels[which], time, value, bound, limit.unit, side))
     return exceeded

@@ -15,7 +15,6 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ..tasks.named_limits import NamedLimits, named_limits
 from ..tasks.path import Motion
 from ..tasks.scenario import POSITION, Scenario
 
@@ -62,11 +61,10 @@ def clear_formation(scenario: Scenario) -> Formation | None:
 
     Return None if the usual one violates none, or if nothing of the formation is free.
     """
-    limits = named_limits(scenario)
     span = _span(scenario)
-    if scenario.relative or not any(limit.name in DISTANCES for limit in limits.all) or not span.any():
+    if scenario.relative or not any(limit.name in DISTANCES for limit in scenario.limits) or not span.any():
         return None
-    beyond = _Distances(scenario, limits)
+    beyond = _Distances(scenario)
     shares = np.linspace(0.0, 1.0, PLACES // 2 + 1)
     references = _References.at(scenario, shares * scenario.duration)
     shape = np.zeros((len(shares), 4))
@@ -167,15 +165,15 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
 class _Distances:
     """The violation of the task's distances by poses, in metres."""
 
-    def __init__(self, scenario: Scenario, limits: NamedLimits):
+    def __init__(self, scenario: Scenario):
         bodies = 1 + len(scenario.robot.carriers)
         pose = ca.SX.sym("pose", 6, bodies)
         at_rest = [ca.vertcat(pose[:, i], ca.SX.zeros(12)) for i in range(bodies)]
-        values = limits.function(*at_rest, ca.SX.zeros(scenario.robot.m))
-        beyond, at = [ca.SX(0.0)], 0
-        for limit in limits.all:
-            mine = values[at : at + len(limit.labels)]
-            at += len(limit.labels)
+        limits = scenario.limits
+        values = limits.function(*at_rest, ca.SX.zeros(scenario.robot.m), ca.SX.zeros(6))
+        beyond = [ca.SX(0.0)]
+        for limit, place in zip(limits, limits.places, strict=True):
+            mine = values[place]
             if limit.name in DISTANCES:
                 beyond += [limit.low + CLEARANCE - mine] * bool(np.isfinite(limit.low))
                 beyond += [mine - limit.high + CLEARANCE] * bool(np.isfinite(limit.high))

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..tasks.scenario import POSITION, Deviation, Scenario
+from ..tasks.deviation import Deviation
+from ..tasks.scenario import POSITION, Scenario
 from .formation import clear_formation
 
 __all__ = ["initial_guess"]

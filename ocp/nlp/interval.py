@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from ..limits import Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values
-from ..tasks.scenario import ATTITUDE, POSITION, CarrierLimits, Scenario
+from ..tasks.scenario import Scenario
 from .layout import Layout
-from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, reference_symbols, spread, stretch
+from .rows import (
+    OTHER_COSTS,
+    Mesh,
+    Row,
+    bounded,
+    differentiated,
+    in_world,
+    motions,
+    reference_symbols,
+    spread,
+    stretch,
+)
 
 JUMP = 0.05  # of an interval: how long a jump of the acceleration counts
 
@@ -84,16 +97,23 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
 
     _inner_rows(scenario, layout, h, columns, own, values, rows)
     cost = _jerk_cost(scenario, h, own, x_end[layout.a])
-    cost += _rate_rows(scenario, mesh, layout, h, columns, values, rows)
+    cost += _rate_cost(scenario, layout, h, columns)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
-    _tube_rows(scenario, _within(layout, h, columns, own.position), values, rows)
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
-    for index, limit in scenario.free_limits(mesh.shrink).items():
-        motion = [point[1 + index] for point in moving]
-        jerk = [spread(scenario, index) @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
-        offset = [spread(scenario, index) @ column[layout.a] for column in columns]
-        total = _total(scenario, h, motion, offset, jerk)
-        _carrier_rows(scenario, index, limit, total, values, rows)
+    _rate_rows(scenario, mesh, layout, h, columns, moving, values, rows)
+
+    @cache
+    def points_of(carrier: int | None) -> Points:
+        """Return the points of a carrier's whole motion, or of the platform's offset from its path."""
+        of_body = spread(scenario, carrier)
+        if carrier is None:
+            own_points = Points(_within(layout, h, columns, own.position), own.speed, own.acceleration)
+            return Points(*([of_body @ point for point in part] for part in own_points))
+        motion = [point[1 + carrier] for point in moving]
+        jerk = [of_body @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
+        return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
+
+    _hull_rows(scenario, mesh, points_of, values, rows)
     inputs = [x, x_end, parameters, parameters_end]
     function = ca.Function("interval", inputs, [cost, ca.vertcat(*values)], differentiated(4, 2))
     return Interval(function, flow, rows, gaps)
@@ -178,37 +198,51 @@ def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points, a_end: ca.SX) 
     return cost
 
 
+def _rate_cost(scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX]) -> ca.SX | float:
+    """Return what the rates of the tensions from point to point cost."""
+    costing = scenario.task.objective.tension_rate
+    if costing is None:
+        return 0.0
+    cost: ca.SX | float = 0.0
+    for share, first, second in _pieces(scenario, columns):
+        rise = second[layout.tensions] - first[layout.tensions]
+        cost += share * ca.sumsqr(scenario.robot.force_scale * rise / (h * share) / costing)
+    return cost
+
+
+def _pieces(scenario: Scenario, at_points: list[ca.SX]) -> list[tuple[float, ca.SX, ca.SX]]:
+    """Return each piece between two points of an interval: its share, and what is at its ends."""
+    shares = np.diff([0.0, *scenario.scheme.inner, 1.0]).tolist()
+    return list(zip(shares, at_points[:-1], at_points[1:], strict=True))
+
+
 def _rate_rows(
     scenario: Scenario,
     mesh: Mesh,
     layout: Layout,
     h: ca.SX | float,
     columns: list[ca.SX],
+    moving: list[list[list[ca.SX]]],
     values: list[ca.SX],
     rows: list[Row],
-) -> ca.SX | float:
-    """Add rows that limit tension rates from point to point; return what the rates cost."""
-    objective, most, robot = scenario.task.objective, scenario.task.limits.tension_rate, scenario.robot
-    if objective.tension_rate is None and most is None:
-        return 0.0
-    cost: ca.SX | float = 0.0
-    places = [0.0, *scenario.scheme.inner, 1.0]
-    for i, share in enumerate(np.diff(places)):
-        rise = columns[i + 1][layout.tensions] - columns[i][layout.tensions]
-        rate = robot.force_scale * rise / (h * float(share))
-        if objective.tension_rate is not None:
-            cost += float(share) * ca.sumsqr(rate / objective.tension_rate)
-        if most is None:
-            continue
-        share_of_most = rate / (most * (1.0 - mesh.shrink))
-        if (place := layout.slack_of("tension_rate")) is None:
-            values.append(share_of_most)
-            rows += [("tension_rate", -1.0, 1.0)] * robot.m
-        else:
-            for sign in (1.0, -1.0):
-                values.append(sign * share_of_most - columns[0][place])
-                rows += [("tension_rate", -np.inf, 1.0)] * robot.m
-    return cost
+) -> None:
+    """Add the limits of how fast something changes, from point to point."""
+    limits = scenario.limits
+    if not any(isinstance(limit, Rate) for limit in limits):
+        return
+    at_points = []
+    for column, bodies in zip(columns, moving, strict=True):
+        platform, *carriers = bodies
+        whole = [ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)]
+        tensions = scenario.robot.force_scale * column[layout.tensions]
+        at_points.append(limits.function(*whole, tensions, spread(scenario, None) @ column[layout.q]))
+    for limit, place in zip(limits, limits.places, strict=True):
+        if isinstance(limit, Rate):
+            for share, first, second in _pieces(scenario, at_points):
+                rate = (second[place] - first[place]) / (h * share)
+                more, named = bounded(limit, rate, mesh, layout.slack(columns[0], limit))
+                values += more
+                rows += named
 
 
 def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: list[ca.SX]) -> list[ca.SX]:
@@ -216,18 +250,29 @@ def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: li
     return bernstein.joined(h, position, first[layout.v], last[layout.q], last[layout.v])
 
 
-def _tube_rows(scenario: Scenario, position: list[ca.SX], values: list[ca.SX], rows: list[Row]) -> None:
-    tube = scenario.task.tube
-    moving = [i for i, coordinate in enumerate(scenario.platform_free) if coordinate in POSITION]
-    turning = [i for i, coordinate in enumerate(scenario.platform_free) if coordinate in ATTITUDE]
-    if moving and np.isfinite(tube.radius):
-        for q in position:
-            values.append(ca.sumsqr(q[moving]) / tube.radius**2)
-            rows.append(("tube", -np.inf, 1.0))
-    if turning:
-        for q in position[1:-1]:
-            values.append(q[turning] / tube.turn)
-            rows += [("tube attitude", -1.0, 1.0)] * len(turning)
+def _hull_rows(
+    scenario: Scenario,
+    mesh: Mesh,
+    points_of: Callable[[int | None], Points],
+    values: list[ca.SX],
+    rows: list[Row],
+) -> None:
+    """Add the hard convex limits at the Bernstein points: so they hold between the nodes too."""
+    for limit in scenario.limits:
+        hull = limit.hull
+        if hull is None or not limit.is_convex or not scenario.moves(hull):
+            continue
+        motion = points_of(hull.carrier)
+        points = motion[hull.order]
+        if hull.order == len(motion) - 1:  # the others are accelerations at points, which `node` limits
+            points = [points[i] for i in scenario.scheme.inner_points]
+        elif not hull.at_ends:
+            points = points[1:-1]
+        evaluate = scenario.limits.hull(limit)
+        for point in points:
+            more, named = bounded(limit, evaluate(point), mesh, None)
+            values += more
+            rows += named
 
 
 def _total(
@@ -243,31 +288,3 @@ def _total(
     speed = bernstein.integral(h, velocity[0], acceleration)
     position = bernstein.joined(h, bernstein.integral(h, pose[0], speed), velocity[0], pose[-1], velocity[-1])
     return Points(position, [*speed[:-1], velocity[-1]], acceleration)
-
-
-def _carrier_rows(
-    scenario: Scenario, index: int, limit: CarrierLimits, total: Points, values: list[ca.SX], rows: list[Row]
-) -> None:
-    name = scenario.robot.carriers[index].name
-    if np.isfinite(limit.low).all():
-        chosen = [axis for axis in POSITION if (index, axis) in scenario.carrier_free]  # the others are constant
-        for point in total.position:
-            values.append(point[chosen])
-            rows += [(f"{name} reach", limit.low[axis], limit.high[axis]) for axis in chosen]
-    if limit.speed is not None:
-        for speed in total.speed:
-            values.append(ca.sumsqr(speed[0:3]) / limit.speed**2)
-            rows.append((f"{name} speed", -np.inf, 1.0))
-    if limit.tilt:
-        for point in total.position:
-            # Below 90 degrees {cos r cos p >= c} is convex, so the Bernstein points bound the whole interval.
-            values.append(ca.cos(point[3]) * ca.cos(point[4]))
-            rows.append((f"{name} tilt", float(np.cos(limit.tilt)), np.inf))
-    for i in scenario.scheme.inner_points:  # the others are accelerations at points, which `node` limits
-        acceleration = total.acceleration[i]
-        if limit.acceleration is not None:
-            values.append(ca.sumsqr(acceleration[0:3]) / limit.acceleration**2)
-            rows.append((f"{name} acceleration", -np.inf, 1.0))
-        if limit.tilt and limit.turn_acceleration is not None:
-            values.append(acceleration[3:5] / limit.turn_acceleration)
-            rows += [(f"{name} turn acceleration", -1.0, 1.0)] * 2

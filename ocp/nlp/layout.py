@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
+
+from ..limits import Limit
 from ..tasks.scenario import Scenario
 
 __all__ = ["Layout"]
@@ -36,7 +39,7 @@ class Layout:
         """Return the layout that a scenario needs."""
         carried = [DURATION] * (scenario.duration_range is not None)
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
-        soft = tuple(scenario.task.limits.soft)
+        soft = tuple(dict.fromkeys(limit.name for limit in scenario.limits if limit.soft is not None))
         n, m, derivatives = scenario.count, scenario.robot.m, scenario.scheme.derivatives
         return Layout(n, m, derivatives, scenario.decisive_winds, elastic, soft, tuple(carried))
 
@@ -93,9 +96,13 @@ class Layout:
         start = self.missing.stop
         return slice(start, start + len(self.soft))
 
-    def slack_of(self, limit: str) -> int | None:
-        """Return the place of a soft limit's slack; None if the limit is hard."""
-        return self.slacks.start + self.soft.index(limit) if limit in self.soft else None
+    def slack_of(self, limit: str) -> int:
+        """Return the place of a soft limit's slack."""
+        return self.slacks.start + self.soft.index(limit)
+
+    def slack(self, x: ca.SX, limit: Limit) -> ca.SX | None:
+        """Return the slack of a limit in column x; None if the limit is hard."""
+        return None if limit.soft is None else x[self.slack_of(limit.name)]
 
     @property
     def shared(self) -> slice:

@@ -7,14 +7,15 @@ import numpy as np
 
 from ...models.rotation import rotation
 from ...models.wind import aerodynamic_wrench
-from ..tasks.named_limits import named_limits
+from ..limits import Rate
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
-from .rows import OTHER_COSTS, Mesh, Row, differentiated, motions, reference_symbols
+from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread
 
 __all__ = ["node_function"]
 
+ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
@@ -42,9 +43,9 @@ def node_function(
     scale = robot.force_scale / robot.wrench_scale
     moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
     balance = ((A @ tensions - w) / ca.DM(scale))[moving]
-    in_world = _in_world(scenario, platform, carriers)
+    bodies = [in_world(scenario, platform, carriers), *carriers]
     balances = [balance]
-    for others, push in _in_decisive_winds(scenario, layout, x, in_world, carriers):
+    for others, push in _in_decisive_winds(scenario, layout, x, bodies[0], carriers):
         balances.append(((A @ others - w + push) / ca.DM(scale))[moving])
     cost = _node_cost(scenario, layout, x)
     if mesh.elastic:
@@ -59,28 +60,15 @@ def node_function(
         lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
         values.append((lengths / robot.fixed_lengths) ** 2)  # squared: no square root in the derivatives
         rows += [(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
-    for index, limit in scenario.free_limits(mesh.shrink).items():
-        name, acceleration = robot.carriers[index].name, carriers[index][2]
-        if limit.acceleration is not None:
-            values.append(ca.sumsqr(acceleration[0:3]) / limit.acceleration**2)
-            rows.append((f"{name} acceleration", -np.inf, 1.0))
-        if (index, 3) in scenario.carrier_free and limit.turn_acceleration is not None:
-            values.append(acceleration[3:5] / limit.turn_acceleration)
-            rows += [(f"{name} turn acceleration", -1.0, 1.0)] * 2
     if (place := layout.at(MARGIN)) is not None:
         low, high = (np.tile(bound / robot.force_scale, 1 + layout.winds) for bound in scenario.bounds())
         all_tensions = ca.vertcat(x[layout.tensions], x[layout.wind_tensions])
         values += [all_tensions - x[place] - low, high - x[place] - all_tensions]
         rows += [("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
-    cost += _limit_rows(scenario, mesh, layout, x, [in_world, *carriers], tensions, values, rows)
+    cost += _slack_cost(scenario, mesh, layout, x)
+    off_path = spread(scenario, None) @ x[layout.q]
+    _limit_rows(scenario, mesh, layout, x, [*(ca.vertcat(*body) for body in bodies), tensions, off_path], values, rows)
     return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)], differentiated(2, 1)), rows
-
-
-def _in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.SX]]) -> list[ca.SX]:
-    """Return the platform's pose, velocity and acceleration in {G}."""
-    if not scenario.relative:
-        return platform
-    return list(scenario.dynamics.relative.motion_in_world(*platform, *carriers[0]))
 
 
 def _in_decisive_winds(
@@ -103,45 +91,28 @@ def _in_decisive_winds(
     return pairs
 
 
+def _slack_cost(scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX) -> ca.SX | float:
+    """Return what exceeding the soft limits costs; those of one name share a slack."""
+    weight = OTHER_COSTS if mesh.elastic else 1.0
+    first = {limit.name: limit for limit in reversed(scenario.limits.all) if limit.soft}
+    return sum((weight * (x[layout.slack_of(name)] * first[name].slack_weight) ** 2 for name in layout.soft), 0.0)
+
+
 def _limit_rows(
-    scenario: Scenario,
-    mesh: Mesh,
-    layout: Layout,
-    x: ca.SX,
-    motions: list[list[ca.SX]],
-    tensions: ca.SX,
-    values: list[ca.SX],
-    rows: list[Row],
-) -> ca.SX | float:
-    """Add the limits of `limits`, in units of their scale; return what exceeding the soft ones costs."""
-    limits = named_limits(scenario)
-    cost, at, weight = 0.0, 0, OTHER_COSTS if mesh.elastic else 1.0
-    if (place := layout.slack_of("tension_rate")) is not None:  # its rows are of two nodes (`interval`)
-        most = scenario.task.limits.tension_rate or 0.0
-        cost += weight * (x[place] * most / scenario.task.limits.soft["tension_rate"]) ** 2
+    scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX], values: list[ca.SX], rows: list[Row]
+) -> None:
+    """Add the limits that hold at a node; `interval` has those between two points."""
+    limits = scenario.limits
     if not limits.all:
-        return cost
-    evaluated = limits.function(*(ca.vertcat(*motion) for motion in motions), tensions)
-    paid: set[str] = set()  # limits of one name share a slack
-    for limit in limits.all:
-        size = limit.values.numel()
-        value = evaluated[at : at + size] / limit.scale
-        at += size
-        reserve = 0.0 if limit.equation else mesh.shrink * limit.scale
-        low, high = (limit.low + reserve) / limit.scale, (limit.high - reserve) / limit.scale
-        if limit.soft is None:
-            values.append(value)
-            rows += [(f"{limit.name} of {label}", low, high) for label in limit.labels]
+        return
+    evaluated = limits.function(*state)
+    for limit, place in zip(limits, limits.places, strict=True):
+        hull = limit.hull if limit.is_convex else None
+        if isinstance(limit, Rate) or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
-        slack = x[layout.slacks][layout.soft.index(limit.name)]
-        if limit.name not in paid:
-            cost += weight * (slack * limit.scale / limit.soft) ** 2
-            paid.add(limit.name)
-        for sign, bound in ((1.0, low), (-1.0, -high)):
-            if np.isfinite(bound):
-                values.append(sign * value + slack)
-                rows += [(f"{limit.name} of {label}", bound, np.inf) for label in limit.labels]
-    return cost
+        more, named = bounded(limit, evaluated[place], mesh, layout.slack(x, limit))
+        values += more
+        rows += named
 
 
 def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:

@@ -24,8 +24,9 @@ import casadi as ca
 import numpy as np
 
 from ..tasks import bernstein
+from ..tasks.deviation import Deviation
 from ..tasks.path import WaypointPath
-from ..tasks.scenario import ATTITUDE, Deviation, Scenario
+from ..tasks.scenario import ATTITUDE, Scenario
 from .interval import Points, interval_of, points
 from .layout import DURATION, MARGIN, Layout
 from .node import node_function

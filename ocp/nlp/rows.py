@@ -8,11 +8,23 @@ from typing import Any, TypeAlias
 import casadi as ca
 import numpy as np
 
+from ..limits import Limit
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import DURATION, Layout
 
-__all__ = ["OTHER_COSTS", "Mesh", "Row", "differentiated", "motions", "reference_symbols", "spread", "stretch"]
+__all__ = [
+    "OTHER_COSTS",
+    "Mesh",
+    "Row",
+    "bounded",
+    "differentiated",
+    "in_world",
+    "motions",
+    "reference_symbols",
+    "spread",
+    "stretch",
+]
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
@@ -29,8 +41,7 @@ class Mesh:
     reserve
         Further distance from the tension limits [N], for what happens between the nodes.
     shrink
-        Share by which the carriers' speed and acceleration limits, and those of the task, are reduced, for the same
-        reason.
+        Share by which the limits of the task and of the carriers are reduced, for the same reason (`Limit.rows`).
     elastic
         Whether A t = w + s with a high cost on the slack s, so that there is always a solution.
     """
@@ -39,6 +50,16 @@ class Mesh:
     reserve: float = 0.0
     shrink: float = 0.0
     elastic: bool = False
+
+
+def bounded(limit: Limit, values: ca.SX, mesh: Mesh, slack: ca.SX | None) -> tuple[list[ca.SX], list[Row]]:
+    """Return values and rows of a limit; if it is soft with its slack, in units of its scale."""
+    value, low, high = limit.rows(values, mesh.shrink)
+    if slack is None:
+        return [value], [(limit.name, low, high)] * value.numel()
+    sides = [(sign, bound) for sign, bound in ((1.0, low), (-1.0, -high)) if np.isfinite(bound)]
+    rows: list[Row] = [(limit.name, bound, np.inf) for _, bound in sides for _ in range(value.numel())]
+    return [sign * value + slack for sign, _ in sides], rows
 
 
 def stretch(layout: Layout, x: Values) -> Values:
@@ -92,3 +113,10 @@ def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> 
             [at / scale**k + chosen @ off for k, (at, off) in enumerate(zip(reference, deviation, strict=True))]
         )
     return each
+
+
+def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.SX]]) -> list[ca.SX]:
+    """Return the platform's pose, velocity and acceleration in {G}."""
+    if not scenario.relative:
+        return platform
+    return list(scenario.dynamics.relative.motion_in_world(*platform, *carriers[0]))

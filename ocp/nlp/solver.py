@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ...errors import SolverError
-from ..tasks.scenario import Deviation
+from ..tasks.deviation import Deviation
 from .guess import initial_guess
 from .program import Program
 from .waiting import Errands, wait_for

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ..limits import Rate
 from ..tasks.scenario import Scenario
 from .layout import Layout
 from .rows import Row
@@ -131,7 +132,8 @@ def stage_by_stage(scenario: Scenario, layout: Layout, steps: int, flow: ca.Func
 def _parts(scenario: Scenario, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     """Return which entries of a node's column are its state, and which of those the stage before chooses."""
     at = np.arange(layout.width)
-    rated = scenario.task.objective.tension_rate is not None or scenario.task.limits.tension_rate is not None
+    limited = any(isinstance(limit, Rate) for limit in scenario.limits)
+    rated = limited or scenario.task.objective.tension_rate is not None
     tensions = at[layout.tensions] if rated else at[:0]
     top = layout.snap if scenario.scheme.smooth else layout.a
     return np.concatenate([at[layout.motion], at[layout.shared], tensions]), np.concatenate([at[top], tensions])

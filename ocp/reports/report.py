@@ -10,7 +10,6 @@ from ...models.part import Vector3
 from ...solvers import Certificate
 from ...text import quantity, quantity_row
 from ..result import Plan
-from ..tasks.named_limits import named_limits
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
@@ -236,19 +235,19 @@ def _carriers(plan: Plan) -> list[Fact]:
     for index, carrier in enumerate(plan.scenario.robot.carriers):
         if not carrier.moves:
             continue
-        limit = plan.scenario.limits.get(index)
-        speed, acceleration = (
-            np.linalg.norm(part[:, index, :3], axis=1) for part in (motion.velocity, motion.acceleration)
-        )
+        limits = {limit.name: limit.high for limit in plan.scenario.limits if limit.labels == (carrier.name,)}
         if not (motion.velocity[:, index].any() or motion.acceleration[:, index].any()):
             facts.append((carrier.name, "at rest"))
             continue
-        facts.append((carrier.name, _against(speed, limit and limit.speed, "m/s", times)))
-        facts.append(("", _against(acceleration, limit and limit.acceleration, "m/s^2", times)))
-        if limit is not None and limit.tilt is not None:
-            upright = np.cos(motion.pose[:, index, 3]) * np.cos(motion.pose[:, index, 4])
-            tilt = np.degrees(np.arccos(np.clip(upright, -1, 1)))
-            facts.append(("", _against(tilt, float(np.degrees(limit.tilt)), "degrees of tilt", times)))
+        speed, acceleration = (
+            np.linalg.norm(part[:, index, :3], axis=1) for part in (motion.velocity, motion.acceleration)
+        )
+        facts.append((carrier.name, _against(speed, limits.get("carrier_speed"), "m/s", times)))
+        facts.append(("", _against(acceleration, limits.get("carrier_acceleration"), "m/s^2", times)))
+        for limit, values in zip(plan.scenario.limits, plan.audit.limited, strict=True):
+            if limit.name == "carrier_tilt" and limit.labels == (carrier.name,):
+                tilt, most = np.degrees(values[:, 0]), float(np.degrees(limit.high))
+                facts.append(("", _against(tilt, most, "degrees of tilt", times)))
     return facts
 
 
@@ -267,7 +266,7 @@ def _audit(plan: Plan) -> list[Fact]:
         ("instants", f"{quantity(len(audit.times))}, one every {quantity(1e3 / audit.rate, 'ms')}"),
         ("worst violation", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
     ]
-    if names := list(dict.fromkeys(limit.name for limit in named_limits(plan.scenario).all)):
+    if names := list(dict.fromkeys(limit.name for limit in plan.scenario.limits if limit.shown)):
         facts.append(("also checked", ", ".join(names)))
     if (drift := audit.drift) is not None:
         window = _error(drift.window_position, drift.window_attitude)

@@ -25,7 +25,7 @@ def page(plan: Plan, trajectory: xr.Dataset) -> str:
     pictures = [html.picture(drawing) for drawing in drawings(plan, trajectory).values()]
     files = [
         html.file("The robot's file", to_yaml(robot)),
-        html.file("The task with all keys (frame: world is {G})", to_yaml(task)),
+        html.file("The task with all keys (frame: world is {G})", to_yaml(task.in_file())),
     ]
     parts = [*_tables(plan), *pictures, *files]
     return html.page(f"{robot.name}: {task.name}", status, decisive, COLOURS[status], parts)

@@ -45,7 +45,7 @@ def trajectory(plan: Plan) -> Contents:
         "title": f"towline plan of {robot.name}: {task.name}",
         "status": plan.status.value,
         "robot": to_yaml(robot),
-        "task": to_yaml(task),
+        "task": to_yaml(task.in_file()),
         "report": json.dumps(plan.to_dict()),
     }
     coordinates = {

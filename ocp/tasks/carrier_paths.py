@@ -1,4 +1,4 @@
-"""`by_index`: the paths that a task gives to carriers, checked, by the index of the carrier."""
+"""`carrier_paths`: the paths that a task gives to carriers, checked, by the index of the carrier."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import Protocol, TypeVar
 
 from ...errors import InputError
 from ...models import Robot
+from .path import AnyPath, RestPath
+from .task import GivenBase, HoldBase, Task
 
-__all__ = ["by_index"]
+__all__ = ["by_index", "carrier_paths"]
 
 
 class _Framed(Protocol):
@@ -39,3 +41,22 @@ def by_index(robot: Robot, paths: Mapping[str, Framed], field: str) -> dict[int,
             raise InputError(f"{field}.{name}.frame must be world, got {path.frame!r}")
         paths_by_index[names.index(name)] = path
     return paths_by_index
+
+
+def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
+    """Return the carriers' reference paths by the index of the carrier; the others stay at home.
+
+    Raises
+    ------
+    InputError
+        As `by_index` does.
+    """
+    base = task.base
+    if isinstance(base, HoldBase):
+        paths: dict[str, AnyPath] = {name: RestPath(kind="rest", pose=pose) for name, pose in base.poses.items()}
+        field = "poses"
+    elif isinstance(base, GivenBase):
+        paths, field = base.paths, "paths"
+    else:
+        paths, field = base.around, "around"
+    return by_index(robot, paths, f"task {task.name!r}: base.{field}")

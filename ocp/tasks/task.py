@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
+from typing_extensions import override
 
 from ...errors import InputError
 from ...inputs import file_path
@@ -160,6 +161,26 @@ class Task(Part):
     output_rate: Positive = Field(
         default=100.0, description="samples per second of the saved trajectory, all of them audited [1/s]"
     )
+
+    @override
+    def model_dump(self, **options: Any) -> dict[str, Any]:
+        """Return the fields.
+
+        Raises
+        ------
+        InputError
+            In mode "json", as for a file, if the task has limits of its own, which only Python can hold.
+        """
+        if self.limits.own and options.get("mode") == "json":
+            names = ", ".join(repr(limit.name) for limit in self.limits.own)
+            raise InputError(
+                f"task {self.name!r}: limits.own must be empty to be saved, since a file holds no Python, got {names}"
+            )
+        return super().model_dump(**options)
+
+    def in_file(self) -> Task:
+        """Return the task without the limits that only Python can hold."""
+        return self.model_copy(update={"limits": self.limits.without_own()}) if self.limits.own else self
 
     @property
     def seconds(self) -> float:

@@ -6,11 +6,13 @@ import difflib
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
 from ...models.part import Box, NonNegative, Part, Positive
 from ...models.ranges import Range
+from ..limits.limit import Limit
 
 Distance = Annotated[NonNegative | None, Field(description="least distance [m]; null: no limit")]
 
@@ -74,7 +76,11 @@ class TaskLimits(Part):
         By name of a limit, the excess that adds one to the objective, in the limit's unit; twice the excess adds four.
         The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
         carrier_turn_acceleration, carrier_reach, thrust, torque.
+    own :
+        Limits of your own (docs/adding-a-limit.md). Only in Python: a file cannot have them.
     """
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
 
     cable_speed: Positive | None = Field(default=None, description="rate of every cable's length, as of a winch [m/s]")
     cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
@@ -107,13 +113,15 @@ class TaskLimits(Part):
         default={},
         description="by the name of a limit, the excess that adds one to the objective; twice the excess adds four",
     )
+    own: SkipJsonSchema[tuple[Limit, ...]] = Field(default=(), exclude=True)
 
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
-        apart = ("soft", "keep_out", *OF_CARRIERS)
+        apart = ("soft", "keep_out", "own", *OF_CARRIERS)
         given = [name for name in type(self).model_fields if name not in apart and getattr(self, name)]
         frames = {place.frame for place in self.keep_out}
         given += ["keep_out"] * ("world" in frames) + list(OF_BODY) * ("platform" in frames)
+        given += [limit.name for limit in self.own]
         for name in self.soft:
             if name not in (*given, "margin", *OF_CARRIERS):
                 names = (*given, "margin", *OF_CARRIERS)
@@ -121,3 +129,9 @@ class TaskLimits(Part):
                 meant = f", did you mean {close[0]!r}?" if close else ""
                 raise ValueError(f"soft must name limits of this task ({', '.join(names)}), got {name!r}{meant}")
         return self
+
+    def without_own(self) -> TaskLimits:
+        """Return what a file can have: the limits without those of `own`."""
+        names = {limit.name for limit in self.own}
+        kept = {name: amount for name, amount in self.soft.items() if name not in names}
+        return self.model_copy(update={"own": (), "soft": kept})

@@ -12,11 +12,12 @@ from typing import Any, TypeAlias
 import casadi as ca
 import numpy as np
 
-from .task_limits import Block, Capsule, KeepOut, Sphere
+from ...models.shapes import Block, Capsule, Sphere
 
 __all__ = ["between_cables", "between_points", "cable_outside", "point_outside"]
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
+Place: TypeAlias = Sphere | Capsule | Block
 
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
 _BISECTIONS = 20
@@ -43,7 +44,7 @@ def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
     return between_points(p + s * along, q + _within(t) * across)
 
 
-def point_outside(place: KeepOut, p: Point) -> Any:
+def point_outside(place: Place, p: Point) -> Any:
     """Return the distance of p from an obstacle [m], negative inside."""
     if isinstance(place, Sphere):
         return between_points(p, ca.DM(place.centre)) - place.radius
@@ -55,7 +56,7 @@ def point_outside(place: KeepOut, p: Point) -> Any:
     raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 
-def cable_outside(place: KeepOut, p: Point, p_end: Point) -> Any:
+def cable_outside(place: Place, p: Point, p_end: Point) -> Any:
     """Return the distance of the segment from p to p_end from an obstacle [m], negative inside."""
     if isinstance(place, Sphere):
         return _from_segment(ca.DM(place.centre), p, p_end) - place.radius

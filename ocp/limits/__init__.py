@@ -1,0 +1,6 @@
+"""Limits of a motion, one class each: what stays between which bounds. `Limit` is the base of them all."""
+
+from .limit import Angle, Hull, Limit, Magnitude, Rate
+from .state import Body, State
+
+__all__ = ["Angle", "Body", "Hull", "Limit", "Magnitude", "Rate", "State"]

@@ -1,0 +1,74 @@
+"""Limits of the cables: how fast they run, how long they are, and how near they come to one another."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import casadi as ca
+import numpy as np
+from typing_extensions import override
+
+from ...models import Robot
+from .clearance import between_cables
+from .limit import Limit
+from .state import State
+
+__all__ = ["CableClearance", "CableLength", "CableSpeed", "names"]
+
+SMALLEST = 1e-3  # [m], of the scale of a length
+
+
+def names(robot: Robot) -> tuple[str, ...]:
+    """Return what texts call the cables, (m,)."""
+    return tuple(f"cable {i + 1}" for i in range(robot.m))
+
+
+class CableSpeed(Limit):
+    """Limit the rate of each cable's length, as of a winch."""
+
+    name, unit = "cable_speed", "m/s"
+
+    def __init__(self, robot: Robot, most: float):
+        self.low, self.high, self.scale = -most, most, most
+        self.labels = names(robot)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.rate(state.run.lengths)
+
+
+class CableLength(Limit):
+    """Limit the length of each cable."""
+
+    name, unit = "cable_length", "m"
+
+    def __init__(self, robot: Robot, low: float, high: float):
+        self.low, self.high, self.scale = low, high, max(abs(low), abs(high), SMALLEST)
+        self.labels = names(robot)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.run.lengths
+
+
+class CableClearance(Limit):
+    """Keep cables apart that share neither anchor nor attachment."""
+
+    name, unit = "cable_clearance", "m"
+
+    def __init__(self, robot: Robot, least: float):
+        self.low, self.scale = least, least
+        self._pairs = [pair for pair in combinations(range(robot.m), 2) if not _share_an_end(robot, *pair)]
+        self.labels = tuple(f"cables {i + 1} and {j + 1}" for i, j in self._pairs)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        ends, anchors = state.attachments, state.anchors
+        pairs = self._pairs
+        return ca.vertcat(*(between_cables(ends[:, i], anchors[:, i], ends[:, j], anchors[:, j]) for i, j in pairs))
+
+
+def _share_an_end(robot: Robot, i: int, j: int) -> bool:
+    of_carrier = robot.carrier_of_cable
+    same_anchor = of_carrier[i] == of_carrier[j] and np.array_equal(robot.anchors[i], robot.anchors[j])
+    return same_anchor or np.array_equal(robot.attachments[i], robot.attachments[j])

@@ -1,0 +1,118 @@
+"""Limits of the carriers: how they move, where they stay, and how near they come to one another."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import casadi as ca
+from typing_extensions import override
+
+from ...models import Robot
+from .clearance import between_points
+from .limit import Angle, Hull, Limit, Magnitude
+from .state import State
+
+__all__ = [
+    "CarrierAcceleration",
+    "CarrierReach",
+    "CarrierSeparation",
+    "CarrierSpeed",
+    "CarrierTilt",
+    "CarrierTurnAcceleration",
+]
+
+
+class CarrierSpeed(Magnitude):
+    """Limit the speed of a carrier."""
+
+    name, unit = "carrier_speed", "m/s"
+
+    def __init__(self, robot: Robot, index: int, most: float):
+        self.labels = (robot.carriers[index].name,)
+        self.high = self.scale = most
+        self.hull = Hull(index, 1, (0, 1, 2))
+        self._index = index
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.carriers[self._index].velocity[:3]
+
+
+class CarrierAcceleration(Magnitude):
+    """Limit the acceleration of a carrier."""
+
+    name, unit = "carrier_acceleration", "m/s^2"
+
+    def __init__(self, robot: Robot, index: int, most: float):
+        self.labels = (robot.carriers[index].name,)
+        self.high = self.scale = most
+        self.hull = Hull(index, 2, (0, 1, 2))
+        self._index = index
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.carriers[self._index].acceleration[:3]
+
+
+class CarrierTilt(Angle):
+    """Limit the angle of a carrier's z axis to the vertical, below 90 degrees."""
+
+    name = "carrier_tilt"
+
+    def __init__(self, robot: Robot, index: int, most: float):
+        self.labels, self.high = (robot.carriers[index].name,), most
+        self.hull = Hull(index, 0, (3, 4))  # {cos r cos p >= c} is convex
+        self._index = index
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.carriers[self._index].upright
+
+
+class CarrierTurnAcceleration(Limit):
+    """Limit the second derivatives of a carrier's roll and pitch."""
+
+    name, unit = "carrier_turn_acceleration", "rad/s^2"
+
+    def __init__(self, robot: Robot, index: int, most: float):
+        carrier = robot.carriers[index].name
+        self.labels = (f"{carrier} roll", f"{carrier} pitch")
+        self.low, self.high, self.scale = -most, most, most
+        self.hull = Hull(index, 2, (3, 4))
+        self._index = index
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.carriers[self._index].acceleration[3:5]
+
+
+class CarrierReach(Limit):
+    """Keep one coordinate of a carrier in {G} inside its reach box. Figures draw the box in space instead."""
+
+    name, unit, shown = "carrier_reach", "m", False
+
+    def __init__(self, robot: Robot, index: int, axis: int, low: float, high: float):
+        self.labels = (f"{robot.carriers[index].name} {'xyz'[axis]}",)
+        self.low, self.high = low, high
+        self.hull = Hull(index, 0, (axis,))
+        self._index, self._axis = index, axis
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.carriers[self._index].pose[self._axis]
+
+
+class CarrierSeparation(Limit):
+    """Keep the origins of all carriers apart."""
+
+    name, unit = "carrier_separation", "m"
+
+    def __init__(self, robot: Robot, least: float):
+        self.low, self.scale = least, least
+        self._pairs = list(combinations(range(len(robot.carriers)), 2))
+        self.labels = tuple(f"{robot.carriers[i].name} and {robot.carriers[j].name}" for i, j in self._pairs)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        at = [carrier.position for carrier in state.carriers]
+        return ca.vertcat(*(between_points(at[i], at[j]) for i, j in self._pairs))

@@ -1,0 +1,229 @@
+"""`Limit`: values that stay between bounds along a whole motion, and the forms that program, audit and figure use.
+
+A limit is one formula, `values`, of everything that there is at one instant (`State`). The program keeps it at its
+nodes and, if the limit has a `Hull`, at the Bernstein points of each interval, so that it holds between the nodes too.
+The audit and the figures evaluate the same formula densely. Subclasses for vectors (`Magnitude`), angles (`Angle`) and
+rates of change (`Rate`) derive from the formula what a program can differentiate and what a person reads.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import NamedTuple, Self
+
+import casadi as ca
+import numpy as np
+from typing_extensions import override
+
+from .state import State
+
+__all__ = ["Angle", "Hull", "Limit", "Magnitude", "Rate", "Rows"]
+
+TOLERANCE = 1e-6  # of the scale: what the audit accepts beyond a bound
+EQUATION_TOLERANCE = 1e-3  # of the scale: equations hold at the nodes, and between them nearly
+ANGLE_TOLERANCE = 1e-6  # [rad]: programs bound the cosine, which resolves a small angle to no better than this
+RATE_TOLERANCE = 1e-3  # of the scale: the audited tensions are the planned ones but for the wrench's rest
+LEAST_COSINE = 1e-4  # less of a cosine is no scale: of angles below a hundredth of a radian
+ROUNDING = 1e-3  # of a bound: a norm is rounded by so much at zero, where it has a corner
+
+
+class Hull(NamedTuple):
+    """The only part of a motion that a convex limit is about.
+
+    The values have to be a linear expression of it (of a `Magnitude` the vector, of an `Angle` the cosine up to 90
+    degrees), so that the convex hull of the Bernstein points bounds them over a whole interval. While such a limit is
+    hard, the program imposes it only if the planner is free to choose one of the coordinates.
+
+    Attributes
+    ----------
+    carrier
+        Index of the carrier; None for the platform's offset from its path.
+    order
+        0: the pose, 1: the velocity, 2: the acceleration.
+    coordinates
+        Those that the values depend on: 0 to 5 for x, y, z, roll, pitch, yaw.
+    at_ends
+        Whether points at the ends of an interval have rows; False where bounds of the unknowns do the same.
+    """
+
+    carrier: int | None
+    order: int
+    coordinates: tuple[int, ...]
+    at_ends: bool = True
+
+
+class Rows(NamedTuple):
+    """Rows of a program: values (k, 1), and the bounds of each."""
+
+    values: ca.SX
+    low: float
+    high: float
+
+
+class Limit:
+    """A limit: `values` stay from `low` to `high` along the whole motion. Subclass it for a limit of your own.
+
+    Attributes
+    ----------
+    name
+        Its name in tasks, audits, reports and figures.
+    unit
+        The unit of values and bounds.
+    labels
+        What each value is about, (k,): "cable 3", "quad1".
+    low, high
+        The bounds of each value; infinite: no bound.
+    scale
+        A typical size in this unit: programs divide by it, and the audit's tolerance is a part of it.
+    soft
+        The excess that adds one to the objective, or None if the limit is hard. A task's `limits.soft` sets it by name.
+    hull
+        The part of the motion on which it depends, if it is convex: it then holds between the nodes too.
+    shown
+        Whether figures have curves of it and reports name it.
+    """
+
+    name: str = "limit"
+    unit: str = ""
+    labels: tuple[str, ...] = ("platform",)
+    low: float = -np.inf
+    high: float = np.inf
+    scale: float = 1.0
+    soft: float | None = None
+    hull: Hull | None = None
+    shown: bool = True
+
+    def values(self, state: State) -> ca.SX:
+        """Return the values at one instant, (k, 1), as an expression of its symbols."""
+        raise NotImplementedError(f"{type(self).__name__} must define values(state)")
+
+    def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
+        """Return the limit as rows of a program, in parts of `scale`.
+
+        Parameters
+        ----------
+        values
+            (k, 1).
+        shrink
+            Part of `scale` by which the bounds move inwards; none of an equation, and none of a convex limit of poses.
+        """
+        reserve = 0.0 if self.is_equation or (self.is_convex and self.order == 0) else shrink * self.scale
+        return Rows(values / self.scale, (self.low + reserve) / self.scale, (self.high - reserve) / self.scale)
+
+    def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return what is between the bounds at `times` (n,) [s], (n, k), from the values at these times."""
+        return values
+
+    def about(self, index: int) -> str:
+        """Return what value `index` is about, for the sentence of a violation."""
+        return self.labels[index]
+
+    @property
+    def title(self) -> str:
+        """Return the name of its curves in a figure."""
+        return self.name
+
+    @property
+    def tolerance(self) -> float:
+        """Return how far beyond the bounds the audit accepts values, in their unit."""
+        return self.scale * (EQUATION_TOLERANCE if self.is_equation else TOLERANCE)
+
+    @property
+    def is_equation(self) -> bool:
+        """Return whether it is met at the nodes, and between them only nearly."""
+        return self.low == self.high
+
+    @property
+    def is_convex(self) -> bool:
+        """Return whether the program imposes it on Bernstein points rather than on values at the nodes."""
+        return self.hull is not None and self.soft is None
+
+    @property
+    def order(self) -> int:
+        """Return the derivative of the pose that a convex limit is about."""
+        return 0 if self.hull is None else self.hull.order
+
+    @property
+    def slack_weight(self) -> float:
+        """Return how many times `soft` a slack of one in the program is."""
+        return 0.0 if self.soft is None else self.scale / self.soft
+
+    def softened(self, amount: float | None) -> Self:
+        """Return the limit as soft, by the excess that adds one to the objective; None leaves it as it is."""
+        if amount is None:
+            return self
+        soft = copy(self)
+        soft.soft = amount
+        return soft
+
+
+class Magnitude(Limit):
+    """A limit of the length of a vector: `values` are its components, `high` bounds their root sum square.
+
+    At the nodes of a program the root is rounded at zero, where a motion rests and a norm has a corner; at the bound it
+    is then 5e-7 too large. On Bernstein points the square is limited, which has no corner.
+    """
+
+    @override
+    def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
+        if self.is_convex:
+            most = self.high if self.order == 0 else self.high * (1.0 - shrink)
+            return Rows(ca.sumsqr(values) / most**2, -np.inf, 1.0)
+        size = ca.sqrt(ca.sumsqr(values) + (ROUNDING * self.high) ** 2)
+        return Rows(size / self.scale, 0.0, (self.high - shrink * self.scale) / self.scale)
+
+    @override
+    def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(values, axis=1, keepdims=True)
+
+
+class Angle(Limit):
+    """A limit of an angle [rad]: `values` is its cosine, which has a derivative at zero too; `high` is the angle."""
+
+    unit = "rad"
+
+    @property
+    def _least(self) -> float:
+        return float(np.cos(self.high))
+
+    @property
+    def _change(self) -> float:
+        """Return the change of the cosine up to the bound."""
+        return max(1.0 - self._least, LEAST_COSINE)
+
+    @override
+    def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
+        if self.is_convex:
+            return Rows(values, self._least, np.inf)
+        return Rows(values / self._change, (self._least + shrink * self._change) / self._change, np.inf)
+
+    @override
+    def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return np.arccos(np.clip(values, -1, 1))
+
+    @property
+    @override
+    def tolerance(self) -> float:
+        return ANGLE_TOLERANCE
+
+    @property
+    @override
+    def slack_weight(self) -> float:
+        if self.soft is None:
+            return 0.0
+        slope = float(np.sqrt(1 - self._least**2))  # what the cosine changes by as the angle does
+        return self._change / (self.soft * slope)
+
+
+class Rate(Limit):
+    """A limit of how fast `values` change: the program takes their differences from point to point."""
+
+    @override
+    def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        rates = np.diff(values, axis=0) / np.diff(times)[:, None]
+        return np.vstack([rates, rates[-1:]])
+
+    @property
+    @override
+    def tolerance(self) -> float:
+        return RATE_TOLERANCE * self.scale

@@ -1,0 +1,103 @@
+"""Limits of distances from places: by how much platform, carriers and cables stay outside.
+
+A place that moves with the platform is its body: then the limits have names of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+from typing_extensions import override
+
+from ...models import Robot
+from .cables import names
+from .clearance import Place, cable_outside, point_outside
+from .limit import Limit
+from .state import State
+
+__all__ = ["CablesOutside", "CarriersOutside", "PlatformOutside"]
+
+
+class _Outside(Limit):
+    """Keep out of a place.
+
+    Parameters
+    ----------
+    place
+        Its shape, in {G} or, if it moves with the platform, in the platform's frame.
+    called
+        The name of the place.
+    riding
+        Whether it moves with the platform.
+    least
+        Distance to keep [m].
+    """
+
+    unit = "m"
+
+    def __init__(self, place: Place, called: str, riding: bool, least: float):
+        self._place, self._called, self._riding, self.low = place, called, riding, least
+
+    @override
+    def about(self, index: int) -> str:
+        return f"{self.labels[index]} outside {self._called}"
+
+    @property
+    @override
+    def title(self) -> str:
+        return f"{self.name}, {self._called}"
+
+    def _points(self, state: State, points: ca.SX) -> ca.SX:
+        """Return points (3, k) of {G} in the frame of the place."""
+        return state.on_platform(points) if self._riding else points
+
+    def _outside(self, points: ca.SX) -> ca.SX:
+        """Return the distances of points (3, k) of the place's frame, (k, 1) [m]."""
+        return ca.vertcat(*(point_outside(self._place, point) for point in ca.horzsplit(points)))
+
+
+class PlatformOutside(_Outside):
+    """Keep the platform's CoM and its attachments out of a place that is fixed in {G}."""
+
+    name = "keep_out"
+
+    def __init__(self, robot: Robot, place: Place, called: str, least: float):
+        super().__init__(place, called, False, least)
+        self.labels = ("platform",) * (1 + robot.m)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return self._outside(ca.horzcat(state.com, state.attachments))
+
+
+class CarriersOutside(_Outside):
+    """Keep the origins of carriers out of a place."""
+
+    def __init__(self, robot: Robot, which: Sequence[int], place: Place, called: str, riding: bool, least: float):
+        super().__init__(place, called, riding, least)
+        self.name = "carrier_platform_clearance" if riding else "keep_out"
+        self.labels = tuple(robot.carriers[index].name for index in which)
+        self._which = which
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return self._outside(
+            self._points(state, ca.horzcat(*(state.carriers[index].position for index in self._which)))
+        )
+
+
+class CablesOutside(_Outside):
+    """Keep the cables out of a place."""
+
+    def __init__(self, robot: Robot, place: Place, called: str, riding: bool, least: float):
+        super().__init__(place, called, riding, least)
+        self.name = "cable_platform_clearance" if riding else "keep_out"
+        self.labels = names(robot)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        anchors = self._points(state, state.anchors)
+        ends = ca.SX(ca.DM(state.robot.attachments.T)) if self._riding else state.attachments
+        outside = (cable_outside(self._place, ends[:, i], anchors[:, i]) for i in range(state.robot.m))
+        return ca.vertcat(*outside)

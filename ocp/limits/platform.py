@@ -1,0 +1,78 @@
+"""Limits of the platform: how fast it moves, accelerates and turns, how far it tilts, and where it stays."""
+
+from __future__ import annotations
+
+import casadi as ca
+from typing_extensions import override
+
+from ...models.rotation import body_rate
+from .limit import Angle, Limit, Magnitude
+from .state import State
+
+__all__ = ["PlatformAcceleration", "PlatformBox", "PlatformSpeed", "PlatformTilt", "PlatformTurn"]
+
+
+class PlatformSpeed(Magnitude):
+    """Limit the speed of the platform frame's origin."""
+
+    name, unit = "platform_speed", "m/s"
+
+    def __init__(self, most: float):
+        self.high = self.scale = most
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.platform.velocity[:3]
+
+
+class PlatformAcceleration(Magnitude):
+    """Limit the acceleration of the platform frame's origin."""
+
+    name, unit = "platform_acceleration", "m/s^2"
+
+    def __init__(self, most: float):
+        self.high = self.scale = most
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.platform.acceleration[:3]
+
+
+class PlatformTurn(Magnitude):
+    """Limit the platform's angular velocity."""
+
+    name, unit = "platform_turn", "rad/s"
+
+    def __init__(self, most: float):
+        self.high = self.scale = most
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return body_rate(state.platform.pose[3:6], state.platform.velocity[3:6])
+
+
+class PlatformTilt(Angle):
+    """Limit the angle of the platform's z axis to the vertical."""
+
+    name = "platform_tilt"
+
+    def __init__(self, most: float):
+        self.high = most
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.platform.upright
+
+
+class PlatformBox(Limit):
+    """Keep one coordinate of the platform frame's origin in {G} inside a range."""
+
+    name, unit = "platform_box", "m"
+
+    def __init__(self, axis: int, low: float, high: float):
+        self._axis, self.low, self.high = axis, low, high
+        self.labels = (f"platform {'xyz'[axis]}",)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.platform.pose[self._axis]

@@ -1,0 +1,105 @@
+"""`State`: everything that a limit may be about, at one instant, as CasADi symbols."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...models import Robot, kinematics
+from ...models.cables.pulley import Exit
+from ...models.carriers import Effort
+from ...models.forward import pull_on_carrier
+from ...models.rotation import rotation
+
+__all__ = ["Body", "State"]
+
+
+class Body(NamedTuple):
+    """The motion of platform or carrier in {G}: (x, y, z, roll, pitch, yaw) and its time derivatives, (6, 1) each."""
+
+    pose: ca.SX  # [m, rad]
+    velocity: ca.SX  # [m/s, rad/s]
+    acceleration: ca.SX  # [m/s^2, rad/s^2]
+
+    @property
+    def position(self) -> ca.SX:
+        """Return the origin of its frame, (3, 1) [m]."""
+        return self.pose[:3]
+
+    @property
+    def upright(self) -> ca.SX:
+        """Return the cosine of the angle of its z axis to the vertical, (1, 1)."""
+        return ca.cos(self.pose[3]) * ca.cos(self.pose[4])
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that there is at one instant, in {G}.
+
+    Attributes
+    ----------
+    platform
+        The motion of the platform.
+    carriers
+        That of each carrier.
+    tensions
+        (m, 1) [N].
+    off_path
+        Offset of the platform from its path, in the path's axes, (6, 1) [m, rad].
+    """
+
+    robot: Robot
+    platform: Body
+    carriers: tuple[Body, ...]
+    tensions: ca.SX
+    off_path: ca.SX
+
+    @cached_property
+    def com(self) -> ca.SX:
+        """Return the CoM of the platform, (3, 1) [m]."""
+        return kinematics.transform(self.platform.pose, np.array([self.robot.platform.com]))
+
+    @cached_property
+    def carrier_poses(self) -> ca.SX:
+        """Return the poses of all carriers, (c, 6) [m, rad]."""
+        return ca.vertcat(*(carrier.pose.T for carrier in self.carriers))
+
+    @cached_property
+    def anchors(self) -> ca.SX:
+        """Return the anchors, (3, m) [m]."""
+        return kinematics.anchors(self.robot.anchors, self.robot.carrier_of_cable, self.carrier_poses)
+
+    @cached_property
+    def attachments(self) -> ca.SX:
+        """Return the attachments, (3, m) [m]."""
+        return kinematics.transform(self.platform.pose, self.robot.attachments)
+
+    @cached_property
+    def run(self) -> Exit:
+        """Return directions, leaving points and lengths of the cables."""
+        axes = kinematics.axes(self.robot.pulley_axes, self.robot.carrier_of_cable, self.carrier_poses)
+        radii = self.robot.pulley_radii
+        return kinematics.cables(self.robot.attachments, self.platform.pose, self.anchors, axes, radii)
+
+    @cached_property
+    def efforts(self) -> list[tuple[Effort, ...]]:
+        """Return the efforts that motion and cables require of each carrier."""
+        robot, gravity = self.robot, np.array(self.robot.gravity)
+        return [
+            carrier.required_effort(*body, pull_on_carrier(robot, i, self.run, body.pose, self.tensions), gravity)
+            for i, (carrier, body) in enumerate(zip(robot.carriers, self.carriers, strict=True))
+        ]
+
+    def rate(self, values: ca.SX) -> ca.SX:
+        """Return the time derivative of an expression of the poses."""
+        bodies = (self.platform, *self.carriers)
+        return sum((ca.jtimes(values, body.pose, body.velocity) for body in bodies), ca.SX.zeros(*values.shape))
+
+    def on_platform(self, points: ca.SX) -> ca.SX:
+        """Return points (3, k) of {G} in the platform's frame, (3, k) [m]."""
+        turned = rotation(self.platform.pose[3:6])
+        return turned.T @ (points - ca.repmat(self.platform.position, 1, points.shape[1]))

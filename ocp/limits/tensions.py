@@ -1,0 +1,42 @@
+"""Limits of the tensions beside t_min and t_max: how far inside these they stay, and how fast they change."""
+
+from __future__ import annotations
+
+import casadi as ca
+from typing_extensions import override
+
+from ...models import Robot
+from .cables import names
+from .limit import Limit, Rate
+from .state import State
+
+__all__ = ["Margin", "TensionRate"]
+
+
+class Margin(Limit):
+    """Keep each tension so far inside its limits. Only soft: a hard margin bounds the tensions themselves."""
+
+    name, unit = "margin", "N"
+
+    def __init__(self, robot: Robot, least: float):
+        self.low, self.scale = least, robot.force_scale
+        self.labels = names(robot) * 2
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        low, high = ca.DM(state.robot.t_min), ca.DM(state.robot.t_max)
+        return ca.vertcat(state.tensions - low, high - state.tensions)
+
+
+class TensionRate(Rate):
+    """Limit how fast each tension changes."""
+
+    name, unit = "tension_rate", "N/s"
+
+    def __init__(self, robot: Robot, most: float):
+        self.low, self.high, self.scale = -most, most, most
+        self.labels = names(robot)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.tensions

@@ -1,0 +1,192 @@
+"""`lay_out`: check that a task fits a robot, and lay it out for planning."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ...errors import InputError
+from ...models import Dynamics, Robot
+from ...models.ranges import PositiveRange
+from ..limits.clearance import point_outside
+from ..limits.limit import Rate
+from ..limits.limits import Limits
+from .carrier_paths import carrier_paths
+from .limit_list import limit_list
+from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
+from .scheme import SCHEMES
+from .task import FreeBase, GivenBase, HoldBase, Task
+from .task_limits import OF_CARRIERS
+from .wind_set import WindBox
+
+__all__ = ["check_margin", "lay_out"]
+
+
+def lay_out(robot: Robot, task: Task) -> Scenario:
+    """Check that `task` fits `robot` and lay it out.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the task that does not fit, its value and what would.
+    """
+    where = f"task {task.name!r}"
+    relative = _frame(robot, task, where)
+    check_margin(robot, task)
+    if task.wind is not None and robot.platform.aero is None:
+        raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
+    if isinstance(task.wind, WindBox):
+        _feels_no_tensions(robot, where)
+    limits = limit_list(robot, task)
+    _fit_limits(robot, task, limits, where)
+    opened = [*POSITION] * (task.tube.radius > 0) + [*ATTITUDE] * (task.tube.turn > 0)
+    platform_free = [coordinate for coordinate in opened if robot.dof_mask[coordinate]]
+    scenario = Scenario(
+        robot=robot,
+        task=task,
+        path=task.path,
+        dynamics=Dynamics(robot),
+        relative=relative,
+        platform_free=platform_free,
+        carrier_free=_free_carriers(robot, task.base, where),
+        limits=limits,
+        carrier_paths=carrier_paths(robot, task),
+        duration=task.seconds,
+    )
+    _check_times(task, where)
+    _check_transcription(task, limits, where)
+    return scenario
+
+
+def _feels_no_tensions(robot: Robot, where: str) -> None:
+    """Refuse a box of winds where other tensions are another motion."""
+    for carrier in robot.carriers:
+        if carrier.efforts:
+            raise InputError(
+                f"{where}: wind must be one wind, (x, y, z) [m/s], got a box: carrier {carrier.name!r} of kind "
+                f"{carrier.kind} moves with the pull of its cables, so that no motion is the same in every wind"
+            )
+
+
+def check_margin(robot: Robot, task: Task) -> None:
+    """Refuse a margin that leaves a cable no tension.
+
+    Raises
+    ------
+    InputError
+        Naming the largest margin and the cable.
+    """
+    for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
+        if low + task.margin > high - task.margin:
+            raise InputError(
+                f"task {task.name!r}: margin must be at most {(high - low) / 2:g} N, half the range of cable "
+                f"{index + 1} ({low:g} N to {high:g} N), got {task.margin:g} N"
+            )
+
+
+def _fit_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
+    """Refuse soft limits of carriers that the robot does not have, and a body nearer to cables than they may be."""
+    names = {limit.name for limit in limits}
+    still = not any(carrier.moves for carrier in robot.carriers)
+    for name in task.limits.soft:
+        for its, owner, missing in (
+            (("thrust", "torque"), "quadrotors", name not in names),
+            (("carrier_reach",), "mobile carriers", name not in names),
+            (OF_CARRIERS, "moving carriers", still),
+        ):
+            if name in its and missing:
+                raise InputError(
+                    f"{where}: limits.soft must not name {name!r}, a limit of {owner}: {robot.name!r} has none"
+                )
+    for place in task.limits.keep_out:
+        if place.frame == "platform" and place.cables is not None:
+            for index, attachment in enumerate(robot.attachments):
+                outside = float(point_outside(place, ca.DM(attachment)))
+                if outside < place.cables:
+                    raise InputError(
+                        f"{where}: limits.keep_out {place.name!r} must leave all attachments outside by as much as "
+                        f"cables, {place.cables:g} m, got {outside:.3g} m for cable {index + 1}"
+                    )
+
+
+def _frame(robot: Robot, task: Task, where: str) -> bool:
+    frame = task.path.frame
+    only = robot.carriers[0].name if len(robot.carriers) == 1 else None
+    if frame != "world" and frame != only:
+        accepted = "world" if only is None else f"world, {only}"
+        raise InputError(f"{where}: path.frame must be one of {accepted}, got {frame!r}")
+    return frame != "world"
+
+
+def _check_transcription(task: Task, limits: Limits, where: str) -> None:
+    """Refuse what the scheme or the solver cannot do."""
+    if task.solver == "fatrop" and getattr(task.base, "ends", None) == "periodic":
+        raise InputError(
+            f"{where}: solver must be ipopt if base.ends is periodic, got fatrop, which cannot couple the "
+            "last stage to the first"
+        )
+    if SCHEMES[task.scheme].continuous:
+        return
+    rates = [(f"limits.{limit.name}", limit.high, limit.unit) for limit in limits if isinstance(limit, Rate)]
+    if (rate := task.objective.tension_rate) is not None:
+        rates.append(("objective.tension_rate", rate, "N/s"))
+    for name, rate, unit in rates:
+        accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if scheme.continuous)
+        raise InputError(
+            f"{where}: {name} must be left out with the scheme {task.scheme!r}, whose tensions jump at the nodes, got "
+            f"{rate:g} {unit}; schemes without jumps: {accepted}"
+        )
+
+
+def _check_times(task: Task, where: str) -> None:
+    """Refuse a task longer or shorter than its waypoints: beyond their times a spline is arbitrary."""
+    longest = task.duration.max if isinstance(task.duration, PositiveRange) else task.seconds
+    if longest * AUDIT_RATE > MOST_SAMPLES:
+        raise InputError(
+            f"{where}: duration must be at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the audit evaluates "
+            f"{AUDIT_RATE:g} instants per second, got {longest:g} s"
+        )
+    if longest * task.output_rate > MOST_SAMPLES:
+        raise InputError(
+            f"{where}: output_rate must be at most {MOST_SAMPLES / longest:g} 1/s, {MOST_SAMPLES} samples in "
+            f"{longest:g} s, got {task.output_rate:g} 1/s"
+        )
+    paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
+    if isinstance(task.duration, PositiveRange):
+        for name, path in paths.items():
+            if not path.stretches:
+                raise InputError(
+                    f"{where}: duration must be a number [s], got a range, while {name} of kind {path.kind} has "
+                    "times of its own; paths of kind rest, line, and waypoints without times take a range"
+                )
+    for name, path in paths.items():
+        end = path.natural_duration if path.kind in ("waypoints", "samples") else None
+        if end is not None and task.seconds > end * (1 + 1e-9):
+            raise InputError(
+                f"{where}: duration must be at most {end:g} s, where the times of {name} end, got {task.seconds:g} s"
+            )
+    end = task.path.natural_duration if task.path.kind in ("waypoints", "samples") else None
+    if end is not None and task.seconds < end * (1 - 1e-9):
+        raise InputError(
+            f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"
+        )
+
+
+def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:
+    """Return the (carrier, coordinate) pairs that the planner chooses."""
+    if not isinstance(base, FreeBase):
+        return []
+    free = [
+        (index, coordinate)
+        for index, carrier in enumerate(robot.carriers)
+        for coordinate in carrier.planned_coordinates(robot.drive, tilts=base.tilt_max > 0)
+    ]
+    if not any(carrier.moves for carrier in robot.carriers):
+        raise InputError(
+            f"{where}: base must be left out, got kind free: the carriers of robot {robot.name!r} are on the ground"
+        )
+    if not free:
+        raise InputError(
+            f"{where}: base.kind must be hold or given, got free: only winches move robot {robot.name!r}, its carriers "
+            f"stay (drive: {robot.drive})"
+        )
+    return free

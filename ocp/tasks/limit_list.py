@@ -1,0 +1,117 @@
+"""`limit_list`: all limits of a task and of the robot that it is laid out for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...models import Robot
+from ..limits.cables import CableClearance, CableLength, CableSpeed
+from ..limits.carriers import (
+    CarrierAcceleration,
+    CarrierReach,
+    CarrierSeparation,
+    CarrierSpeed,
+    CarrierTilt,
+    CarrierTurnAcceleration,
+)
+from ..limits.efforts import efforts
+from ..limits.limit import Limit
+from ..limits.limits import Limits
+from ..limits.places import CablesOutside, CarriersOutside, PlatformOutside
+from ..limits.platform import PlatformAcceleration, PlatformBox, PlatformSpeed, PlatformTilt, PlatformTurn
+from ..limits.tensions import Margin, TensionRate
+from ..limits.tube import TubeAttitude, TubePosition
+from .task import FreeBase, Task
+from .task_limits import AnyKeepOut, TaskLimits
+
+__all__ = ["limit_list"]
+
+
+def limit_list(robot: Robot, task: Task) -> Limits:
+    """Return the limits of `task` and those of the file of `robot`, each hard unless the task makes it soft."""
+    given = task.limits
+    parts = (
+        _of_cables(robot, task),
+        _of_platform(given),
+        _of_carriers(robot, task),
+        (limit for place in given.keep_out for limit in _of_place(robot, place)),
+        (effort for index in range(len(robot.carriers)) for effort in efforts(robot, index)),
+        _of_tube(task),
+        given.own,
+    )
+    return Limits(robot, tuple(limit.softened(given.soft.get(limit.name)) for part in parts for limit in part))
+
+
+def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
+    given = task.limits
+    if given.cable_speed is not None:
+        yield CableSpeed(robot, given.cable_speed)
+    if given.cable_length is not None:
+        yield CableLength(robot, given.cable_length.min, given.cable_length.max)
+    if "margin" in given.soft:
+        yield Margin(robot, task.margin)
+    if given.tension_rate is not None:
+        yield TensionRate(robot, given.tension_rate)
+    if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:
+        yield clearance
+
+
+def _of_platform(given: TaskLimits) -> Iterator[Limit]:
+    if given.platform_speed is not None:
+        yield PlatformSpeed(given.platform_speed)
+    if given.platform_acceleration is not None:
+        yield PlatformAcceleration(given.platform_acceleration)
+    if given.platform_turn is not None:
+        yield PlatformTurn(given.platform_turn)
+    if given.platform_tilt is not None:
+        yield PlatformTilt(given.platform_tilt)
+    if given.platform_box is not None:
+        for axis, low, high in zip(range(3), given.platform_box.min, given.platform_box.max, strict=True):
+            yield PlatformBox(axis, low, high)
+
+
+def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
+    """Return the limits of the robot's file together with the task's, whichever is tighter."""
+    given, free = task.limits, task.base if isinstance(task.base, FreeBase) else None
+    speed = _tighter(given.carrier_speed, free and free.speed_max)
+    acceleration = _tighter(given.carrier_acceleration, free and free.acceleration_max)
+    if given.carrier_separation is not None and len(robot.carriers) > 1:
+        yield CarrierSeparation(robot, given.carrier_separation)
+    for index, carrier in enumerate(robot.carriers):
+        if not carrier.moves:
+            continue
+        own, turns = carrier.motion_limits, None if carrier.keeps_attitude else free
+        if (most := _tighter(acceleration, own.acceleration)) is not None:
+            yield CarrierAcceleration(robot, index, most)
+        if (most := _tighter(speed, own.speed)) is not None:
+            yield CarrierSpeed(robot, index, most)
+        if (most := _tighter(turns and (turns.tilt_max or None), own.tilt)) is not None:
+            yield CarrierTilt(robot, index, most)
+        if turns is not None and turns.turn_acceleration_max is not None:
+            yield CarrierTurnAcceleration(robot, index, turns.turn_acceleration_max)
+        if own.reach is not None:
+            for axis, low, high in zip(range(3), own.reach.min, own.reach.max, strict=True):
+                yield CarrierReach(robot, index, axis, low, high)
+
+
+def _tighter(*bounds: float | None) -> float | None:
+    return min((bound for bound in bounds if bound is not None), default=None)
+
+
+def _of_place(robot: Robot, place: AnyKeepOut) -> Iterator[Limit]:
+    riding = place.frame == "platform"
+    if place.platform is not None and not riding:
+        yield PlatformOutside(robot, place, place.name, place.platform)
+    moving = [index for index, carrier in enumerate(robot.carriers) if carrier.moves]
+    if place.carriers is not None and moving:
+        yield CarriersOutside(robot, moving, place, place.name, riding, place.carriers)
+    if place.cables is not None:
+        yield CablesOutside(robot, place, place.name, riding, place.cables)
+
+
+def _of_tube(task: Task) -> Iterator[Limit]:
+    if np.isfinite(task.tube.radius):
+        yield TubePosition(task.tube.radius)
+    yield from (TubeAttitude(axis, task.tube.turn) for axis in range(3))
