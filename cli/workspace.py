@@ -21,11 +21,9 @@ if TYPE_CHECKING:
     from ..workspace.run import Progress
 
 
-# Those of `workspace.Condition.kinds`, which takes longer to load than help may.
-CONDITIONS = (
-    "all, any, dynamic, equilibrium-posture, exists-placement, force-balance, interference, lengths, margin, "
-    "static-equilibrium, wrench-closure, wrench-feasible, wrench-with-tolerance"
-)
+# Each has a file of its own; to load them takes longer than help may.
+_FILES = (Path(__file__).parent.parent / "workspace" / "conditions").glob("[a-z]*.py")
+CONDITIONS = ", ".join(sorted(["all", "any", *(file.stem.replace("_", "-") for file in _FILES)]))
 
 
 def workspace(
@@ -37,6 +35,10 @@ def workspace(
             f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
             "Default: static-equilibrium."
         ),
+    ] = None,
+    define: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE.py", help="Python file with conditions of your own, to use by their kinds."),
     ] = None,
     box: Annotated[
         str | None,
@@ -61,7 +63,7 @@ def workspace(
         ),
     ] = None,
     samples: Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")] = 60_000,
-    method: Annotated[str, typer.Option(help="How to sample: random, sobol, halton, grid or adaptive.")] = "random",
+    method: Annotated[str, typer.Option(help="How to sample: random, sobol, grid or adaptive.")] = "random",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     size: Annotated[
         float | None,
@@ -117,6 +119,8 @@ def workspace(
     from ..workspace import sample, save
     from ..writing import check_writable
 
+    for file in define or []:
+        _import(file)
     loaded = load(robot)
     required = _condition(condition)
     region = _region(box, attitude, carriers, lengths)
@@ -182,6 +186,21 @@ def _boundary(robot: Robot, condition: Condition, data: dict[str, Any]) -> Mesh:
 
 def _name(file: Path | None) -> str | None:
     return None if file is None else str(file)
+
+
+def _import(file: Path) -> None:
+    """Import a Python file by its name, from its folder, as worker processes will do too."""
+    import sys
+    from importlib import import_module
+
+    try:
+        sys.path.insert(0, str(file.resolve().parent))
+        if Path(import_module(file.stem).__file__ or "").resolve() == file.resolve():
+            return
+        reason = "there is another module of that name"
+    except Exception as error:  # anything that a file of the user's may raise
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+    raise InputError(f"--define must be a Python file that can be imported, got {file} ({reason})")
 
 
 def _condition(texts: list[str] | None) -> Condition:

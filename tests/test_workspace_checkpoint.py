@@ -24,9 +24,9 @@ RECORD = 16 + CHUNK // 8 + 4  # bytes
 class Counting(StaticEquilibrium):
     """Rest; counts how many places it was evaluated at."""
 
-    def _holds(self, robot, places):
+    def evaluate(self, robot, places):
         counts.append(len(places.pose))
-        return super()._holds(robot, places)
+        return super().evaluate(robot, places)
 
 
 counts: list[int] = []

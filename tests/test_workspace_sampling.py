@@ -10,7 +10,6 @@ from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.workspace import Places, Region, StaticEquilibrium, sample, save
 from towline.workspace.domain import Domain
-from towline.workspace.halton import halton
 from towline.workspace.sampling import CHUNK, Sampler, cells_of
 
 REST = StaticEquilibrium()
@@ -72,11 +71,11 @@ def towed_body():
     )
 
 
-@pytest.mark.parametrize("method", ["random", "sobol", "halton", "grid"])
+@pytest.mark.parametrize("method", ["random", "sobol", "grid"])
 def test_chunks_are_the_same_in_any_order(method):
     sampler = Sampler(method, 4 * CHUNK + 100, 7, (1.0, 2.0, 0.5))
-    forth = [sampler.units(chunk) for chunk in range(sampler.chunks)]
-    back = [sampler.units(chunk) for chunk in reversed(range(sampler.chunks))][::-1]
+    forth = [sampler.units(chunk) for chunk in range(5)]
+    back = [sampler.units(chunk) for chunk in reversed(range(5))][::-1]
     for one, other in zip(forth, back, strict=True):
         np.testing.assert_array_equal(one, other)
     points = np.vstack(forth)
@@ -93,16 +92,6 @@ def test_sobol_is_scipys():
     np.testing.assert_array_equal(sampler.units(2), want)
 
 
-def test_halton_fills_every_interval_once():
-    """Any b^k points in a row lie one in each of b^k equal intervals, if they begin at a multiple of b^k."""
-    for axis, (base, power) in enumerate(((2, 10), (3, 6), (5, 4), (7, 3))):
-        count = base**power
-        for start in (0, count * 12345):
-            points = halton(start, count, 4, seed=1)[:, axis]
-            np.testing.assert_array_equal(np.sort((points * count).astype(int)), np.arange(count))
-    assert qmc.discrepancy(halton(0, 2000, 3, 5)) < 0.2 * qmc.discrepancy(np.random.default_rng(0).random((2000, 3)))
-
-
 def test_random_streams_are_apart():
     one, other = (Sampler("random", 2 * CHUNK, seed, (1.0,)) for seed in (0, 1))
     streams = np.hstack([one.units(0), one.units(1), other.units(0)])
@@ -115,7 +104,7 @@ def test_cells_of_a_grid_are_about_cubes():
     assert cells_of(np.array([2.0, 1.0]), 1) == (1, 1)
 
 
-@pytest.mark.parametrize("method", ["random", "sobol", "halton", "grid", "adaptive"])
+@pytest.mark.parametrize("method", ["random", "sobol", "grid", "adaptive"])
 def test_the_prism_below_three_anchors(method):
     found = sample(hanging_mass(), REST, {"position": BOX}, 40_000, method)
     low, high = found["volume_interval"].values
@@ -123,7 +112,7 @@ def test_the_prism_below_three_anchors(method):
         assert np.isnan([low, high]).all()  # no chance, no interval
     else:
         assert low < AREA < high
-    within = {"random": 0.04, "grid": 0.02, "adaptive": 0.02, "sobol": 0.006, "halton": 0.006}[method]
+    within = {"random": 0.04, "grid": 0.02, "adaptive": 0.02, "sobol": 0.006}[method]
     assert float(found["volume"]) == pytest.approx(AREA, rel=within)
     assert found["volume"].units == "m^3"
     x, y = found["position"].values[:, :2].T
@@ -245,7 +234,7 @@ def test_fewer_processors_inside_of_a_block():
     [
         ({"samples": 0}, "samples must be a whole number from 1"),
         ({"samples": 2.5}, "got 2.5"),
-        ({"method": "dice"}, "method must be one of random, sobol, halton, grid, adaptive, got 'dice'"),
+        ({"method": "dice"}, "method must be one of random, sobol, grid, adaptive, got 'dice'"),
         ({"seed": -1}, "seed must be a whole number"),
         ({"workers": 0}, "workers must be"),
         ({"keep": "some"}, "keep must be one of accepted, all, none, got 'some'"),

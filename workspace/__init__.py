@@ -4,44 +4,23 @@ Conditions stand alone or are joined by & and |. `sample` evaluates them, `bound
 hold, `hints` takes a first look.
 """
 
+from . import conditions
 from .boundary_mesh import boundary
 from .condition import AllOf, AnyOf, Condition, condition_from
-from .conditions import (
-    Dynamic,
-    EquilibriumPosture,
-    ExistsPlacement,
-    ForceBalance,
-    Interference,
-    Lengths,
-    Margin,
-    StaticEquilibrium,
-    WrenchClosure,
-    WrenchFeasible,
-    WrenchWithTolerance,
-)
+from .conditions import *  # noqa: F403  the only list of them is there
+from .dataset import save
 from .feasibility import load_kernels
 from .first_look import hints
 from .places import Places
 from .region import Region
-from .run import sample, save
+from .run import sample
 
 __all__ = [
     "AllOf",
     "AnyOf",
     "Condition",
-    "Dynamic",
-    "EquilibriumPosture",
-    "ExistsPlacement",
-    "ForceBalance",
-    "Interference",
-    "Lengths",
-    "Margin",
     "Places",
     "Region",
-    "StaticEquilibrium",
-    "WrenchClosure",
-    "WrenchFeasible",
-    "WrenchWithTolerance",
     "boundary",
     "condition_from",
     "hints",
@@ -49,3 +28,4 @@ __all__ = [
     "sample",
     "save",
 ]
+__all__ += conditions.__all__

@@ -22,7 +22,13 @@ __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
 
 
 class Condition(Part, ABC):
-    """A property of a place that holds or does not. A condition of your own has a `kind` and `_holds`."""
+    """A property of a place that holds or does not. A condition of your own has a `kind` and `evaluate`.
+
+    Attributes
+    ----------
+    kinds
+        The registry: every condition by its kind, from when its class is defined.
+    """
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
 
@@ -43,14 +49,20 @@ class Condition(Part, ABC):
         check_places(robot, places)
         finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
         if finite.all():
-            return self._holds(robot, places)
+            return self.evaluate(robot, places)
         held = np.zeros(len(places), dtype=bool)
-        held[finite] = self._holds(robot, places.only(finite))
+        held[finite] = self.evaluate(robot, places.only(finite))
         return held
 
     @abstractmethod
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return where the condition holds among places of finite numbers, (n,) of bool."""
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return where the condition holds among places of finite numbers, (n,) of bool.
+
+        Raises
+        ------
+        InputError
+            If the condition does not apply to the robot.
+        """
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return how far each place is from fulfilling the condition, (n,): zero exactly where it holds.
@@ -100,7 +112,8 @@ class AllOf(Condition):
     kind: Literal["all"] = "all"
     conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions that all must hold")
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return where all hold, (n,) of bool."""
         return _one_by_one(self.conditions, robot, places, undecided=True)
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
@@ -118,7 +131,8 @@ class AnyOf(Condition):
     kind: Literal["any"] = "any"
     conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions of which one must hold")
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return where one of them holds, (n,) of bool."""
         return _one_by_one(self.conditions, robot, places, undecided=False)
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:

@@ -115,6 +115,18 @@ class Domain:
         """Return the unit of `measure`."""
         return {1: "m", 2: "m^2", 3: "m^3"}.get(int((self.high[:3] - self.low[:3] > THINNEST).sum()), "1")
 
+    @property
+    def numbers_kept(self) -> int:
+        """Return how many numbers `numbers` returns of a place."""
+        return 3 + 3 * self.attitude_varies + 3 * len(self.robot.carriers) * self.carriers_vary
+
+    def numbers(self, places: Places) -> np.ndarray:
+        """Return what differs between places: position, and attitude and carriers' positions if they vary, (n, k)."""
+        parts = [places.pose if self.attitude_varies else places.pose[:, :3]]
+        if self.carriers_vary:
+            parts.append(places.carriers[:, :, :3].reshape(len(places), -1))
+        return np.hstack(parts) if len(parts) > 1 else parts[0]
+
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:
         """Return the places that points of the unit cube stand for, and whether there is such a place.
 

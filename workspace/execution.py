@@ -1,6 +1,7 @@
-"""Where the jobs run: in this process, in processes of this machine, or on a Dask cluster; results keep their order.
+"""Where jobs run: in this process, in processes of this machine, or on a Dask cluster; results keep their order.
 
-Enough jobs are submitted at once that no worker waits, and no more: memory does not grow with the number of samples.
+Each of the three is an executor of `concurrent.futures`. Enough jobs are submitted at once that no worker waits, and
+no more: memory does not grow with the number of jobs.
 """
 
 from __future__ import annotations
@@ -10,31 +11,69 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 from ..errors import InputError, SolverError
 from ..inputs import shown
-from .jobs import Job, JobResult, evaluate, prepare
 
 AHEAD = 3  # jobs for each worker, one of which it works on
 CONNECT_WITHIN = 5.0  # [s]
 WORKERS_WITHIN = 30.0  # [s]
 
-Evaluate = Callable[[Iterable[Job]], Iterator[JobResult]]
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Evaluate jobs by an executor.
+
+    Attributes
+    ----------
+    limit
+        Returns how many jobs may be under way now; a cluster may grow and shrink.
+    failures
+        What ends the work because of the workers, and the message for it; {0} in it is the error.
+    """
+
+    executor: Executor
+    limit: Callable[[], int]
+    failures: Mapping[type[Exception], str] = field(default_factory=dict)
+
+    def map(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
+        """Yield `function(*job)` of each job, in their order, while the next ones are being evaluated.
+
+        Raises
+        ------
+        SolverError
+            If workers end before their work is done.
+        """
+        under_way: deque[Future[Result]] = deque()
+        try:
+            for job in jobs:
+                under_way.append(self.executor.submit(function, *job))
+                if len(under_way) >= self.limit():
+                    yield under_way.popleft().result()
+            while under_way:
+                yield under_way.popleft().result()
+        except tuple(self.failures) as error:
+            message = next(text for kind, text in self.failures.items() if isinstance(error, kind))
+            raise SolverError(message.format(error)) from None
+        finally:
+            for future in under_way:
+                future.cancel()
 
 
 @contextmanager
-def executor(packed: bytes, workers: int, scheduler: str | None) -> Iterator[Evaluate]:
-    """Return a function that evaluates jobs and yields their results in the same order.
+def start_workers(workers: int, scheduler: str | None) -> Iterator[Workers]:
+    """Start workers, which end with the block.
 
     Parameters
     ----------
-    packed
-        From `RunSettings.packed`.
     workers
         Processes of this machine; 1: this process.
     scheduler
@@ -44,28 +83,57 @@ def executor(packed: bytes, workers: int, scheduler: str | None) -> Iterator[Eva
     ------
     InputError
         If there is no such scheduler.
-    SolverError
-        If workers end before their work is done.
     """
     if scheduler is not None:
-        with _cluster(scheduler) as client:
-            yield lambda jobs: _on_cluster(client, packed, jobs)
+        with _cluster(scheduler) as started:
+            yield started
     elif workers == 1:
-        yield lambda jobs: (evaluate(packed, job) for job in jobs)
+        yield Workers(_ThisProcess(), lambda: 1)
     else:
-        prepare(packed)
-        # New processes, not copies of this one: a copy would have its locks, but not the threads that hold them.
-        context = multiprocessing.get_context("spawn")
-        alive, stop = context.Pipe(duplex=False)
-        pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker, initargs=(alive,))
-        with alive, stop, _one_thread_each():
-            try:
-                yield lambda jobs: _on_processes(pool, packed, jobs, AHEAD * workers)
-            except BaseException:
-                stop.close()  # nobody wants the rest: workers end at once, whatever they are doing
-                raise
-            finally:
-                pool.shutdown(wait=True, cancel_futures=True)
+        with _processes(workers) as executor:
+            ended = (
+                "a worker process ended before its work was done (killed, out of memory, or a script without "
+                "`if __name__ == '__main__':`); a checkpoint can be resumed"
+            )
+            yield Workers(executor, lambda: AHEAD * workers, {BrokenProcessPool: ended})
+
+
+class _ThisProcess(Executor):
+    """Evaluate a job when it is submitted."""
+
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        future: Future[Result] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+class _Processes(ProcessPoolExecutor):
+    """Processes that ignore interrupts of the terminal from their first instruction on."""
+
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        if not hasattr(signal, "pthread_sigmask"):
+            return super().submit(fn, *args, **kwargs)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which a process that starts inherits
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _processes(workers: int) -> Iterator[Executor]:
+    # New processes, not copies of this one: a copy would have its locks, but not the threads that hold them.
+    context = multiprocessing.get_context("spawn")
+    alive, stop = context.Pipe(duplex=False)
+    pool = _Processes(workers, mp_context=context, initializer=_begin_worker, initargs=(alive,))
+    with alive, stop, _one_thread_each():
+        try:
+            yield pool
+        except BaseException:
+            stop.close()  # nobody wants the rest: workers end at once, whatever they are doing
+            raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager
@@ -94,29 +162,8 @@ def _begin_worker(alive: Any) -> None:
     threading.Thread(target=end_with_it, daemon=True).start()
 
 
-def _submit(pool: ProcessPoolExecutor, packed: bytes, job: Job) -> Future[JobResult]:
-    """Submit a job; a worker that starts for it ignores interrupts of the terminal from its first instruction on."""
-    if not hasattr(signal, "pthread_sigmask"):
-        return pool.submit(evaluate, packed, job)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which a new process inherits
-    try:
-        return pool.submit(evaluate, packed, job)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _on_processes(pool: ProcessPoolExecutor, packed: bytes, jobs: Iterable[Job], most: int) -> Iterator[JobResult]:
-    try:
-        yield from _in_order(lambda job: _submit(pool, packed, job), jobs, lambda: most)
-    except BrokenProcessPool:
-        raise SolverError(
-            "a worker process ended before its work was done (killed, out of memory, or a script without "
-            "`if __name__ == '__main__':`); a checkpoint can be resumed"
-        ) from None
-
-
 @contextmanager
-def _cluster(address: str) -> Iterator[Any]:
+def _cluster(address: str) -> Iterator[Workers]:
     try:
         import distributed
         from distributed.comm.addressing import get_address_host
@@ -126,53 +173,25 @@ def _cluster(address: str) -> Iterator[Any]:
     try:
         # A client of something that is no address is never closed, which takes long and prints many lines.
         get_address_host(address)
-        client = distributed.Client(address, timeout=CONNECT_WITHIN, set_as_default=False)
+        client: Any = distributed.Client(address, timeout=CONNECT_WITHIN, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = "no answer" if isinstance(error, OSError) else "not an address"
         raise InputError(f"{accepted}, got {shown(address)} ({reason})") from None
+    ended = "the scheduler ended before the work was done; a checkpoint can be resumed"
+    failures: dict[type[Exception], str] = {
+        distributed.KilledWorker: "one job ended several workers of the scheduler (out of memory?); a checkpoint can "
+        "be resumed",
+        ModuleNotFoundError: "the scheduler's workers do not have {0.name!r}: install it there",
+        CancelledError: ended,
+        OSError: ended,
+    }
     try:
         try:
             client.wait_for_workers(1, timeout=WORKERS_WITHIN)
         except TimeoutError:
             raise InputError(f"scheduler must have a worker at least, got {shown(address)} without any") from None
-        yield client
+        # Not pure: Dask would take a hash of the job instead of a name of its own.
+        executor = client.get_executor(pure=False)
+        yield Workers(executor, lambda: AHEAD * max(sum(client.nthreads().values()), 1), failures)
     finally:
         client.close(timeout=CONNECT_WITHIN)
-
-
-def _on_cluster(client: Any, packed: bytes, jobs: Iterable[Job]) -> Iterator[JobResult]:
-    import distributed
-    from distributed import CancelledError
-
-    def threads() -> int:
-        """Return how many threads the workers have now: a cluster may grow and shrink."""
-        return AHEAD * max(sum(client.nthreads().values()), 1)
-
-    try:
-        # Not pure: Dask would take a hash of the job instead of a name of its own.
-        yield from _in_order(lambda job: client.submit(evaluate, packed, job, pure=False), jobs, threads)
-    except distributed.KilledWorker:
-        raise SolverError(
-            "one job ended several workers of the scheduler (out of memory?); a checkpoint can be resumed"
-        ) from None
-    except ModuleNotFoundError as error:
-        raise SolverError(f"the scheduler's workers do not have {error.name!r}: install towline there") from None
-    except (CancelledError, OSError):
-        raise SolverError("the scheduler ended before the work was done; a checkpoint can be resumed") from None
-
-
-def _in_order(submit: Callable[[Job], Any], jobs: Iterable[Job], most: Callable[[], int]) -> Iterator[JobResult]:
-    """Yield the results in the jobs' order, while the next jobs are being evaluated."""
-    under_way: deque[Any] = deque()
-    limit = most()
-    try:
-        for job in jobs:
-            under_way.append(submit(job))
-            if len(under_way) >= limit:
-                yield under_way.popleft().result()
-                limit = most()
-        while under_way:
-            yield under_way.popleft().result()
-    finally:
-        for future in under_way:
-            future.cancel()

@@ -1,4 +1,4 @@
-"""`sample`: evaluate a condition at 10^3 to 10^9 places of a robot; `save`: write the result."""
+"""`sample`: evaluate a condition at 10^3 to 10^9 places of a robot."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import nullcontext
-from importlib.util import find_spec
-from pathlib import Path
+from contextlib import nullcontext, suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,17 +16,16 @@ from .. import __version__
 from ..errors import InputError
 from ..inputs import file_path, flag, one_of, required, shown, whole_number
 from ..models import Robot
-from ..netcdf import Contents, save_netcdf
-from ..writing import whole_folder
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
+from .counting import Counter, count
+from .counts import Counts
+from .dataset import dataset
 from .domain import Domain
-from .execution import Evaluate, executor
-from .jobs import Job, RunSettings
+from .execution import Workers, start_workers
 from .refinement import Refinement
 from .region import Region
-from .sampling import CHUNK, Sampler, check_sampling
-from .totals import Totals
+from .sampling import CHUNK, Sampler, check_sampling, chunks_of, size_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +34,6 @@ KEEP = ("accepted", "all", "none")
 MOST_WORKERS = 1024
 MOST_POINTS = 10_000_000
 LARGEST_JOB = 8  # chunks
-OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # left out of files, which are the same whoever computed them
 
 Progress = Callable[[int, int, int], None]
 
@@ -75,9 +71,9 @@ def sample(
     samples
         Number of samples. A grid and adaptive refinement have at most this many.
     method
-        random; sobol or halton (low discrepancy); grid; adaptive: cells whose corners differ are halved.
+        random; sobol (low discrepancy); grid; adaptive: cells whose corners differ are halved.
     seed
-        Of the random streams, and of the scrambling of sobol and halton.
+        Of the random streams, and of the scrambling of sobol.
     size
         Of adaptive: edge below which cells are not halved any more [m]; default: as small as the samples allow.
     workers
@@ -156,126 +152,83 @@ def sample(
         "seed": int(seed),
     }
     total = int(samples) if sampler is None else sampler.samples
-    totals = Totals(domain, points_max if keep != "none" else 0)
-    packed = RunSettings(robot, condition, domain, sampler, keep, total).packed()
+    counter = Counter(condition, domain, sampler, keep, total)
+    counts = Counts(domain, points_max if keep != "none" else 0)
     header = _header(robot, {**requested, "samples": total, "size": size})
     opened = open_checkpoint(file, header, resume) if file is not None else nullcontext()
-    with executor(packed, workers, scheduler) as evaluate, opened as stored:
-        work = _Work(evaluate, totals, stored, progress, total)
+    if workers > 1 and scheduler is None:
+        counter.prepare()
+    with start_workers(workers, scheduler) as started, opened as stored:
+        run = _Run(counter, counts, started, stored, progress)
         if refinement is None:
-            assert sampler is not None
-            work.sample(sampler)
+            for _ in run.flags(total):
+                pass
         else:
-            work.refine(refinement)
-    result = totals.dataset(keep, method, refinement)
+            levels = refinement.levels()
+            points = next(levels)
+            with suppress(StopIteration):
+                while True:
+                    points = levels.send(np.concatenate(list(run.flags(len(points), points))))
+    result = dataset(counts, domain, keep, method, refinement)
     seconds = time.perf_counter() - start
     result.attrs = {
         **requested,
-        "samples": totals.tried,
-        "accepted": totals.accepted,
+        "samples": counts.tried,
+        "accepted": counts.accepted,
         "keep": keep,
         "towline": __version__,
         "seconds": seconds,
-        "poses_per_s": totals.tried / seconds,
+        "poses_per_s": counts.tried / seconds,
         "workers": "cluster" if scheduler is not None else str(workers),
     }
     return result
 
 
-def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save a result of `sample`, whole or not at all: as NetCDF, or as a Zarr folder if the path ends in .zarr.
-
-    `xarray.load_dataset` reads the one, `xarray.open_zarr` the other (extra `cluster`). Attributes of the run, such as
-    the seconds it took, are left out: equal results are equal NetCDF files.
-
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists already.
-    """
-    import xarray as xr
-
-    required("result", result, xr.Dataset)
-    path = file_path("file", file)
-    lasting = result.copy(deep=False)
-    lasting.attrs = {name: value for name, value in result.attrs.items() if name not in OF_THIS_RUN}
-    if path.suffix == ".zarr":
-        return _save_zarr(lasting, path)
-    compressed = [str(name) for name, variable in lasting.data_vars.items() if variable.size > CHUNK]
-    return save_netcdf(Contents.of(lasting), path, compressed)
-
-
-def _save_zarr(result: xr.Dataset, path: Path) -> Path:
-    if find_spec("zarr") is None:
-        raise InputError(f"file must end in .nc unless zarr is installed (pip install 'towline[cluster]'), got {path}")
-    with whole_folder(path) as temporary:
-        result.to_zarr(temporary, mode="w", zarr_format=2, consolidated=True)
-    return path
-
-
-class _Work:
-    """Evaluate the chunks of a run: those that the checkpoint has are read from it, the others are appended to it."""
+class _Run:
+    """Count chunk after chunk: those that the checkpoint has are counted from it, the others are appended to it."""
 
     def __init__(
-        self, evaluate: Evaluate, totals: Totals, checkpoint: Checkpoint | None, progress: Progress | None, total: int
+        self,
+        counter: Counter,
+        counts: Counts,
+        workers: Workers,
+        checkpoint: Checkpoint | None,
+        progress: Progress | None,
     ):
-        self._evaluate, self._totals, self._checkpoint = evaluate, totals, checkpoint
-        self._progress, self._total = progress, total
+        self._packed, self._total = counter.packed(), counter.samples
+        self._counts, self._workers, self._checkpoint, self._progress = counts, workers, checkpoint, progress
+        self._chunk = 0
 
-    def sample(self, sampler: Sampler) -> None:
-        """Evaluate all chunks of a sampler."""
-        together = _together(sampler.chunks)
+    def flags(self, samples: int, points: np.ndarray | None = None) -> Iterator[np.ndarray]:
+        """Count the next samples; yield which of them are accepted, (n,) of bool, chunk after chunk.
 
-        def jobs() -> Iterator[Job]:
-            for first in range(0, sampler.chunks, together):
-                chunks = range(first, min(first + together, sampler.chunks))
-                yield self._job(first, [sampler.size(chunk) for chunk in chunks], None)
-
-        for _ in self._flags(jobs(), 0):
-            pass
-
-    def refine(self, refinement: Refinement) -> None:
-        """Evaluate all levels of a refinement."""
-        levels = refinement.levels()
-        units = next(levels)
-        first = 0
-        while True:
-            pieces = np.split(units, range(CHUNK, len(units), CHUNK))
-
-            def jobs(pieces: list[np.ndarray] = pieces, first: int = first) -> Iterator[Job]:
-                together = _together(len(pieces))
-                for start in range(0, len(pieces), together):
-                    some = tuple(pieces[start : start + together])
-                    yield self._job(first + start, [len(piece) for piece in some], some)
-
-            flags = np.concatenate(list(self._flags(jobs(), first)))
-            first += len(pieces)
-            try:
-                units = levels.send(flags)
-            except StopIteration:
-                break
-
-    def _job(self, first: int, sizes: list[int], units: tuple[np.ndarray, ...] | None) -> Job:
-        known = [self._checkpoint.flags(first + i, n) if self._checkpoint else None for i, n in enumerate(sizes)]
-        return Job(first, tuple(known), units, self._totals.keeps_more)
-
-    def _flags(self, jobs: Iterator[Job], first: int) -> Iterator[np.ndarray]:
-        """Yield which samples were accepted, (n,) of bool, chunk after chunk."""
-        chunk = first
-        for result in self._evaluate(jobs):
-            self._totals.add(result)
-            for size, flags in zip(result.sizes, result.flags, strict=True):
+        Parameters
+        ----------
+        points
+            Of the unit cube, (samples, d); default: the sampler's.
+        """
+        for counts, chunks in self._workers.map(count, self._jobs(samples, points)):
+            self._counts.add(counts)
+            left = counts.tried
+            for flags in chunks:
+                size = min(CHUNK, left)
+                left -= size
                 if self._checkpoint:
-                    self._checkpoint.append(chunk, size, flags)
-                chunk += 1
+                    self._checkpoint.append(self._chunk, size, flags)
+                self._chunk += 1
                 yield np.unpackbits(np.frombuffer(flags, np.uint8), count=size).astype(bool)
             if self._progress is not None:
-                self._progress(self._totals.tried, self._total, self._totals.accepted)
+                self._progress(self._counts.tried, self._total, self._counts.accepted)
 
-
-def _together(chunks: int) -> int:
-    """Return how many chunks make a job: few enough that all workers have jobs, enough that sending them is cheap."""
-    return min(LARGEST_JOB, max(1, chunks // 64))
+    def _jobs(self, samples: int, points: np.ndarray | None) -> Iterator[tuple[Any, ...]]:
+        """Yield the arguments of `count`, a few chunks each: all workers have jobs, and sending them is cheap."""
+        first, chunks = self._chunk, chunks_of(samples)
+        together = min(LARGEST_JOB, max(1, chunks // 64))
+        for start in range(0, chunks, together):
+            some = range(start, min(start + together, chunks))
+            known = [self._checkpoint and self._checkpoint.flags(first + i, size_of(i, samples)) for i in some]
+            units = None if points is None else [points[i * CHUNK : (i + 1) * CHUNK] for i in some]
+            yield self._packed, first + start, known, units, self._counts.left > 0
 
 
 def _region(region: Region | Mapping[str, Any] | None) -> Region:

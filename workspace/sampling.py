@@ -1,8 +1,7 @@
 """Samplers: points of the unit cube in chunks, each chunk by itself, so that any process can compute any chunk.
 
-Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Low-discrepancy sequences,
-Sobol's (scipy's) and Halton's, are scrambled by the seed and advanced to where the chunk begins. A grid has the
-midpoints of equal cells.
+Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Sobol's sequence (scipy's) is
+scrambled by the seed and advanced to where the chunk begins. A grid has the midpoints of equal cells.
 """
 
 from __future__ import annotations
@@ -15,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..inputs import one_of, whole_number
-from .halton import halton
 
 CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
-METHODS = ("random", "sobol", "halton", "grid", "adaptive")
+METHODS = ("random", "sobol", "grid", "adaptive")
 MOST = 10**12  # samples
 MOST_SOBOL = 2**32
 
@@ -30,7 +28,7 @@ class Sampler:
     Attributes
     ----------
     method
-        random, sobol, halton or grid.
+        random, sobol or grid.
     requested
         Number of samples that was requested; a grid has at most this many, `samples`.
     extent
@@ -52,27 +50,26 @@ class Sampler:
         """Return the number of samples."""
         return int(np.prod(self.cells)) if self.cells else self.requested
 
-    @property
-    def chunks(self) -> int:
-        """Return the number of chunks."""
-        return -(-self.samples // CHUNK)
-
-    def size(self, chunk: int) -> int:
-        """Return the number of samples in a chunk; only the last chunk has fewer than `CHUNK`."""
-        return min(CHUNK, self.samples - chunk * CHUNK)
-
     def units(self, chunk: int) -> np.ndarray:
         """Return the points of a chunk, (n, d), between 0 and 1."""
-        count, dimension = self.size(chunk), len(self.extent)
+        count, dimension = size_of(chunk, self.samples), len(self.extent)
         if self.method == "random":
             key = np.array([self.seed, chunk], dtype=np.uint64)
             return np.random.Generator(np.random.Philox(key=key)).random((count, dimension))
         if self.method == "grid":
             index = np.unravel_index(np.arange(chunk * CHUNK, chunk * CHUNK + count), self.cells)
             return (np.stack(index, axis=1) + 0.5) / np.array(self.cells)
-        if self.method == "halton":
-            return halton(chunk * CHUNK, count, dimension, self.seed)
         return _sobol(dimension, self.seed).points(chunk * CHUNK)[:count]
+
+
+def chunks_of(samples: int) -> int:
+    """Return the number of chunks that samples make."""
+    return -(-samples // CHUNK)
+
+
+def size_of(chunk: int, samples: int) -> int:
+    """Return the number of samples in a chunk; only the last chunk has fewer than `CHUNK`."""
+    return min(CHUNK, samples - chunk * CHUNK)
 
 
 def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:

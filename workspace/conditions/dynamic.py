@@ -29,7 +29,7 @@ class Dynamic(Condition):
         min_length=1, description="second derivatives of (x, y, z, roll, pitch, yaw) [m/s^2, rad/s^2]"
     )
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         accelerations = np.array(self.accelerations) * robot.dof_mask
         wrenches = dynamics_of(robot).required_wrench(places.pose, np.zeros(6), accelerations[:, None])
         return feasible(robot, places, wrenches)

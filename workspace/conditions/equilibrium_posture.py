@@ -43,7 +43,7 @@ class EquilibriumPosture(Condition):
 
     kind: Literal["equilibrium-posture"] = "equilibrium-posture"
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         pose, tensions = self.postures(robot, places)
         if robot.m <= 3:
             low, high = robot.t_min, robot.t_max

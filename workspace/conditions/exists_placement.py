@@ -46,7 +46,7 @@ class ExistsPlacement(Condition):
     )
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of the placements")
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         boxes = reach_boxes(robot)
         mobile = [i for i, c in enumerate(robot.carriers) if c.name in boxes and c.free_coordinates(robot.drive)]
         if not mobile and not self.turn:

@@ -23,7 +23,7 @@ class ForceBalance(Condition):
 
     kind: Literal["force-balance"] = "force-balance"
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         return feasible(robot, places, rest_wrench(robot)[None], wrench_rows(robot, forces_only=True))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:

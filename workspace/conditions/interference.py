@@ -44,7 +44,7 @@ class Interference(Condition):
     obstacles: tuple[Obstacle, ...] = Field(default=(), description="spheres, capsules and boxes in {G}")
     clearance: NonNegative = Field(default=0.0, description="minimum distance between cables and obstacles [m]")
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         with np.errstate(over="ignore", invalid="ignore"):  # of places that are far too far away
             return self._free(robot, places)
 

@@ -31,12 +31,12 @@ class Lengths(Condition):
         if self.max is None:
             return self
         least, most = np.atleast_1d(self.min), np.atleast_1d(self.max)
-        # If min and max have different numbers of cables, one of them does not fit the robot: `_holds` reports it.
+        # If min and max have different numbers of cables, one of them does not fit the robot: `evaluate` reports it.
         if (1 in (least.size, most.size) or least.size == most.size) and np.greater(least, most).any():
             raise ValueError(f"min must not exceed max, {self.max} m, got {self.min} m")
         return self
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         for name, value in (("min", self.min), ("max", self.max)):
             if isinstance(value, tuple) and len(value) != robot.m:
                 raise InputError(f"lengths.{name} must have one number or {robot.m}, one a cable, got {len(value)}")

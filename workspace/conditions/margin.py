@@ -23,7 +23,7 @@ class Margin(Condition):
     kind: Literal["margin"] = "margin"
     above: Finite = Field(default=0.0, description="minimum of the margin [N]")
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         return self.margins(robot, places) >= self.above
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:

@@ -19,7 +19,7 @@ class StaticEquilibrium(Condition):
 
     kind: Literal["static-equilibrium"] = "static-equilibrium"
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         return feasible(robot, places, rest_wrench(robot)[None])
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:

@@ -25,7 +25,7 @@ class WrenchClosure(Condition):
 
     kind: Literal["wrench-closure"] = "wrench-closure"
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         rows = wrench_rows(robot)
         held = np.zeros(len(places), dtype=bool)
         if robot.m <= rows.size:

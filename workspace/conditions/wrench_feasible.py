@@ -55,7 +55,7 @@ class WrenchFeasible(Condition):
         assert self.box is not None
         return np.array(list(product(*[sorted({low, high}) for low, high in zip(*self.box, strict=True)])))
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         return feasible(robot, places, self._wrenches(robot))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:

@@ -28,7 +28,7 @@ class WrenchWithTolerance(Condition):
     kind: Literal["wrench-with-tolerance"] = "wrench-with-tolerance"
     tolerance: NonNegative = Field(description="largest wrench error, moments divided by the robot's length [N]")
 
-    def _holds(self, robot: Robot, places: Places) -> np.ndarray:
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         return self.error(robot, places) <= self.tolerance
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:

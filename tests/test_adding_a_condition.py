@@ -1,0 +1,94 @@
+"""The page on adding a condition: its example runs, also from the command line, resumed, and by several workers."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from towline.models import Dynamics, load
+from towline.workspace import Condition, Places, StaticEquilibrium, sample
+
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "adding-a-condition.md").read_text()
+TOWLINE = Path(sys.executable).with_name("towline")
+HIGH = '{"kind": "above-ground", "height": 0.3}'
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert code.count("\n") <= 30
+    (tmp_path / "conditions_of_mine.py").write_text(code)
+    return tmp_path
+
+
+def run(folder, *command):
+    done = subprocess.run([str(part) for part in command], cwd=folder, capture_output=True, text=True, check=False)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+def test_the_example_runs_and_resumes(folder):
+    """What it accepts is at rest and above the ground, computed here by another way."""
+    done = run(folder, sys.executable, "conditions_of_mine.py")
+    both, lowest, high = done.stdout.split()
+    robot = load("cogiro")
+    found = sample(robot, StaticEquilibrium(), samples=40_000, keep="all")
+    poses = np.tile(robot.home, (40_000, 1))
+    poses[:, :3] = found["position"].values
+    heights = Dynamics(robot).points(poses)[1][:, :, 2].min(axis=1)
+    assert int(high) == np.count_nonzero(heights >= 0.3)
+    rest = found["accepted"].values.astype(bool)
+    assert int(both) == np.count_nonzero(rest & (heights >= 0.3))
+    assert 0 < int(both) < min(int(high), rest.sum())
+    assert float(lowest) == poses[rest & (heights >= 0.3), 2].min()
+
+    checkpoint = folder / "run.checkpoint"
+    whole = checkpoint.read_bytes()
+    checkpoint.write_bytes(whole[: len(whole) // 2])
+    command = [TOWLINE, "workspace", "cogiro", "--define", "conditions_of_mine.py", "--samples", "40000", "--json"]
+    command += ["--condition", "static-equilibrium", "--condition", HIGH]
+    done = run(folder, *command, "--resume", "run.checkpoint", "--workers", "2")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["accepted"] == int(both)
+    assert checkpoint.read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "message"),
+    [
+        ("nowhere.py", None, "No module named 'nowhere'"),
+        ("json.py", "x = 1", "another module of that name"),
+        ("broken.py", "x =", "SyntaxError"),
+        ("raising.py", "raise OSError('disk\\nand more')", "OSError: disk"),
+    ],
+)
+def test_a_file_that_cannot_be_imported_is_one_line(tmp_path, file, text, message):
+    if text is not None:
+        (tmp_path / file).write_text(text)
+    done = run(tmp_path, TOWLINE, "workspace", "cogiro", "--define", file, "--condition", HIGH)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"towline: --define must be a Python file that can be imported, got {file} (")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_every_condition_is_on_the_pages():
+    """The registry is the list of the conditions; the pages are checked against it."""
+    names = {kind: one for kind, one in Condition.kinds.items() if one.__module__.startswith("towline.")}
+    table, reference = ((ROOT / "docs" / page).read_text() for page in ("workspace.md", "api/workspace.md"))
+    assert len(names) == 13
+    for kind, one in names.items():
+        assert f"::: towline.workspace.{one.__name__}\n" in reference
+        assert kind in ("all", "any") or f"`{one.__name__}" in table
+
+
+def test_a_condition_holds_nowhere_where_a_number_is_not_finite():
+    robot = load("wang-flying")
+    poses = np.tile(robot.home, (2, 1))
+    poses[1, 0] = np.nan
+    assert StaticEquilibrium().holds(robot, Places.at_home(robot, poses)).tolist() == [True, False]

@@ -1,0 +1,119 @@
+"""Count accepted samples chunk by chunk, in whatever process: `Counter`.
+
+The result for the same samples is the same to the last bit whichever process computes it. Chunks whose flags are known
+already, from a checkpoint, are counted again without evaluating the condition.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from .. import processors
+from ..solvers import compiled
+from .condition import Condition
+from .counts import Counts
+from .domain import Domain
+from .feasibility import load_kernels
+from .sampling import Sampler
+
+WORTH_KERNELS = 500_000  # samples of a run: the first kernels on a machine take a minute, saving 20 us a sample
+
+
+@dataclass(frozen=True)
+class Counter:
+    """Count where a condition holds among the samples of a domain.
+
+    Attributes
+    ----------
+    sampler
+        None if the points of each chunk are given.
+    keep
+        Which samples are kept: accepted, all or none.
+    samples
+        Of the run, the maximum.
+    """
+
+    condition: Condition
+    domain: Domain
+    sampler: Sampler | None
+    keep: str
+    samples: int
+
+    def packed(self) -> bytes:
+        """Return it as bytes, to be sent to other processes with every job."""
+        return pickle.dumps(self)
+
+    def prepare(self) -> None:
+        """Compile the kernels of a large run once, before its processes start: each would compile them for itself."""
+        if self.samples >= WORTH_KERNELS:
+            compiled.keep()
+
+    def chunk(self, counts: Counts, units: np.ndarray, known: bytes | None, keep: bool) -> bytes:
+        """Add the points of a chunk (n, d) to counts; return which of them are accepted, one bit a sample.
+
+        Parameters
+        ----------
+        known
+            The bits where they are known already.
+        keep
+            Whether samples are kept and not only counted.
+        """
+        places, exists = self.domain.places(units)
+        if known is None:
+            held = np.asarray(self.condition.holds(self.domain.robot, places), dtype=bool) & exists
+        else:
+            held = np.unpackbits(np.frombuffer(known, np.uint8), count=len(units)).astype(bool)
+        counts.count(self.domain, places, exists, held)
+        if keep and self.keep != "none":
+            rows = slice(None) if self.keep == "all" else held
+            counts.keep(self.domain.numbers(places.only(rows)), held[rows])
+        return np.packbits(held).tobytes()
+
+
+def count(
+    packed: bytes, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
+) -> tuple[Counts, list[bytes]]:
+    """Count some chunks, one after the other, with one processor.
+
+    Parameters
+    ----------
+    packed
+        From `Counter.packed`.
+    first
+        Number of the first chunk.
+    known
+        Of each chunk: its bits where they are known already, else None.
+    points
+        Of each chunk: points of the unit cube (n, d); default: the sampler's.
+    keep
+        Whether samples are kept and not only counted.
+
+    Returns
+    -------
+    The counts, and of each chunk which samples are accepted, one bit a sample.
+    """
+    counter = _unpacked(packed)
+    counts, flags = Counts(counter.domain), []
+    with processors.at_most(1):
+        for offset, bits in enumerate(known):
+            if points is not None:
+                units = points[offset]
+            else:
+                assert counter.sampler is not None
+                units = counter.sampler.units(first + offset)
+            flags.append(counter.chunk(counts, units, bits, keep))
+    return counts, flags
+
+
+@lru_cache(maxsize=2)
+def _unpacked(packed: bytes) -> Counter:
+    """Unpack once for all jobs of a run, and load the kernels for a large run; the bits do not depend on it."""
+    counter: Counter = pickle.loads(packed)
+    if counter.samples >= WORTH_KERNELS:
+        load_kernels(counter.domain.robot)
+    return counter

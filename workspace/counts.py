@@ -1,0 +1,81 @@
+"""`Counts`: how many samples were tried and accepted, where, and the first of them; counts of more can be added."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from .domain import THINNEST, Domain
+from .places import Places
+
+RESOLUTION = 32  # cells along each axis
+
+
+class Counts:
+    """Numbers of samples so far. They are added in the order of the samples, so that nothing depends on timing.
+
+    Attributes
+    ----------
+    tried
+        Number of samples.
+    cells
+        Samples tried and accepted in each cell of the box of positions, (2, nx, ny, nz); an axis along which the box
+        has no thickness has one cell. Samples without a place are in no cell.
+    low, high
+        Bounds of the accepted positions, (3,) [m]; infinite where there are none.
+    samples, flags
+        Arrays of the samples that are kept, (n, k) as `Domain.numbers` returns them, and of whether each was accepted.
+    left
+        How many samples more may be kept.
+    """
+
+    def __init__(self, domain: Domain, points_max: int = sys.maxsize):
+        low, high = domain.box
+        self.tried, self.left = 0, points_max
+        self.cells = np.zeros((2, *np.where(high - low > THINNEST, RESOLUTION, 1)), dtype=np.int64)
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+        self.samples: list[np.ndarray] = []
+        self.flags: list[np.ndarray] = []
+
+    @property
+    def accepted(self) -> int:
+        """Return the number of accepted samples."""
+        return int(self.cells[1].sum())
+
+    def count(self, domain: Domain, places: Places, exists: np.ndarray, held: np.ndarray) -> None:
+        """Count samples by their places, whether there is such a place, and whether it is accepted, (n,) of bool."""
+        position = places.pose[:, :3]
+        index = _cell(position, domain, self.cells.shape[1:])
+        for cells, some in zip(self.cells, (index[exists], index[held]), strict=True):
+            cells += np.bincount(some, minlength=cells.size).reshape(cells.shape)
+        if held.any():
+            self.low = np.minimum(self.low, position[held].min(axis=0))
+            self.high = np.maximum(self.high, position[held].max(axis=0))
+        self.tried += len(places)
+
+    def keep(self, samples: np.ndarray, flags: np.ndarray) -> None:
+        """Keep samples (n, k) and whether each was accepted (n,), as many as there may still be."""
+        self.samples.append(samples[: self.left])
+        self.flags.append(flags[: self.left])
+        self.left -= len(self.samples[-1])
+
+    def add(self, other: Counts) -> None:
+        """Add the counts of the samples that come next."""
+        self.tried += other.tried
+        self.cells += other.cells
+        self.low, self.high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
+        for samples, flags in zip(other.samples, other.flags, strict=True):
+            self.keep(samples, flags)
+
+
+def _cell(position: np.ndarray, domain: Domain, cells: tuple[int, ...]) -> np.ndarray:
+    """Return the index of the cell that each position is in, (n,); positions outside of the box go to its border."""
+    low, high = domain.box
+    index = np.zeros(len(position), dtype=np.int32)
+    for axis, count in enumerate(cells):
+        along = np.zeros_like(index)
+        if count > 1:
+            along = ((position[:, axis] - low[axis]) * (count / (high[axis] - low[axis]))).astype(np.int32)
+        index = index * count + np.clip(along, 0, count - 1)
+    return index
