@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
-from typing import Any, overload
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..inputs import flag, required
-from . import elasticity, forward, kinematics, points, rigid_body, wind
-from .arrays import Array, Symbol
+from . import elasticity, points
+from .arrays import Array, one_array, several_arrays
 from .batch import arrays, call, is_symbolic
-from .cables.pulley import Exit
 from .files import as_robot
-from .functions import Functions
+from .motion import Motion
 from .relative_dynamics import RelativeDynamics
 from .robot import Robot
+from .world_functions import WorldFunctions
 
 
 def dynamics_of(robot: Robot) -> Dynamics:
@@ -58,16 +58,14 @@ class Dynamics:
 
     def __init__(self, robot: Robot | str | os.PathLike[str]):
         self.robot = as_robot(robot)
-        self.functions: Mapping[str, ca.Function] = _world_functions(self.robot)
+        self._functions = WorldFunctions(self.robot)
+        self.functions: Mapping[str, ca.Function] = self._functions
 
     def __reduce__(self) -> tuple[type[Dynamics], tuple[Robot]]:
         """Pickle the robot alone: its functions are built again."""
         return Dynamics, (self.robot,)
 
-    @overload
-    def wrench_matrix(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
-    @overload
-    def wrench_matrix(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray: ...
+    @one_array
     def wrench_matrix(self, pose: Array, carrier_pose: Array | None = None) -> Array:
         """Return the wrench matrix A, (..., 6, m), in {G}.
 
@@ -81,24 +79,18 @@ class Dynamics:
             The same of each carrier, (..., c, 6); default: at home.
         """
         arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
-        return call(self.functions["wrench_matrix"], arguments, matrices=("A",))["A"]
+        return call(self._functions.wrench_matrix, arguments, matrices=("A",))["A"]
 
-    @overload
-    def cable_lengths(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
-    @overload
-    def cable_lengths(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray: ...
+    @one_array
     def cable_lengths(self, pose: Array, carrier_pose: Array | None = None) -> Array:
         """Return the distance from anchor to attachment of each cable [m], (..., m). Arguments as in `wrench_matrix`.
 
         Over a pulley it is the length of the cable from the anchor around the sheave to the attachment.
         """
         arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
-        return call(self.functions["cable_lengths"], arguments)["lengths"]
+        return call(self._functions.cable_lengths, arguments)["lengths"]
 
-    @overload
-    def points(self, pose: Symbol, carrier_pose: Array | None = None) -> tuple[Symbol, Symbol]: ...
-    @overload
-    def points(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]: ...
+    @several_arrays
     def points(self, pose: Array, carrier_pose: Array | None = None) -> tuple[Array, Array]:
         """Return the anchors and the attachments of the cables in {G}, (..., m, 3) each [m].
 
@@ -106,50 +98,26 @@ class Dynamics:
         """
         carriers = self._carriers(carrier_pose)
         if is_symbolic(pose) or is_symbolic(carriers):
-            result = call(self._points, {"pose": pose, "carrier_pose": carriers})
+            result = call(self._functions.points, {"pose": pose, "carrier_pose": carriers})
             return result["anchors"], result["attachments"]
-        pose, carriers = arrays({"pose": (pose, (6,)), "carrier_pose": (carriers, (self._count, 6))})
+        pose, carriers = arrays({"pose": (pose, (6,)), "carrier_pose": (carriers, (len(self.robot.carriers), 6))})
         both = points.anchors(self.robot, carriers), points.attachments(self.robot, pose)
         if both[0].shape == both[1].shape:
             return both
         shape = np.broadcast_shapes(both[0].shape, both[1].shape)
         return np.broadcast_to(both[0], shape).copy(), np.broadcast_to(both[1], shape).copy()
 
-    @overload
-    def exits(self, pose: Symbol, carrier_pose: Array | None = None) -> Symbol: ...
-    @overload
-    def exits(self, pose: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray: ...
+    @one_array
     def exits(self, pose: Array, carrier_pose: Array | None = None) -> Array:
         """Return where each cable leaves its pulley in {G}, (..., m, 3) [m]; the anchor of a cable without a pulley.
 
         Arguments as in `wrench_matrix`. The exit is nan for an attachment inside the sheave, where no cable is tangent.
         """
         if is_symbolic(pose) or self.robot.pulley_radii.any():
-            return call(self._exits, {"pose": pose, "carrier_pose": self._carriers(carrier_pose)})["exits"]
+            return call(self._functions.exits, {"pose": pose, "carrier_pose": self._carriers(carrier_pose)})["exits"]
         return self.points(pose, carrier_pose)[0]
 
-    @overload
-    def required_wrench(
-        self,
-        pose: Symbol,
-        velocity: Array,
-        acceleration: Array,
-        carrier_pose: Array | None = None,
-        carrier_velocity: Array | None = None,
-        carrier_acceleration: Array | None = None,
-        wind: Array | None = None,
-    ) -> Symbol: ...
-    @overload
-    def required_wrench(
-        self,
-        pose: ArrayLike,
-        velocity: ArrayLike,
-        acceleration: ArrayLike,
-        carrier_pose: ArrayLike | None = None,
-        carrier_velocity: ArrayLike | None = None,
-        carrier_acceleration: ArrayLike | None = None,
-        wind: ArrayLike | None = None,
-    ) -> np.ndarray: ...
+    @one_array
     def required_wrench(
         self,
         pose: Array,
@@ -180,47 +148,22 @@ class Dynamics:
         InputError
             If an argument has a wrong shape or value, or wind is given and the robot's file has no `platform.aero`.
         """
-        arguments = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
-        given = {
-            "carrier_pose": carrier_pose,
-            "carrier_velocity": carrier_velocity,
-            "carrier_acceleration": carrier_acceleration,
-        }
-        arguments |= {name: np.zeros((self._count, 6)) if value is None else value for name, value in given.items()}
+        motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
+        arguments = motion.arguments(self.robot.carrier_home)
         if wind is None:
-            return call(self.functions["required_wrench"], arguments)["w"]
-        return call(self._in_wind, arguments | {"wind": wind})["w"]
+            return call(self._functions.required_wrench, arguments)["w"]
+        return call(self._functions.required_wrench_in_wind, arguments | {"wind": wind})["w"]
 
-    @overload
-    def aerodynamic_wrench(self, pose: Symbol, velocity: Array, wind: Array) -> Symbol: ...
-    @overload
-    def aerodynamic_wrench(self, pose: ArrayLike, velocity: ArrayLike, wind: ArrayLike) -> np.ndarray: ...
+    @one_array
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
         """Return W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`.
 
         Arguments as in `required_wrench`.
         """
         arguments = {"pose": pose, "velocity": velocity, "wind": wind}
-        return call(self._aerodynamic, arguments)["W_e"]
+        return call(self._functions.aerodynamic_wrench, arguments)["W_e"]
 
-    @overload
-    def acceleration(
-        self,
-        pose: Symbol,
-        velocity: Array,
-        tensions: Array,
-        carrier_pose: Array | None = None,
-        wind: Array | None = None,
-    ) -> Symbol: ...
-    @overload
-    def acceleration(
-        self,
-        pose: ArrayLike,
-        velocity: ArrayLike,
-        tensions: ArrayLike,
-        carrier_pose: ArrayLike | None = None,
-        wind: ArrayLike | None = None,
-    ) -> np.ndarray: ...
+    @one_array
     def acceleration(
         self,
         pose: Array,
@@ -245,31 +188,10 @@ class Dynamics:
         arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
         arguments["carrier_pose"] = self._carriers(carrier_pose)
         if wind is None:
-            return call(self.functions["acceleration"], arguments)["acceleration"]
-        return call(self._acceleration_in_wind, arguments | {"wind": wind})["acceleration"]
+            return call(self._functions.acceleration, arguments)["acceleration"]
+        return call(self._functions.acceleration_in_wind, arguments | {"wind": wind})["acceleration"]
 
-    @overload
-    def coupled_acceleration(
-        self,
-        pose: Symbol,
-        velocity: Array,
-        carrier_pose: Array,
-        carrier_velocity: Array,
-        tensions: Array,
-        thrust: Array,
-        torque: Array,
-    ) -> tuple[Symbol, Symbol]: ...
-    @overload
-    def coupled_acceleration(
-        self,
-        pose: ArrayLike,
-        velocity: ArrayLike,
-        carrier_pose: ArrayLike,
-        carrier_velocity: ArrayLike,
-        tensions: ArrayLike,
-        thrust: ArrayLike,
-        torque: ArrayLike,
-    ) -> tuple[np.ndarray, np.ndarray]: ...
+    @several_arrays
     def coupled_acceleration(
         self,
         pose: Array,
@@ -308,17 +230,10 @@ class Dynamics:
             "thrust": thrust,
             "torque": torque,
         }
-        result = call(self._coupled, arguments)
+        result = call(self._functions.coupled_acceleration, arguments)
         return result["acceleration"], result["carrier_acceleration"]
 
-    @overload
-    def linearise(
-        self, pose: Symbol, velocity: Array, tensions: Array, carrier_pose: Array | None = None
-    ) -> tuple[Symbol, Symbol]: ...
-    @overload
-    def linearise(
-        self, pose: ArrayLike, velocity: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None
-    ) -> tuple[np.ndarray, np.ndarray]: ...
+    @several_arrays
     def linearise(
         self, pose: Array, velocity: Array, tensions: Array, carrier_pose: Array | None = None
     ) -> tuple[Array, Array]:
@@ -333,17 +248,10 @@ class Dynamics:
         """
         arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
         arguments["carrier_pose"] = self._carriers(carrier_pose)
-        result = call(self._linearisation, arguments, matrices=("B",))
+        result = call(self._functions.linearisation, arguments, matrices=("B",))
         return result["A"], result["B"]
 
-    @overload
-    def stiffness(
-        self, pose: Symbol, tensions: Array, carrier_pose: Array | None = None, elastic: bool = True
-    ) -> Symbol: ...
-    @overload
-    def stiffness(
-        self, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None, elastic: bool = True
-    ) -> np.ndarray: ...
+    @one_array
     def stiffness(self, pose: Array, tensions: Array, carrier_pose: Array | None = None, elastic: bool = True) -> Array:
         """Return the stiffness K about the CoM in {G}, (..., 6, 6) [N/m, N, N m].
 
@@ -372,7 +280,8 @@ class Dynamics:
                         f"{self.robot.name!r}; elastic=False needs no stiffness"
                     )
         arguments = {"pose": pose, "tensions": tensions, "carrier_pose": self._carriers(carrier_pose)}
-        return call(self._stiffness if elastic else self._tension_stiffness, arguments)["K"]
+        functions = self._functions
+        return call(functions.stiffness if elastic else functions.tension_stiffness, arguments)["K"]
 
     def natural_frequencies(
         self, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None, elastic: bool = False
@@ -423,154 +332,5 @@ class Dynamics:
         """
         return RelativeDynamics(self.robot)
 
-    @property
-    def _count(self) -> int:
-        return len(self.robot.carriers)
-
     def _carriers(self, carrier_pose: Array | None) -> Array:
         return self.robot.carrier_home if carrier_pose is None else carrier_pose
-
-    @cached_property
-    def _points(self) -> ca.Function:
-        symbols = _symbols(self.robot, ["pose", "carrier_pose"])
-        pose, carriers = symbols
-        anchors = kinematics.anchors(self.robot.anchors, self.robot.carrier_of_cable, carriers)
-        outputs = [anchors.T, kinematics.transform(pose, self.robot.attachments).T]
-        return ca.Function("points", symbols, outputs, ["pose", "carrier_pose"], ["anchors", "attachments"])
-
-    @cached_property
-    def _exits(self) -> ca.Function:
-        symbols = _symbols(self.robot, ["pose", "carrier_pose"])
-        exits = _run(self.robot, *symbols).points.T
-        return ca.Function("exits", symbols, [exits], ["pose", "carrier_pose"], ["exits"])
-
-    @cached_property
-    def _acceleration_in_wind(self) -> ca.Function:
-        names = ["pose", "velocity", "tensions", "carrier_pose"]
-        symbols = _symbols(self.robot, names)
-        pose, velocity, tensions, carriers = symbols
-        air = ca.SX.sym("wind", 3)
-        pull = self.wrench_matrix(pose, carriers) @ tensions
-        wrench = pull + wind.aerodynamic_wrench(self.robot, pose, velocity, air)
-        acceleration = forward.platform_acceleration(self.robot, pose, velocity, wrench)
-        return ca.Function("acceleration_in_wind", [*symbols, air], [acceleration], [*names, "wind"], ["acceleration"])
-
-    @cached_property
-    def _coupled(self) -> ca.Function:
-        robot = self.robot
-        names = ["pose", "velocity", "tensions", "carrier_pose", "carrier_velocity"]
-        symbols = _symbols(robot, names)
-        pose, velocity, tensions, carriers, rates = symbols
-        thrust, torque = ca.SX.sym("thrust", self._count), ca.SX.sym("torque", self._count, 3)
-        A, run = self.wrench_matrix(pose, carriers), _run(robot, pose, carriers)
-        accelerations = []
-        for index, carrier in enumerate(robot.carriers):
-            at, rate = carriers[index, :].T, rates[index, :].T
-            pull = forward.pull_on_carrier(robot, index, run, at, tensions)
-            own = carrier.acceleration(at, rate, thrust[index], torque[index, :].T, pull, np.array(robot.gravity))
-            accelerations.append(ca.SX.zeros(1, 6) if own is None else own.T)
-        acceleration = forward.platform_acceleration(robot, pose, velocity, A @ tensions)
-        outputs = [acceleration, ca.vertcat(*accelerations)]
-        return ca.Function(
-            "coupled_acceleration",
-            [*symbols, thrust, torque],
-            outputs,
-            [*names, "thrust", "torque"],
-            ["acceleration", "carrier_acceleration"],
-        )
-
-    @cached_property
-    def _linearisation(self) -> ca.Function:
-        names = ["pose", "velocity", "tensions", "carrier_pose"]
-        symbols = _symbols(self.robot, names)
-        pose, velocity, tensions, carriers = symbols
-        state = ca.vertcat(pose, velocity)
-        rate = ca.vertcat(velocity, self.acceleration(pose, velocity, tensions, carriers))
-        outputs = [ca.densify(ca.jacobian(rate, state)), ca.densify(ca.jacobian(rate, tensions))]
-        return ca.Function("linearisation", symbols, outputs, names, ["A", "B"])
-
-    @cached_property
-    def _tension_stiffness(self) -> ca.Function:
-        names = ["pose", "tensions", "carrier_pose"]
-        symbols = _symbols(self.robot, names)
-        pose, tensions, carriers = symbols
-        owner = self.robot.carrier_of_cable
-        anchors = kinematics.anchors(self.robot.anchors, owner, carriers)
-        axes = kinematics.axes(self.robot.pulley_axes, owner, carriers)
-        K = elasticity.tension_stiffness(self.robot, pose, anchors, axes, tensions)
-        return ca.Function("tension_stiffness", symbols, [K], names, ["K"])
-
-    @cached_property
-    def _stiffness(self) -> ca.Function:
-        names = ["pose", "tensions", "carrier_pose"]
-        symbols = _symbols(self.robot, names)
-        pose, tensions, carriers = symbols
-        A, lengths = self.wrench_matrix(pose, carriers), self.cable_lengths(pose, carriers)
-        K = self._tension_stiffness(*symbols) + elasticity.cable_stiffness(self.robot, A, lengths, tensions)
-        return ca.Function("stiffness", symbols, [K], names, ["K"])
-
-    @cached_property
-    def _aerodynamic(self) -> ca.Function:
-        pose, velocity, air = ca.SX.sym("pose", 6), ca.SX.sym("velocity", 6), ca.SX.sym("wind", 3)
-        W_e = wind.aerodynamic_wrench(self.robot, pose, velocity, air)
-        return ca.Function("aerodynamic_wrench", [pose, velocity, air], [W_e], ["pose", "velocity", "wind"], ["W_e"])
-
-    @cached_property
-    def _in_wind(self) -> ca.Function:
-        still = self.functions["required_wrench"]
-        inputs = [ca.SX.sym(name, *still.size_in(name)) for name in still.name_in()]
-        air = ca.SX.sym("wind", 3)
-        w = still(*inputs) - self._aerodynamic(inputs[0], inputs[1], air)
-        return ca.Function("required_wrench_in_wind", [*inputs, air], [w], [*still.name_in(), "wind"], ["w"])
-
-
-def _symbols(robot: Robot, names: list[str]) -> list[ca.SX]:
-    """Make symbols of the shapes that these arguments have."""
-    count = len(robot.carriers)
-    shapes = {"tensions": (robot.m, 1)}
-    return [ca.SX.sym(name, *shapes.get(name, (count, 6) if name.startswith("carrier") else (6, 1))) for name in names]
-
-
-def _run(robot: Robot, pose: ca.SX, carriers: ca.SX) -> Exit:
-    """Compute how the cables run in {G}."""
-    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, carriers)
-    axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, carriers)
-    return kinematics.cables(robot.attachments, pose, anchors, axes, robot.pulley_radii)
-
-
-def _world_functions(robot: Robot) -> Functions:
-    names = ["pose", "velocity", "acceleration", "carrier_pose", "carrier_velocity", "carrier_acceleration"]
-    motion = _symbols(robot, names)
-    pose, velocity, acceleration, carriers = motion[:4]
-    place = [pose, carriers], ["pose", "carrier_pose"]
-
-    def matrix() -> ca.SX:
-        directions = _run(robot, pose, carriers).directions
-        return kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, directions)
-
-    def wrench_matrix() -> ca.Function:
-        return ca.Function("wrench_matrix", place[0], [matrix()], place[1], ["A"])
-
-    def cable_lengths() -> ca.Function:
-        return ca.Function("cable_lengths", place[0], [_run(robot, pose, carriers).lengths], place[1], ["lengths"])
-
-    def required_wrench() -> ca.Function:
-        w = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)
-        return ca.Function("required_wrench", motion, [w], names, ["w"])
-
-    def forward_acceleration() -> ca.Function:
-        (tensions,) = _symbols(robot, ["tensions"])
-        result = forward.platform_acceleration(robot, pose, velocity, matrix() @ tensions)
-        state_names = ["pose", "velocity", "tensions", "carrier_pose"]
-        return ca.Function(
-            "acceleration", [pose, velocity, tensions, carriers], [result], state_names, ["acceleration"]
-        )
-
-    return Functions(
-        {
-            "wrench_matrix": wrench_matrix,
-            "cable_lengths": cable_lengths,
-            "required_wrench": required_wrench,
-            "acceleration": forward_acceleration,
-        }
-    )
