@@ -17,7 +17,7 @@ from .solvers.solution import TensionSolution
 
 if TYPE_CHECKING:
     from .models.dynamics import Dynamics
-    from .solvers.method import Method
+    from .solvers.methods.method import Method
 
 __all__ = ["pose_problem", "tensions", "wrench_problem"]
 
@@ -64,7 +64,7 @@ def tensions(
     """
     from .models.dynamics import dynamics_of
     from .models.files import as_robot
-    from .solvers.registry import solve
+    from .solvers.solve import solve
 
     moving = (velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
     problem = pose_problem(dynamics_of(as_robot(robot)), pose, *moving, wind=wind, t_ref=t_ref)

@@ -165,7 +165,7 @@ def _towline_soft_batch(task: Task) -> Batch:
 
 
 def _towline_kernel(task: Task) -> Single:
-    kernel = compiled.load().solve_packed
+    kernel = compiled.load().one
     packed = [problem.packed for problem in task.problems]
     n, size = task.problems[0].A.shape
 

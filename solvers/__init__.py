@@ -9,12 +9,13 @@ from .casadi_form import casadi_function
 from .certificate import Certificate, certify
 from .derivatives import sensitivity
 from .margin import Margin, capacity_margin
-from .method import Method, Proposal
+from .methods.method import Method, Proposal
 from .problem import TensionProblem
 from .rate import limit_rate
-from .registry import methods, solve
-from .solution import Status, TensionSolution
+from .solution import TensionSolution
+from .solve import methods, solve
 from .standard_form import StandardForm
+from .status import Status
 
 __all__ = [
     "BatchSolution",

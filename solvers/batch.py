@@ -12,20 +12,17 @@ from .. import processors
 from ..errors import InputError
 from ..inputs import number, real_array, shown, whole_number
 from . import compiled
+from .kernels.codes import INACCURATE, INVALID, OPTIMAL, UNSURE
 from .problem import TensionProblem
-from .registry import solve
-from .solution import Status, TensionSolution
+from .solution import TensionSolution
+from .solve import solve
+from .status import STATUSES, Status
 
 __all__ = ["BatchSolution", "solve_batch"]
 
 Array = NDArray[np.float64]
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond
-
-# Codes of `kernel`; those it is unsure of never leave this module.
-_STATUSES = (Status.OPTIMAL, Status.INFEASIBLE, Status.SINGULAR, Status.INACCURATE, Status.INVALID, Status.FAILED)
-_CODES = {status: code for code, status in enumerate(_STATUSES)}
-_OPTIMAL, _INACCURATE, _UNSURE = 0, 3, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +65,7 @@ class BatchSolution:
     rho: float | None = None
     backend: str = ""
 
-    statuses = _STATUSES
+    statuses = STATUSES
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -78,12 +75,12 @@ class BatchSolution:
     @cached_property
     def status(self) -> NDArray[np.str_]:
         """Return the status of each row as text, shape (...): "optimal", "infeasible", ..."""
-        return np.array([status.value for status in _STATUSES])[self.code]
+        return np.array([status.value for status in STATUSES])[self.code]
 
     def count(self) -> dict[Status, int]:
         """Return how many rows have each status, for those that occur."""
-        numbers = np.bincount(self.code.ravel(), minlength=len(_STATUSES))
-        return {status: int(number) for status, number in zip(_STATUSES, numbers, strict=True) if number}
+        numbers = np.bincount(self.code.ravel(), minlength=len(STATUSES))
+        return {status: int(number) for status, number in zip(STATUSES, numbers, strict=True) if number}
 
     def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
         """Solve one row again by itself, for its certificate and all else that a `TensionSolution` has.
@@ -190,7 +187,7 @@ def solve_batch(
         flat.append(np.ascontiguousarray(value).reshape(-1))
 
     tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
-    code = np.full(rows, _UNSURE, np.int8)
+    code = np.full(rows, UNSURE, np.int8)
     kernels = compiled.current()
     share, together = 1, max(rows, 1)
     if kernels.rows_at_once is not None:
@@ -200,7 +197,7 @@ def solve_batch(
 
     def work(first: int) -> None:
         stop = min(first + block, rows)
-        kernels.solve_rows(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, code)
+        kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, code)
 
     if share == 1:
         work(0)
@@ -213,14 +210,14 @@ def solve_batch(
         name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
     }
     if code.any():
-        without = (code != _OPTIMAL) & (code != _INACCURATE)
+        without = (code != OPTIMAL) & (code != INACCURATE)
         t[without], residual[without] = np.nan, np.nan
-        unproven = (code == _OPTIMAL) | (code == _CODES[Status.INVALID]) | np.isnan(proof[:, 1])
+        unproven = (code == OPTIMAL) | (code == INVALID) | np.isnan(proof[:, 1])
         d[unproven], proof[unproven] = np.nan, np.nan
-        for row in np.flatnonzero(code == _UNSURE):
+        for row in np.flatnonzero(code == UNSURE):
             index = tuple(int(i) for i in np.unravel_index(row, lead))
             solution = _alone(_row(problem, index), rho)
-            code[row] = _CODES[solution.status]
+            code[row] = STATUSES.index(solution.status)
             if solution.tensions is not None:
                 t[row], residual[row] = solution.tensions, solution.residual
             d[row], proof[row] = np.nan, np.nan

@@ -1,20 +1,42 @@
-"""Least squares in a box, the projection kernel: min |M x - b| subject to lower <= x <= upper.
+"""Least squares in the box of the tension limits: min |M x - b| subject to lower <= x <= upper.
 
-Bounded-variable least squares (Stark and Parker 1995), as Lawson and Hanson arrange it: every variable starts at the
-value inside its limits nearest to zero and is freed one at a time. A variable is freed only if its column is not in the
-span of the free ones (it has a part along the residual, which is orthogonal to that span), so rank-deficient matrices
-and duplicate columns need no special care, infinite limits neither.
+`box_least_squares` is bounded-variable least squares (Stark and Parker 1995), as Lawson and Hanson arrange it: every
+variable starts at the value inside its limits nearest to zero and is freed one at a time. A variable is freed only if
+its column is not in the span of the free ones (it has a part along the residual, which is orthogonal to that span), so
+rank-deficient matrices and duplicate columns need no special care, infinite limits neither.
+
+`project` finds with it the available wrench that is nearest to w.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["box_least_squares"]
-
-Array = NDArray[np.float64]
+from ..tolerances import RANK
+from .problem import Array, TensionProblem
 
 # Rounding of a gradient entry, relative to the sum of the absolute terms in it.
 _NOISE = 4e-15
+
+# A cable whose column has a larger part than this along the residual, relative to both, is at a limit.
+_STILL = 1e-5
+
+
+class Projection(NamedTuple):
+    """The projection of w on the available wrench set, in newtons (moments divided by the problem's length).
+
+    Attributes
+    ----------
+    closest :
+        Tensions inside the limits whose wrench is nearest to w [N], shape (m,). The wrench is unique, they need not be.
+    residual :
+        What they leave open, S (w - A closest) [N], shape (n,), orthogonal to the last digit to every cable that is not
+        at a limit. It has that accuracy relative to its own length, however short it is beside w.
+    """
+
+    closest: Array
+    residual: Array
 
 
 def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -87,3 +109,32 @@ def _settle(M: Array, b: Array, lower: Array, upper: Array, x: Array, free: NDAr
         stopped = fraction <= shortest
         x[index[stopped]] = limit[stopped]
         free[index[stopped]] = False
+
+
+def project(problem: TensionProblem) -> Projection:
+    """Project w on the available wrench set."""
+    M, residual = problem.scaled_A, problem.scaled_w
+    closest = np.zeros(problem.m)
+    # Rounding is relative to w, and a short residual has lost the digits that make its direction. Projecting what is
+    # left, from where we stand, brings them back.
+    for _ in range(4):
+        given = residual
+        step, _ = box_least_squares(M, given, problem.t_min - closest, problem.t_max - closest)
+        closest = np.minimum(np.maximum(closest + step, problem.t_min), problem.t_max)
+        residual = given - M @ step
+        if residual @ residual > 1e-2 * (given @ given):
+            break
+    # A cable that is not at a limit has no part along the residual, but for rounding. One that has is at its limit, and
+    # only rounding puts it inside.
+    still = np.abs(residual @ M) <= _STILL * problem.column_norms * np.sqrt(residual @ residual)
+    inside = (closest > problem.t_min) & (closest < problem.t_max) & still
+    return Projection(closest, _orthogonal_part(residual, M[:, inside]))
+
+
+def _orthogonal_part(vector: Array, columns: Array) -> Array:
+    """Remove from `vector` its parts in the range of `columns`; twice, since once is not enough if little is left."""
+    U, sigma, _ = np.linalg.svd(columns, full_matrices=False)
+    U = U[:, sigma > RANK * sigma.max(initial=0.0)]
+    for _ in range(2):
+        vector = vector - U @ (U.T @ vector)
+    return vector

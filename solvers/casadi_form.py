@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..inputs import shown, whole_number
 from .derivatives import derivatives
 from .problem import TensionProblem
-from .registry import solve
+from .solve import solve
 
 if TYPE_CHECKING:
     import casadi

@@ -18,12 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..inputs import finite_array, required
 from ..text import quantity
 from ..tolerances import NEGLIGIBLE, RANK
-from .problem import TensionProblem
-from .projection import project
+from .box_least_squares import Projection, project
+from .problem import Array, TensionProblem
 
-__all__ = ["Certificate", "CertificateText", "certificate_along", "certify"]
+__all__ = ["Certificate", "CertificateText", "certificate_along", "certify", "sharpest"]
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
@@ -223,24 +222,29 @@ def certify(problem: TensionProblem) -> Certificate | None:
     :
         A verified certificate. None means that w is available within the tolerance.
     """
-    closest, residual = project(required("problem", problem, TensionProblem))
+    return sharpest(problem, project(required("problem", problem, TensionProblem)))
+
+
+def sharpest(problem: TensionProblem, projection: Projection) -> Certificate | None:
+    """Return the certificate of `certify`, from the projection of w."""
     outside = _outside_range(problem)
     if outside is not None:
-        certificate = _certificate(problem, outside, closest)
+        certificate = _along(problem, outside, projection.closest)
         if certificate is not None and certificate.singular:
             return certificate
-    return _certificate(problem, residual, closest)
+    return _along(problem, projection.residual, projection.closest)
 
 
-def certificate_along(problem: TensionProblem, direction: Array) -> Certificate | None:
+def certificate_along(
+    problem: TensionProblem, direction: Array, projection: Projection | None = None
+) -> Certificate | None:
     """Return the certificate along a direction, shape (n,), of any length, or None if it proves nothing.
 
     Its shortfall is a lower bound of the distance to the available wrench set, and `closest` the nearest tensions that
     the projection found.
     """
-    vector = direction / problem.row_scale
-    size = float(np.sqrt(vector @ vector))
-    return _along(problem, vector / size, project(problem)[0]) if 0.0 < size < np.inf else None
+    closest = (projection or project(problem)).closest
+    return _along(problem, direction / problem.row_scale, closest, any_length=True)
 
 
 def _outside_range(problem: TensionProblem) -> Array | None:
@@ -250,21 +254,18 @@ def _outside_range(problem: TensionProblem) -> Array | None:
     return null @ (null.T @ problem.scaled_w) if null.shape[1] else None
 
 
-def _certificate(problem: TensionProblem, vector: Array, closest: Array) -> Certificate | None:
-    """Make the certificate along a scaled wrench `vector` [N], or None if it proves nothing."""
+def _along(problem: TensionProblem, vector: Array, closest: Array, any_length: bool = False) -> Certificate | None:
+    """Return the certificate along a scaled wrench [N], or None if it, or its shortfall, is below the tolerance."""
+    tolerance = problem.accepted_error(closest)
     size = np.sqrt(vector @ vector)
-    return None if size <= problem.tolerance(closest) else _along(problem, vector / size, closest)
-
-
-def _along(problem: TensionProblem, unit: Array, closest: Array) -> Certificate | None:
-    """Make the certificate along a scaled direction of length one, or None if it proves nothing."""
-    direction = problem.row_scale * unit
+    if not (0.0 if any_length else tolerance) < size < np.inf:
+        return None
+    direction = problem.row_scale * (vector / size)
     support, at_max, at_min = _support(problem, direction)
     demand = float(direction @ problem.w)
-    certificate = Certificate(
-        direction, support, demand, demand - support, at_max, at_min, closest, length=problem.length
-    )
-    return certificate if certificate.verify(problem) else None
+    if not demand - support > tolerance:
+        return None
+    return Certificate(direction, support, demand, demand - support, at_max, at_min, closest, problem.length)
 
 
 def _support(problem: TensionProblem, direction: Array) -> tuple[float, Indices, Indices]:

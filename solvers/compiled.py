@@ -12,6 +12,7 @@ import shutil
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
@@ -24,8 +25,6 @@ from .. import tolerances
 from ..writing import whole_file
 from .kernels import memory, single, wide
 from .kernels.codes import UNSURE
-
-__all__ = ["COMPILED", "INTERPRETED", "Kernels", "current", "keep", "load", "machine_code", "solve_packed"]
 
 COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
 
@@ -47,6 +46,7 @@ _alone = 0  # single problems solved in plain Python so far
 _patience: float | None = None
 
 
+@dataclass(frozen=True, eq=False)
 class Kernels:
     """The two kernels in one of their forms.
 
@@ -54,33 +54,21 @@ class Kernels:
     ----------
     backend :
         `COMPILED` or `INTERPRETED`.
-    solve_packed, solve_rows :
-        See `kernels.single` and `kernels.wide`.
+    one, many :
+        `solve_packed` of `kernels.single` and `solve_rows` of `kernels.wide`.
     rows_at_once :
-        How many rows `solve_rows` takes together; threads share multiples of it. None if threads gain nothing.
+        How many rows `many` takes together; threads share multiples of it. None if threads gain nothing.
     """
 
-    def __init__(
-        self,
-        backend: str,
-        solve_packed: Callable[..., int],
-        solve_rows: Callable[..., None],
-        rows_at_once: int | None,
-    ) -> None:
-        self.backend = backend
-        self.solve_packed = solve_packed
-        self.solve_rows = solve_rows
-        self.rows_at_once = rows_at_once
+    backend: str
+    one: Callable[..., int]
+    many: Callable[..., None]
+    rows_at_once: int | None
 
 
 def current() -> Kernels:
     """Return the kernels in the form that is loaded."""
     return _kernels
-
-
-def solve_packed(data: Any, n: int, m: int, t: Any) -> int:
-    """Solve one problem with the kernels that are loaded; see `kernels.single.solve_packed`."""
-    return _kernels.solve_packed(data, n, m, t)
 
 
 def load() -> Kernels:
@@ -100,7 +88,8 @@ def keep() -> None:
         load()
 
 
-def _interpreted(data: Any, n: int, m: int, t: Any) -> int:
+def _one_in_python(data: Any, n: int, m: int, t: Any) -> int:
+    """Solve one problem in plain Python; see `kernels.single.solve_packed`."""
     start = perf_counter()
     try:
         return single.solve_packed(memoryview(data), n, m, memoryview(t))
@@ -110,13 +99,15 @@ def _interpreted(data: Any, n: int, m: int, t: Any) -> int:
         _lose(perf_counter() - start, problems=1)
 
 
-def _interpreted_rows(*arguments: Any) -> None:
+def _many_in_numpy(*arguments: Any) -> None:
+    """Solve the rows of a batch on NumPy arrays; see `kernels.wide.solve_rows`."""
     start = perf_counter()
     wide.solve_rows(*arguments)
     _lose(perf_counter() - start)
 
 
-_kernels = Kernels(INTERPRETED, _interpreted, _interpreted_rows, None)
+PLAIN = Kernels(INTERPRETED, _one_in_python, _many_in_numpy, None)
+_kernels = PLAIN
 
 
 def _lose(seconds: float, problems: int = 0) -> None:

@@ -17,27 +17,24 @@ from fractions import Fraction
 from math import gcd
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..tolerances import FEASIBILITY
-from .problem import TensionProblem
-from .projection import project
-
-__all__ = ["exact_optimum", "minimum_in_box"]
+from .box_least_squares import Projection, project
+from .problem import Array, TensionProblem
 
 # Relative error of the wrench at an optimum where the cost is proportional to the wrench: 1e-22, far below rounding.
 # Where the cost is K times as sensitive the error is K times as large.
 _ERROR = 2.0**-73
 
 
-def exact_optimum(problem: TensionProblem) -> NDArray[np.float64]:
+def exact_optimum(problem: TensionProblem, projection: Projection | None = None) -> Array:
     """Return the tensions of least cost inside their limits [N], shape (m,), whose wrench is w or the nearest to it.
 
-    Exact but for the rounding of the result. Some 10 ms.
+    Begins at the projection of w. Exact but for the rounding of the result. Some 10 ms.
     """
-    nearest = project(problem)[0]
+    nearest = (projection or project(problem)).closest
     size = problem.weights @ (nearest - problem.t_ref) ** 2
-    wrench = problem.tolerance(nearest) / FEASIBILITY
+    wrench = problem.accepted_error(nearest) / FEASIBILITY
     _, exponent = np.frexp(size / wrench / wrench / _ERROR if size > 0.0 and wrench > 0.0 else 1.0)
     rho = Fraction(2) ** int(exponent)
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..inputs import required
 from ..tolerances import NEGLIGIBLE, RANK
+from .box_least_squares import project
 from .problem import TensionProblem
-from .projection import project
 
 __all__ = ["Margin", "capacity_margin"]
 

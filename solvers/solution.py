@@ -1,46 +1,20 @@
-"""The answer: `TensionSolution`, which judges its own tensions, and its `Status`."""
+"""The answer to one problem: `TensionSolution`."""
 
 from collections.abc import Callable
-from enum import StrEnum
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SolverError
-from .certificate import Certificate, certificate_along, certify
-from .problem import TensionProblem
+from .certificate import Certificate
+from .problem import Array, TensionProblem
+from .status import Status
 
-__all__ = ["Status", "TensionSolution"]
-
-
-class Status(StrEnum):
-    """The status of a solution; the values are plain strings."""
-
-    OPTIMAL = "optimal"
-    """The tensions give w inside the limits, within `TensionProblem.tolerance`, and are the method's answer."""
-
-    INFEASIBLE = "infeasible"
-    """The limits forbid w; a verified certificate shows along which direction and by how much."""
-
-    SINGULAR = "singular"
-    """w has a part outside the range of A: no tensions of either sign give it, whatever the limits. The certificate's
-    direction is in the left null space of A and no cable binds. A rank-deficient A alone is not singular in this sense:
-    if w is in its range the problem may well be optimal."""
-
-    INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate proves
-    that w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
-
-    INVALID = "invalid"
-    """A row of a batch whose numbers are no problem: NaN, crossed limits, a weight that is not positive. A single
-    problem like that is an `InputError`."""
-
-    FAILED = "failed"
-    """A back end gave up, or called the problem infeasible and could not be believed, or the method has no answer here
-    although other methods may have one; `detail` is its message."""
+__all__ = ["TensionSolution"]
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class TensionSolution:
     """Tensions, or the proof that there are none.
 
@@ -63,46 +37,19 @@ class TensionSolution:
         Iterations of the method, None if it does not count any.
     detail :
         What the method reports beyond the status, else empty.
-
-    `direction` computes the direction on which the method's own status rests, when it is first read.
+    proof :
+        The certificate, or a function of the problem that finds it when `certificate` is first read.
     """
 
-    __slots__ = (
-        "_certificate",
-        "_direction",
-        "backend",
-        "detail",
-        "iterations",
-        "method",
-        "problem",
-        "status",
-        "tensions",
-        "time",
-    )
-
-    def __init__(
-        self,
-        problem: TensionProblem,
-        tensions: NDArray[np.float64] | None,
-        status: Status,
-        method: str,
-        backend: str | None = None,
-        time: float = 0.0,
-        certificate: Certificate | None = None,
-        iterations: int | None = None,
-        detail: str = "",
-        direction: Callable[[TensionProblem], NDArray[np.float64] | None] | None = None,
-    ) -> None:
-        self.problem = problem
-        self.tensions = tensions  # (m,)
-        self.status = status
-        self.method = method
-        self.backend = backend
-        self.time = time
-        self._certificate = certificate
-        self._direction = direction
-        self.iterations = iterations
-        self.detail = detail
+    problem: TensionProblem
+    tensions: Array | None  # (m,)
+    status: Status
+    method: str
+    backend: str | None = None
+    time: float = 0.0
+    iterations: int | None = None
+    detail: str = ""
+    proof: Certificate | Callable[[TensionProblem], Certificate | None] | None = None
 
     def __repr__(self) -> str:
         return f"TensionSolution(status={self.status.value!r}, tensions={self.tensions!r}, method={self.method!r})"
@@ -121,17 +68,14 @@ class TensionSolution:
         SolverError
             If neither proves the status. No problem is known that leads here.
         """
-        if self._certificate is None and (self.status is Status.INFEASIBLE or self.status is Status.SINGULAR):
-            self._certificate = certify(self.problem) or self._own_proof()
-        return self._certificate
-
-    def _own_proof(self) -> Certificate:
-        """Return the certificate along the direction on which the method's status rests."""
-        direction = None if self._direction is None else self._direction(self.problem)
-        certificate = None if direction is None else certificate_along(self.problem, direction)
-        if certificate is None:
-            raise SolverError(f"{self.method} reported {self.status}, but no certificate confirms it; try method daqp")
-        return certificate
+        if callable(self.proof):
+            proof = self.proof(self.problem)
+            if proof is None:
+                raise SolverError(
+                    f"{self.method} reported {self.status}, but no certificate confirms it; try method daqp"
+                )
+            self.proof = proof
+        return self.proof
 
     @property
     def feasible(self) -> bool:

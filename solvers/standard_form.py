@@ -14,12 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import RANK
-from .problem import TensionProblem
-
-__all__ = ["StandardForm", "standard_form"]
-
-Array = NDArray[np.float64]
+from ..tolerances import AT_LIMIT, DOUBTFUL, OPTIMALITY, RANK
+from .box_least_squares import box_least_squares
+from .kernels.codes import DECISIVE, SLACK
+from .problem import Array, TensionProblem
 
 
 class StandardForm(NamedTuple):
@@ -61,42 +59,72 @@ class StandardForm(NamedTuple):
         t[self.moving] += self.unit * s
         return np.minimum(np.maximum(t, problem.t_min), problem.t_max)
 
+    @property
+    def holds_reference(self) -> bool:
+        """Return whether s = 0, tensions at t_ref, gives b inside the limits."""
+        return not self.b.any() and bool((self.lower <= 0.0).all() and (self.upper >= 0.0).all())
 
-def standard_form(problem: TensionProblem, cut: float = RANK) -> StandardForm:
+    def is_optimal(self, tensions: Array) -> bool:
+        r"""Return whether multipliers prove that tensions, (m,) [N], which give w inside the limits, are the optimum.
+
+        The point of least norm leaves no part of its gradient, s itself, in the null space of the equations except for
+        limits that it is at and that push against it:
+
+        $$
+        N s = N \mu, \qquad \mu_i \ge 0 \text{ at } lower_i, \quad \mu_i \le 0 \text{ at } upper_i, \quad
+        \mu_i = 0 \text{ elsewhere}
+        $$
+
+        Such a $\mu$ is a proof, whatever method proposed s. It proves nothing if it is so large that a limit moved by
+        rounding would change the cost.
+        """
+        s = (tensions - self.origin)[self.moving] / self.unit
+        square = float(s @ s)
+        gradient = self.N @ s
+        if np.sqrt(gradient @ gradient) <= OPTIMALITY * np.sqrt(square):
+            return True
+        above, below = s - self.lower, self.upper - s
+        near = AT_LIMIT * max(1.0, np.sqrt(square))
+        held = (above <= near) | (below <= near)
+        # A limit is known to rounding of its own size, that of an infinite one to rounding of everything.
+        size = np.minimum(np.maximum(np.abs(self.lower), np.abs(self.upper)), 1.0)[held]
+        most = DECISIVE / SLACK * square / np.maximum(size, SLACK)
+        normals = self.N[:, held]
+        low, high = np.where(below[held] <= near, -most, 0.0), np.where(above[held] <= near, most, 0.0)
+        multipliers, _ = box_least_squares(normals, gradient, low, high)
+        rest = gradient - normals @ multipliers
+        distance = np.where(multipliers > 0.0, above[held], below[held])
+        gap = np.abs(multipliers[multipliers != 0.0]) @ distance[multipliers != 0.0]
+        return bool(np.sqrt(rest @ rest) <= OPTIMALITY * np.sqrt(square) and gap <= OPTIMALITY * square)
+
+
+def standard_forms(problem: TensionProblem) -> list[StandardForm]:
     """Bring a problem to standard form, by singular value decomposition of its scaled wrench matrix.
 
-    Parameters
-    ----------
-    problem :
-        The problem.
-    cut :
-        Singular values below this part of the largest count as zero.
+    Returns
+    -------
+    :
+        The standard form, in which singular values below `RANK` of the largest count as zero; before it, if some are
+        below `DOUBTFUL`, the coarse form without those.
     """
     apart = problem.t_min < problem.t_max
     origin = np.where(apart, problem.t_ref, problem.t_min)
     moving = np.flatnonzero(apart)
     # In s_i = sqrt(omega_i) (t_i - t_ref_i) the cost is |s|^2.
     unit = np.sqrt(problem.weights.max() / problem.weights[moving])  # (k,)
-    matrix = problem.scaled_A[:, moving] * unit  # (n, k)
     wrench = problem.scaled_w - problem.scaled_A @ origin
-
-    U, sigma, Vt = np.linalg.svd(matrix)
-    rank = int(np.count_nonzero(sigma > cut * sigma[0])) if sigma.size else 0
-    b = (U[:, :rank].T @ wrench) / sigma[:rank]
-
     lower = (problem.t_min[moving] - origin[moving]) / unit
     upper = (problem.t_max[moving] - origin[moving]) / unit
-    # The least-norm s is at least as long as b, and as its distance to the limits: a scale that no huge t_max spoils.
-    nearest_to_zero = np.minimum(np.maximum(lower, 0.0), upper)
-    scale = max(float(np.sqrt(b @ b)), float(np.abs(nearest_to_zero).max(initial=0.0))) or 1.0
-    return StandardForm(
-        Q=Vt[:rank],
-        N=Vt[rank:],
-        b=b / scale,
-        lower=lower / scale,
-        upper=upper / scale,
-        origin=origin,
-        unit=unit * scale,
-        moving=moving,
-        sigma=sigma[:rank],
-    )
+    farthest = float(np.abs(np.minimum(np.maximum(lower, 0.0), upper)).max(initial=0.0))
+
+    U, sigma, Vt = np.linalg.svd(problem.scaled_A[:, moving] * unit)  # of (n, k)
+    ranks = [int(np.count_nonzero(sigma > cut * sigma[0])) if sigma.size else 0 for cut in (DOUBTFUL, RANK)]
+    forms = []
+    for rank in sorted(set(ranks)):
+        b = (U[:, :rank].T @ wrench) / sigma[:rank]
+        # The least-norm s is at least as long as b and as its distance to the limits: no huge t_max spoils the scale.
+        scale = max(float(np.sqrt(b @ b)), farthest) or 1.0
+        basis, null = Vt[:rank], Vt[rank:]
+        scaled = (basis, null, b / scale, lower / scale, upper / scale, origin, unit * scale, moving, sigma[:rank])
+        forms.append(StandardForm(*scaled))
+    return forms

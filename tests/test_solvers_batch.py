@@ -1,5 +1,7 @@
 """The kernel and `solve_batch`: exact on awkward problems, the same as `solve`, and nothing lost to a bad row."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from towline.benchmarks.exactness import awkward_problem, check
 from towline.errors import InputError, SolverError
-from towline.solvers import Status, TensionProblem, certify, methods, solve, solve_batch
+from towline.solvers import Status, TensionProblem, certify, solve, solve_batch
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
 from .references import linear_program_status, optimum_by_enumeration
@@ -244,16 +246,15 @@ def test_no_infeasible_answer_is_without_its_certificate():
 
 def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch):
     """Run as if the projection failed, which it does for one in 10^5 problems with nearly parallel cables."""
-    from towline.solvers import solution as module
-
-    monkeypatch.setattr(module, "certify", lambda problem: None)
+    module = import_module("towline.solvers.solve")
+    monkeypatch.setattr(module, "sharpest", lambda problem, projection: None)
     for k in range(40):
         problem = random_infeasible(np.random.default_rng(k), 3 + k % 8)
         solution = solve(problem)
         assert solution.certificate.verify(problem)
         assert solution.certificate.singular is (solution.status is Status.SINGULAR)
         assert solution.certificate.shortfall <= certify(problem).shortfall * (1 + 1e-9)
-    monkeypatch.setattr(type(methods()["active-set"]), "direction", lambda self, problem: None)
+    monkeypatch.setattr(module, "_direction_of_kernel", lambda problem: None)
     with pytest.raises(SolverError, match="active-set reported infeasible, but no certificate confirms it"):
         _ = solve(TensionProblem([[1.0, -1.0]], [60.0], 1, 60)).certificate
 

@@ -10,8 +10,6 @@ from towline.benchmarks.exactness import awkward_problem
 from towline.solvers import TensionProblem, compiled, solve, solve_batch
 from towline.tests.problems import ZOO
 
-INTERPRETED = compiled.Kernels(compiled.INTERPRETED, compiled._interpreted, compiled._interpreted_rows, None)
-
 
 @pytest.fixture
 def patient(monkeypatch):
@@ -70,7 +68,7 @@ def test_plain_python_and_machine_code_give_the_same_bits(rho, monkeypatch, pati
     for members in shapes.values():
         arrays = [np.array(column) for column in zip(*members, strict=True)]
         answers = []
-        for kernels in (INTERPRETED, machine_code):
+        for kernels in (compiled.PLAIN, machine_code):
             monkeypatch.setattr(compiled, "_kernels", kernels)
             answers.append(solve_batch(*arrays, rho=rho))
             assert answers[-1].backend == kernels.backend
@@ -79,7 +77,7 @@ def test_plain_python_and_machine_code_give_the_same_bits(rho, monkeypatch, pati
 
 @pytest.mark.parametrize("m", [6, 7, 8, 12])
 def test_a_row_does_not_depend_on_its_company(m, monkeypatch, patient):
-    monkeypatch.setattr(compiled, "_kernels", INTERPRETED)
+    monkeypatch.setattr(compiled, "_kernels", compiled.PLAIN)
     rng = np.random.default_rng(m)
     A = rng.normal(size=(60, 6, m))
     w = np.einsum("rij,rj->ri", A, rng.uniform(-0.3, 1.3, (60, m)))
@@ -92,7 +90,7 @@ def test_a_row_does_not_depend_on_its_company(m, monkeypatch, patient):
 
 
 def test_plain_python_answers_the_zoo(monkeypatch, patient):
-    monkeypatch.setattr(compiled, "_kernels", INTERPRETED)
+    monkeypatch.setattr(compiled, "_kernels", compiled.PLAIN)
     for name, (problem, status) in ZOO.items():
         solution = solve(problem)
         assert solution.status == status, name

@@ -14,7 +14,7 @@ change sign.
 Nothing here is believed that the data do not confirm. Tensions count only if, inside their limits, their wrench error
 is below `TensionProblem.tolerance` and the multipliers of the limits prove that they are optimal; a direction only if
 its support value falls short of the demand by more than the tolerance. Near the boundary, near the rank cut, or where
-rounding leads the iteration astray, the answer is UNSURE and the robust path of `registry.py` follows.
+rounding leads the iteration astray, the answer is UNSURE and another method answers: see `solve`.
 """
 
 from __future__ import annotations

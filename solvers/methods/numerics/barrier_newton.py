@@ -13,15 +13,9 @@ cannot fail: the function is self-concordant (Boyd and Vandenberghe 2004, sectio
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .linear_programs import optimise
-from .method import Proposal
-from .standard_form import StandardForm
-
-__all__ = ["barrier_point"]
-
-Array = NDArray[np.float64]
+from ..method import Array, Proposal, StandardForm
+from .linear_program import deepest
 
 _STEPS = 50
 _DAMPED_STEPS = 300
@@ -189,12 +183,6 @@ def _way_to_limits(form: StandardForm, s: Array, step: Array) -> float:
 
 def _interior_point(form: StandardForm) -> Array | None:
     """Return a point as far inside the limits as a linear program finds one, or None."""
-    k = form.lower.size
     # Of wide ranges, a unit of s is space enough.
-    space = np.minimum(form.upper - form.lower, 1.0)[:, None]
-    rows = np.block([[-np.eye(k), space], [np.eye(k), space]])
-    result = optimise(form, np.r_[np.zeros(k), -1.0], rows, np.r_[-form.lower, form.upper], nonnegative=True, most=0.5)
-    if result.s is None:
-        return None
-    share = (np.minimum(result.s - form.lower, form.upper - result.s) / space[:, 0]).min(initial=1.0)
-    return result.s if share > 1e-9 else None
+    program, share = deepest(form, np.minimum(form.upper - form.lower, 1.0), most=0.5)
+    return program.s if share > 1e-9 else None

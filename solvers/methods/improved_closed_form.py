@@ -1,15 +1,12 @@
 """Method "improved-closed-form": the closed form, repeated with the worst cable held at its limit."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from ..tolerances import FEASIBILITY, RANK, ROUNDING
+from ...tolerances import FEASIBILITY, RANK, ROUNDING
 from .closed_form import middle, outside
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["ImprovedClosedForm"]
+from .method import Method, Proposal, StandardForm
 
 
 class ImprovedClosedForm(Method):
@@ -21,15 +18,15 @@ class ImprovedClosedForm(Method):
     certificate. With weights the worst cable is the one with the largest weighted excess.
     """
 
-    name: ClassVar[str] = "improved-closed-form"
-    guarantee: ClassVar[str] = (
+    name = "improved-closed-form"
+    guarantee = (
         "at most m - rank + 1 pseudo-inverses; finds most but not all feasible distributions: failed on the others"
     )
-    source: ClassVar[str] = (
+    source = (
         "A. Pott, 'An improved force distribution algorithm for over-constrained cable-driven parallel robots', "
         "Computational Kinematics (CK 2013), 2014"
     )
-    exact: ClassVar[bool] = False
+    exact = False
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Hold the cable farthest outside its limits and distribute the rest again, until all are inside."""

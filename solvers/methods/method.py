@@ -3,14 +3,10 @@
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from ..problem import Array
+from ..standard_form import StandardForm
 
-from .problem import TensionProblem
-from .solution import Status
-from .standard_form import StandardForm
-
-__all__ = ["Method", "Proposal"]
+__all__ = ["Array", "Method", "Proposal", "StandardForm"]
 
 
 class Proposal(NamedTuple):
@@ -26,10 +22,10 @@ class Proposal(NamedTuple):
         The reason when `s` is None.
     final :
         True if this stands even if the problem is feasible, for example because the feasible tensions are unbounded:
-        `solve` does not look in `boundary.py` for what rounding may have lost.
+        `solve` does not compute in exact arithmetic what rounding may have lost.
     """
 
-    s: NDArray[np.float64] | None
+    s: Array | None
     iterations: int | None = None
     detail: str = ""
     final: bool = False
@@ -49,7 +45,7 @@ class Method(ABC):
 
     exact: ClassVar[bool]
     """True if the method ends at the optimum itself. Where rounding alone makes such a method lose a point on the very
-    boundary of the available wrench set, `solve` finds it in `boundary.py`."""
+    boundary of the available wrench set, `solve` computes it in exact arithmetic."""
 
     continuous: ClassVar[bool] = False
     """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior,
@@ -71,22 +67,6 @@ class Method(ABC):
     def backends(self) -> list[str]:
         """Return the names of the installed back ends, the default first; empty for methods that have none."""
         return []
-
-    def attempt(self, problem: TensionProblem) -> tuple[Status, NDArray[np.float64] | None] | None:
-        """Answer at once, or return None; then `propose` is called and judged.
-
-        What is returned here is not judged again. Tensions, (m,) [N], are inside the limits and give w within
-        `TensionProblem.tolerance`; "infeasible" and "singular" rest on a direction that proves it by several times as
-        much, so that `certify` finds the sharpest certificate when it is first read.
-        """
-        return None
-
-    def direction(self, problem: TensionProblem) -> NDArray[np.float64] | None:
-        """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of `attempt` rests.
-
-        It is computed only where `certify` finds none.
-        """
-        return None
 
     @abstractmethod
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

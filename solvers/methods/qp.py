@@ -6,13 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["QuadraticProgram"]
-
-Array = NDArray[np.float64]
+from ...errors import InputError
+from .method import Method, Proposal, StandardForm
 
 # As tight as each can go: their defaults leave wrench errors of newtons, and the standard form has condition one. Every
 # one is bounded in iterations or time, since some loop for ever on infeasible problems.
@@ -48,15 +43,15 @@ _FAR = 1e3
 class QuadraticProgram(Method):
     """Weighted least squares to t_ref inside the limits, by a general QP solver."""
 
-    name: ClassVar[str] = "qp"
-    guarantee: ClassVar[str] = (
+    name = "qp"
+    guarantee = (
         "the unique optimum to the back end's accuracy; a back end's 'infeasible' counts only with a certificate"
     )
-    source: ClassVar[str] = "qpsolvers: S. Caron et al.; OSQP: Stellato et al. 2020; Clarabel: Goulart and Chen 2024"
-    exact: ClassVar[bool] = False
-    continuous: ClassVar[bool] = True
-    least_squares: ClassVar[bool] = True
-    seeks_reference: ClassVar[bool] = True
+    source = "qpsolvers: S. Caron et al.; OSQP: Stellato et al. 2020; Clarabel: Goulart and Chen 2024"
+    exact = False
+    continuous = True
+    least_squares = True
+    seeks_reference = True
     options: ClassVar[dict[str, str] | None] = None
 
     def backends(self) -> list[str]:

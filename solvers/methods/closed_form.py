@@ -8,17 +8,11 @@ With weights the pseudo-inverse is the weighted one. Of all tensions that give w
 to the middle; if they leave the limits although others would not, that is the method's known gap.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["ClosedForm", "middle", "outside"]
-
-Array = NDArray[np.float64]
+from .method import Array, Method, Proposal, StandardForm
 
 _SLACK = 1e-12  # How far s, of order one, may pass a limit; `solve` moves it back.
 
@@ -32,15 +26,13 @@ class ClosedForm(Method):
     middle; t_ref plays no other part.
     """
 
-    name: ClassVar[str] = "closed-form"
-    guarantee: ClassVar[str] = (
-        "one matrix product, smooth in w; may leave the limits though the problem is feasible: then failed"
-    )
-    source: ClassVar[str] = (
+    name = "closed-form"
+    guarantee = "one matrix product, smooth in w; may leave the limits though the problem is feasible: then failed"
+    source = (
         "A. Pott, T. Bruckmann, L. Mikelsons, 'Closed-form force distribution for parallel wire robots', "
         "Computational Kinematics 2009"
     )
-    exact: ClassVar[bool] = False
+    exact = False
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Project the middle of the limits on Q s = b."""

@@ -9,16 +9,10 @@ $$
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..inputs import number
-from .direct_daqp import bounded_least_norm
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["PNorm"]
-
-Array = NDArray[np.float64]
+from ...inputs import number
+from .method import Array, Method, Proposal, StandardForm
+from .numerics.least_norm import bounded_least_norm, least_norm
 
 _STEPS = 200
 
@@ -39,20 +33,18 @@ class PNorm(Method):
     Outside the feasible set: a certificate.
     """
 
-    name: ClassVar[str] = "p-norm"
-    guarantee: ClassVar[str] = "the unique optimum, continuous; no tensions and a certificate if there are none"
-    source: ClassVar[str] = "C. Gosselin, M. Grenier, Meccanica 46(1), 2011; R. Verhoeven, thesis, Duisburg 2004"
-    exact: ClassVar[bool] = True
-    continuous: ClassVar[bool] = True
-    seeks_reference: ClassVar[bool] = True
+    name = "p-norm"
+    guarantee = "the unique optimum, continuous; no tensions and a certificate if there are none"
+    source = "C. Gosselin, M. Grenier, Meccanica 46(1), 2011; R. Verhoeven, thesis, Duisburg 2004"
+    exact = True
+    continuous = True
+    seeks_reference = True
     options: ClassVar[dict[str, str] | None] = {"p": "exponent, a number from 2 to 20; 4 if not given"}
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Take Newton steps, each a quadratic program, from the least-squares solution."""
         p = number("p", options.get("p", 4), 2, 20)
-        first = bounded_least_norm(
-            np.concatenate([form.upper, form.b]), np.concatenate([form.lower, form.b]), form.Q, equalities=form.b.size
-        )
+        first = least_norm(form)
         if first.s is None or not first.s.any() or p == 2:
             return first
         s = np.minimum(np.maximum(first.s, form.lower), form.upper)

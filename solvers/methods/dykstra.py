@@ -13,16 +13,10 @@ a small angle.
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..inputs import whole_number
-from ..tolerances import RANK
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["Dykstra"]
-
-Array = NDArray[np.float64]
+from ...inputs import whole_number
+from ...tolerances import RANK
+from .method import Array, Method, Proposal, StandardForm
 
 # Stop when the projection on the equations moves s, of order one, by no more than this: then x is in both sets, and
 # stays. The change of p is that same distance (Birgin and Raydan 2005), so a standstill of x alone does not stop it.
@@ -47,15 +41,15 @@ class Dykstra(Method):
     feasible set: a certificate.
     """
 
-    name: ClassVar[str] = "dykstra"
-    guarantee: ClassVar[str] = (
+    name = "dykstra"
+    guarantee = (
         "converges to the unique optimum, at no stated speed: inaccurate after max_iter; certificate if there are none"
     )
-    source: ClassVar[str] = "M. Hassan, A. Khajepour, IEEE Trans. Robotics 24(3), 2008; R. Dykstra, JASA 78, 1983"
-    exact: ClassVar[bool] = False
-    continuous: ClassVar[bool] = True
-    least_squares: ClassVar[bool] = True
-    seeks_reference: ClassVar[bool] = True
+    source = "M. Hassan, A. Khajepour, IEEE Trans. Robotics 24(3), 2008; R. Dykstra, JASA 78, 1983"
+    exact = False
+    continuous = True
+    least_squares = True
+    seeks_reference = True
     options: ClassVar[dict[str, str] | None] = {
         "max_iter": "iterations at most, a number from 1 up; 50000 if not given"
     }

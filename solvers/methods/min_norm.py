@@ -6,16 +6,12 @@ pseudo-inverse comes from the singular value decomposition and $\lambda \in R^{m
 brings the tensions inside their limits. T' and N lambda are orthogonal: the result is the least norm of all.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .direct_daqp import bounded_least_norm
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["MinNorm"]
+from .method import Array, Method, Proposal, StandardForm
+from .numerics.least_norm import least_norm_in_null_space
 
 _SLACK = 1e-12  # How far s, of order one, may pass a limit; `solve` moves it back.
 
@@ -23,15 +19,13 @@ _SLACK = 1e-12  # How far s, of order one, may pass a limit; `solve` moves it ba
 class MinNorm(Method):
     """Pseudo-inverse solution, moved along the null space as little as the limits require."""
 
-    name: ClassVar[str] = "min-norm"
-    guarantee: ClassVar[str] = (
-        "the unique optimum, in closed form up to m - rank = 1; no tensions and a certificate if there are none"
-    )
-    source: ClassVar[str] = "Wang, Zhao, Li, Ji, cable-driven multi-robot towing system, Eq. 16-17, corrected"
-    exact: ClassVar[bool] = True
-    continuous: ClassVar[bool] = True
-    least_squares: ClassVar[bool] = True
-    seeks_reference: ClassVar[bool] = True
+    name = "min-norm"
+    guarantee = "the unique optimum, in closed form up to m - rank = 1; no tensions and a certificate if there are none"
+    source = "Wang, Zhao, Li, Ji, cable-driven multi-robot towing system, Eq. 16-17, corrected"
+    exact = True
+    continuous = True
+    least_squares = True
+    seeks_reference = True
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Take s' = Q^T b, and s' + N^T lambda if that is outside the limits."""
@@ -47,13 +41,10 @@ class MinNorm(Method):
             if shift is None:
                 return Proposal(None, detail="no multiple of the null-space vector lies inside the limits")
             return Proposal(s + shift * form.N[0])
-        answer = bounded_least_norm(high, low, np.ascontiguousarray(form.N.T), equalities=0)
-        if answer.s is None:
-            return answer
-        return Proposal(s + answer.s @ form.N, answer.iterations)
+        return least_norm_in_null_space(form)
 
 
-def _shortest_shift(null: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> float | None:
+def _shortest_shift(null: Array, low: Array, high: Array) -> float | None:
     """Return the lambda nearest to 0 with low <= lambda null <= high, or None; all of shape (k,)."""
     moves = np.abs(null) > _SLACK
     still = ~moves

@@ -4,13 +4,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..tolerances import RANK
-from .barrier_newton import barrier_point
+from ...tolerances import RANK
 from .log_barrier import start_in_form
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["AnalyticCentre"]
+from .method import Method, Proposal, StandardForm
+from .numerics.barrier_newton import barrier_point
 
 
 class AnalyticCentre(Method):
@@ -23,13 +20,13 @@ class AnalyticCentre(Method):
     feasible set: a certificate.
     """
 
-    name: ClassVar[str] = "analytic-centre"
-    guarantee: ClassVar[str] = (
+    name = "analytic-centre"
+    guarantee = (
         "unique, strictly inside the limits, continuously differentiable; failed if unbounded, certificate if none"
     )
-    source: ClassVar[str] = "S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 8.5.3"
-    exact: ClassVar[bool] = True
-    continuous: ClassVar[bool] = True
+    source = "S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 8.5.3"
+    exact = True
+    continuous = True
     options: ClassVar[dict[str, str] | None] = {
         "start": "tensions to start from [N], shape (m,), for example the last answer; they need not give w"
     }

@@ -14,11 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from .standard_form import StandardForm
-
-__all__ = ["corners", "inside", "meet", "simplex_centroid"]
-
-Array = NDArray[np.float64]
+from ..method import Array, StandardForm
 
 # How far a corner may lie beyond a limit, relative to the size of s.
 _SLACK = 1e-12
@@ -27,7 +23,9 @@ _SLACK = 1e-12
 _PARALLEL = 1e-13
 
 # In units of s, which is of order one: where a missing limit is put. A corner out there means there is no bound.
-_FAR = 1e8
+FAR = 1e8
+
+EMPTY = "the lines of the limits enclose nothing"  # why a method has no point
 
 
 def corners(form: StandardForm) -> Array | None:
@@ -45,7 +43,7 @@ def corners(form: StandardForm) -> Array | None:
     base = form.b @ form.Q
     open_low, open_high = np.isinf(form.lower), np.isinf(form.upper)
     largest = max(np.abs(form.lower[~open_low]).max(initial=0.0), np.abs(form.upper[~open_high]).max(initial=0.0))
-    far = _FAR * (1.0 + largest)
+    far = FAR * (1.0 + largest)
     low, high = np.where(open_low, -far, form.lower) - base, np.where(open_high, far, form.upper) - base
     vertices = _by_qhull(form.N, low, high) if freedom > 2 else meet(form.N, low, high)
     s = base + vertices @ form.N

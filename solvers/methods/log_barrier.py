@@ -11,13 +11,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import number, shown
-from .barrier_newton import barrier_point
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["LogBarrier", "start_in_form"]
+from ...errors import InputError
+from ...inputs import number, shown
+from .method import Method, Proposal, StandardForm
+from .numerics.barrier_newton import barrier_point
 
 
 class LogBarrier(Method):
@@ -31,16 +28,14 @@ class LogBarrier(Method):
     a certificate.
     """
 
-    name: ClassVar[str] = "log-barrier"
-    guarantee: ClassVar[str] = (
-        "unique, strictly inside the limits, continuously differentiable; certificate if there are none"
-    )
-    source: ClassVar[str] = (
+    name = "log-barrier"
+    guarantee = "unique, strictly inside the limits, continuously differentiable; certificate if there are none"
+    source = (
         "in the spirit of E. Ueland, T. Sauder, R. Skjetne, 'Optimal force allocation for overconstrained cable-driven "
         "parallel robots: continuously differentiable solutions', IEEE Trans. Robotics 37(2), 2021"
     )
-    exact: ClassVar[bool] = True
-    continuous: ClassVar[bool] = True
+    exact = True
+    continuous = True
     options: ClassVar[dict[str, str] | None] = {
         "barrier": "square root of mu in units of the narrowest range t_max - t_min (of 1 N if there is none); 0.01 if "
         "not given",

@@ -12,15 +12,11 @@ give the projection.
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..inputs import number
-from .box_least_squares import box_least_squares
-from .direct_daqp import bounded_least_norm
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["SoftWrench"]
+from ...inputs import number
+from ..box_least_squares import box_least_squares
+from .method import Method, Proposal, StandardForm
+from .numerics.least_norm import least_norm
 
 # How much the limits may move outwards, in units of s, until least squares on the boundary of the available wrench set
 # has a solution despite rounding.
@@ -39,18 +35,18 @@ class SoftWrench(Method):
     solves, one with `rho`.
     """
 
-    name: ClassVar[str] = "soft-wrench"
-    guarantee: ClassVar[str] = (
+    name = "soft-wrench"
+    guarantee = (
         "always tensions, Lipschitz in w: the optimum if w is available, else the nearest wrench and a certificate"
     )
-    source: ClassVar[str] = (
+    source = (
         "A. F. Côté, P. Cardou, C. Gosselin, 'A tension distribution algorithm for cable-driven parallel robots "
         "operating beyond their wrench-feasible workspace', ICCAS 2016, slack form"
     )
-    exact: ClassVar[bool] = True
-    continuous: ClassVar[bool] = True
-    least_squares: ClassVar[bool] = True
-    always_answers: ClassVar[bool] = True
+    exact = True
+    continuous = True
+    least_squares = True
+    always_answers = True
     options: ClassVar[dict[str, str] | None] = {
         "rho": "weight of the squared wrench error beside the squared tensions, 1e-12 to 1e12; infinite if not given"
     }
@@ -70,17 +66,12 @@ class SoftWrench(Method):
 
 def _nearest_wrench(form: StandardForm) -> Proposal:
     """Give b if that can be, else the available b nearest to it in newtons, with the least norm."""
-
-    def least_norm(b: NDArray[np.float64], slack: float) -> Proposal:
-        upper, lower = np.append(form.upper + slack, b), np.append(form.lower - slack, b)
-        return bounded_least_norm(upper, lower, form.Q, equalities=b.size)
-
-    exact = least_norm(form.b, 0.0)
+    exact = least_norm(form)
     if exact.s is not None:
         return exact
     nearest, _ = box_least_squares(form.sigma[:, None] * form.Q, form.sigma * form.b, form.lower, form.upper)
     for slack in _SLACKS:
-        solution = least_norm(form.Q @ nearest, slack)
+        solution = least_norm(form, form.Q @ nearest, slack)
         if solution.s is not None:
             return solution
     return Proposal(nearest)

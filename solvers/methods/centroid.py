@@ -1,12 +1,9 @@
 """Method "centroid": the centre of gravity of the feasible tensions, which the field calls barycentric."""
 
-from typing import Any, ClassVar
+from typing import Any
 
-from .feasible_polytope import corners, simplex_centroid
-from .method import Method, Proposal
-from .standard_form import StandardForm
-
-__all__ = ["Centroid"]
+from .method import Method, Proposal, StandardForm
+from .numerics.feasible_polytope import corners, simplex_centroid
 
 # Largest m - rank that is taken: the hull of the corners takes 0.2 ms in three dimensions, 7 ms in five, 0.25 s in six
 # and minutes in eight.
@@ -24,17 +21,17 @@ class Centroid(Method):
     Outside the feasible set: a certificate. The centroid is that of the tensions themselves whatever t_ref and weights.
     """
 
-    name: ClassVar[str] = "centroid"
-    guarantee: ClassVar[str] = (
+    name = "centroid"
+    guarantee = (
         "barycentric: the centroid of the feasible tensions, continuous; failed if they are unbounded or m - rank > 5, "
         "certificate if there are none"
     )
-    source: ClassVar[str] = (
+    source = (
         "L. Mikelsons et al., ICRA 2008; J. Lamaury, M. Gouttefarde, Cable-Driven Parallel Robots 2013; "
         "M. Gouttefarde, J. Lamaury, C. Reichert, T. Bruckmann, IEEE Trans. Robotics 31(6), 2015"
     )
-    exact: ClassVar[bool] = True
-    continuous: ClassVar[bool] = True
+    exact = True
+    continuous = True
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Take the centroid of the corners in the null space."""

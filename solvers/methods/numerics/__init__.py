@@ -1,0 +1,1 @@
+"""Numerics that several methods share: least norm, linear programs, the feasible polytope, Newton's method."""

@@ -1,0 +1,128 @@
+"""Solve one problem by any method: look it up, bring the problem to standard form, propose, judge."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs import shown
+from . import compiled
+from .box_least_squares import project
+from .certificate import Certificate, certificate_along, sharpest
+from .judge import judge
+from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR
+from .kernels.memory import floats
+from .kernels.single import solve_one, work_size
+from .methods import METHODS
+from .methods.active_set import ActiveSet
+from .methods.method import Method, Proposal
+from .problem import Array, TensionProblem
+from .solution import TensionSolution
+from .standard_form import standard_forms
+from .status import STATUSES
+
+__all__ = ["methods", "solve"]
+
+
+def methods() -> dict[str, Method]:
+    """Return every method by name; each has `guarantee`, `source`, `options` and `backends()`."""
+    return dict(METHODS)
+
+
+def solve(
+    problem: TensionProblem, method: str | Method = "active-set", backend: str | None = None, **options: Any
+) -> TensionSolution:
+    """Distribute the tensions of one problem.
+
+    An infeasible problem is an answer, not an exception: the status reports it and a certificate proves it. The status
+    "optimal" of a method of least squares rests on multipliers that were verified, "infeasible" and "singular" on a
+    certificate that was verified, never on a solver's word.
+
+    Parameters
+    ----------
+    problem :
+        The problem.
+    method :
+        One of `methods()`, or a method of your own (docs/adding-a-method.md).
+    backend :
+        For "qp", the name of an installed QP solver; default: "clarabel".
+    **options :
+        Options of the method, see `methods()[name].options`.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, back end or option; the message lists those that exist.
+    """
+    start = time.perf_counter()
+    if not isinstance(problem, TensionProblem):
+        raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
+    if isinstance(method, str) and method == "active-set" and backend is None and not options:
+        loaded = compiled.current()
+        n, m = problem.A.shape
+        tensions = np.empty(m)
+        code = loaded.one(problem.packed, n, m, tensions)
+        if code <= SINGULAR:
+            given, proof = (tensions, None) if code == OPTIMAL else (None, _prove)
+            spent = time.perf_counter() - start
+            return TensionSolution(problem, given, STATUSES[code], method, loaded.backend, spent, proof=proof)
+    chosen, backend = _look_up(method, backend, options)
+    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the kernel was not sure
+    forms = standard_forms(problem)
+    while True:
+        form = forms.pop(0)
+        if chosen.seeks_reference and form.holds_reference:
+            proposal = Proposal(np.zeros(form.moving.size))
+        else:
+            proposal = chosen.propose(form, backend, **options)
+        tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
+        judgement = judge(problem, form, chosen, proposal, tensions, settle=not forms)
+        if judgement is not None:
+            status, tensions, certificate, detail = judgement
+            spent = time.perf_counter() - start
+            return TensionSolution(
+                problem, tensions, status, chosen.name, used, spent, proposal.iterations, detail, certificate
+            )
+
+
+def _prove(problem: TensionProblem) -> Certificate | None:
+    """Return the sharpest certificate of what the kernel proved, or else the one along its own direction."""
+    projection = project(problem)
+    certificate = sharpest(problem, projection)
+    if certificate is None and (direction := _direction_of_kernel(problem)) is not None:
+        certificate = certificate_along(problem, direction, projection)
+    return certificate
+
+
+def _direction_of_kernel(problem: TensionProblem) -> Array | None:
+    """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of the kernel rests."""
+    n, m = problem.A.shape
+    direction = np.full(n, np.nan)
+    given: list[Any] = [problem.A.ravel(), *(problem.w, problem.t_min, problem.t_max, problem.t_ref, problem.weights)]
+    outputs: list[Any] = [np.empty(m), direction, np.empty(3)]
+    views = [memoryview(array) for array in (*given, *outputs)]
+    code = solve_one(*views[:6], problem.length, n, m, *views[6:], floats(work_size(n, m)))
+    return direction if code in (INFEASIBLE, SINGULAR) else None
+
+
+def _look_up(name: str | Method, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
+    """Return the method and the back end it will use, or raise InputError listing what there is."""
+    if isinstance(name, Method):
+        method = name
+    elif isinstance(name, str) and name in METHODS:
+        method = METHODS[name]
+    else:
+        raise InputError(f"method must be one of {', '.join(METHODS)}, got {shown(name)}")
+    available = method.backends()
+    if backend is None:
+        backend = next(iter(available), None)
+    elif not isinstance(backend, str) or backend not in available:
+        accepted = f"one of {', '.join(available)}" if available else f"None, as method {method.name} has no back ends"
+        raise InputError(f"backend must be {accepted}, got {shown(backend)}")
+    if method.options is not None:
+        unknown = [key for key in options if key not in method.options]
+        if unknown:
+            accepted = f"among {', '.join(method.options)}" if method.options else f"empty for method {method.name}"
+            raise InputError(f"options must be {accepted}, got {shown(unknown[0])}")
+    return method, backend
