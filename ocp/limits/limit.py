@@ -126,7 +126,7 @@ class Limit:
     @property
     def tolerance(self) -> float:
         """Return how far beyond the bounds the audit accepts values, in their unit."""
-        return self.scale * (EQUATION_TOLERANCE if self.is_equation else TOLERANCE)
+        return self.scale * (EQUATION_TOLERANCE if self.is_equation and self.hull is None else TOLERANCE)
 
     @property
     def is_equation(self) -> bool:

@@ -164,7 +164,7 @@ class Task(Part):
 
     @override
     def model_dump(self, **options: Any) -> dict[str, Any]:
-        """Return the fields.
+        """Return the fields, by `options` of pydantic.
 
         Raises
         ------

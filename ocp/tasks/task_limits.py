@@ -76,8 +76,6 @@ class TaskLimits(Part):
         By name of a limit, the excess that adds one to the objective, in the limit's unit; twice the excess adds four.
         The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
         carrier_turn_acceleration, carrier_reach, thrust, torque.
-    own :
-        Limits of your own (docs/adding-a-limit.md). Only in Python: a file cannot have them.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
@@ -113,7 +111,9 @@ class TaskLimits(Part):
         default={},
         description="by the name of a limit, the excess that adds one to the objective; twice the excess adds four",
     )
-    own: SkipJsonSchema[tuple[Limit, ...]] = Field(default=(), exclude=True)
+    own: SkipJsonSchema[tuple[Limit, ...]] = Field(
+        default=(), exclude=True, description="limits of your own, in Python alone (docs/adding-a-limit.md)"
+    )
 
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
