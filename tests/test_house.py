@@ -60,6 +60,20 @@ def test_the_import_test_can_see():
     assert {"models", "solvers"} <= seen
 
 
+def test_only_carriers_know_their_kinds():
+    """No other file imports a class of one kind, or compares a kind, alone or in a collection, with a value."""
+    from towline.models.carriers import _KINDS
+
+    classes = {kind.__name__ for kind in _KINDS.values()}
+    for file in {path for room in rooms() for path in files_of(room)} - {ROOT / "models" / "carriers.py"}:
+        for node in ast.walk(ast.parse(file.read_text())):
+            named = {getattr(node, "id", None), getattr(node, "attr", None), getattr(node, "name", None)}
+            assert not named & classes, f"{file.relative_to(ROOT)} names {named & classes}"
+            parts = ast.walk(node) if isinstance(node, ast.Compare | ast.Match) else ()
+            kinds = {part.value for part in parts if isinstance(part, ast.Constant)} & set(_KINDS)
+            assert not kinds, f"{file.relative_to(ROOT)} compares with {kinds}"
+
+
 def test_every_package_is_listed():
     listed = set(CONFIGURATION["tool"]["setuptools"]["packages"])
     found = {"towline"} | {
