@@ -25,7 +25,7 @@ def demo(
         halves = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict()}
         print_json({"as_expected": result.as_expected, **halves, "files": written})
     else:
-        typer.echo("A circle of 1 m radius at a height of 99 m, under a quadrotor that hovers at 100 m:\n")
+        typer.echo("A circle of radius 1 m at a height of 99 m, under a quadrotor that hovers at 100 m:\n")
         typer.echo(result.hovering.report())
         typer.echo("\nThe same circle with a quadrotor that may move, with acceleration up to 3 m/s^2:\n")
         typer.echo(result.free.report())

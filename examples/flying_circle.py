@@ -1,8 +1,8 @@
 """Plan a circle of the platform under a quadrotor; run `python examples/flying_circle.py`.
 
-In the paper of Wang, Chen, Su and Qiao the platform follows a circle of 1 m under a hovering quadrotor. All anchors are
-within 0.52 m of the quadrotor's axis, so the cables cannot hold the platform on that circle; the first plan proves it.
-In the second plan the quadrotor may move, and the platform follows the circle exactly.
+In the paper of Wang, Chen, Su and Qiao the platform follows a circle of radius 1 m under a hovering quadrotor. All
+anchors are within 0.52 m of the quadrotor's axis, so the cables cannot hold the platform on that circle; the first plan
+proves it. In the second plan the quadrotor may move, and the platform follows the circle exactly.
 """
 
 import numpy as np

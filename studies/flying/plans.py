@@ -5,7 +5,7 @@ hovers or flies straight (`circle`). These plans replace them:
 
 - VI.B, the circle in {G}, with the quadrotor free to move beside its hovering point;
 - VI.A, the helix in {G}, with the quadrotor free to leave its straight line;
-- VI.C, a circle of 0.15 m in {A}, with the quadrotor moving and pitching as given.
+- VI.C, a circle of radius 0.15 m in {A}, with the quadrotor moving and pitching as given.
 
 The paper draws VI.C's flight and pitch and prints no numbers. Assumed here: VI.A's line at its mean velocity, pitching
 by `PITCH` sin(0.2 pi t), and along x the surge that a quadrotor has when its thrust pitches: ddx = g tan(pitch).

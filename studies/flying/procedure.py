@@ -184,6 +184,6 @@ def _figure(run: Run, own: DrivingForce) -> Drawing:
         Panel("T [N]", {"in one pass": own.T[:, 0]}, dots={"step by step": run.T[:, 0]}),
     ]
     return Drawing(
-        f"Section V for cable 1: circle of {FEASIBLE:g} m, vibration of {AMPLITUDE * 1e6:g} um",
+        f"Section V for cable 1: circle of radius {FEASIBLE:g} m, vibration of {AMPLITUDE * 1e6:g} um",
         curves(run.times, "time [s]", panels),
     )

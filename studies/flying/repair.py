@@ -29,8 +29,8 @@ def chapter() -> Chapter:
     ]
     both = {"quadrotor hovering": hovering.trajectory, "quadrotor free": circle.trajectory}
     drawings = {
-        "circle-tensions": Drawing("The circle of 1 m: tensions", figures.tensions_side_by_side(both)),
-        "repair": Drawing("The circle of 1 m with the quadrotor free", figures.path(circle.trajectory)),
+        "circle-tensions": Drawing("The circle of radius 1 m: tensions", figures.tensions_side_by_side(both)),
+        "repair": Drawing("The circle of radius 1 m with the quadrotor free", figures.path(circle.trajectory)),
         "repair-base": Drawing("The position of the free quadrotor", figures.base_offset(circle.trajectory)),
         "repair-helix": Drawing("The helix with the quadrotor free", figures.path(helix.trajectory)),
     }
@@ -49,7 +49,7 @@ def _hovering(planned: Plan) -> Claim:
     return stated(
         "circle",
         "VI.B, figures 8 to 10",
-        f"Under a quadrotor hovering at [50, 50, 100] m the platform follows a circle of {RADIUS:g} m at 99 m.",
+        f"Under a quadrotor hovering at [50, 50, 100] m the platform follows a circle of radius {RADIUS:g} m at 99 m.",
         "tensions are drawn",
         planned.status.value,
         holds=planned.feasible,

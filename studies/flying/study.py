@@ -31,7 +31,7 @@ CHAPTERS = {
     "The procedure (section V)": procedure.chapter,
     "Wind (section VI)": wind.chapter,
     "A straight flight (section VI.A)": helix.chapter,
-    "A circle of 1 m, and what makes it possible (section VI.B)": repair.chapter,
+    "A circle of radius 1 m, and what makes it possible (section VI.B)": repair.chapter,
     "The largest circle (section VI.B)": radius.chapter,
     "A vibrating platform (section VI.B)": vibration.chapter,
     "A moving quadrotor (section VI.C)": disturbance.chapter,

@@ -2,7 +2,7 @@
 
 The paper prints neither the amplitude and the frequency of the vibration nor the time step. Assumed: along each axis a
 sine of one amplitude at 5, 6 and 7 Hz, no rotation; steps of 10 ms; 8 elements, whose number does not matter. On the
-printed circle the steady tension of cable 1 passes zero, so the ratio dT / T is computed on a circle of 0.15 m.
+printed circle the steady tension of cable 1 passes zero, so the ratio dT / T is computed on a circle of radius 0.15 m.
 """
 
 from __future__ import annotations
@@ -113,9 +113,8 @@ def _tension(lengths: np.ndarray, tensions: np.ndarray, near: float) -> Claim:
         together,
         holds=together > 0,
         agrees="Length and tension rise together.",
-        differs=f"The opposite holds, on a circle of {FEASIBLE:g} m too ({near:.2f}): a long cable is on the far side "
-        "of the "
-        "platform, and the near cables carry the load.",
+        differs=f"The opposite holds, on a circle of radius {FEASIBLE:g} m too ({near:.2f}): a long cable is on the far "
+        "side of the platform, and the near cables carry the load.",
         figure="turn",
     )
 
@@ -162,7 +161,7 @@ def _no_ratio(tensions: np.ndarray) -> Claim:
     return stated(
         "fig-11-circle",
         "VI.B, figure 11",
-        f"On the circle of {RADIUS:g} m dT / T of cable 1 has a largest value (zeros of its steady tension T).",
+        f"On the circle of radius {RADIUS:g} m dT / T of cable 1 has a largest value (zeros of its steady tension T).",
         "none",
         when,
         holds=not len(crossing),
@@ -178,7 +177,8 @@ def _ratio(robot: Robot, amplitudes: dict[float, float]) -> Claim:
     return undetermined(
         "fig-11",
         "VI.B, figure 11, conclusion 2",
-        f"The largest dT / T of cable 1 is 12.47 % (amplitude of the vibration for it, on a circle of {FEASIBLE:g} m).",
+        "The largest dT / T of cable 1 is 12.47 % (amplitude of the vibration for it, on a circle of radius "
+        f"{FEASIBLE:g} m).",
         f"{RATIO:.2%}",
         f"{ratio:.2%} at {amplitudes[STEP] * 1e6:.2f} um",
         missing="Amplitude, frequency and time step are not printed, and the ratio grows with the amplitude from zero. "
@@ -203,7 +203,7 @@ def _curves(robot: Robot, amplitude: float) -> Drawing:
         Panel("dT / T [%]", {"with vibration": 100 * shaken.ratio[rows, 0]}, {"12.47 %": 100 * RATIO}),
     ]
     return Drawing(
-        f"Figures 9 to 11 about the largest ratio: cable 1, circle of {FEASIBLE:g} m, {amplitude * 1e6:.2g} um",
+        f"Figures 9 to 11 about the largest ratio: cable 1, circle of radius {FEASIBLE:g} m, {amplitude * 1e6:.2g} um",
         curves(TIMES[rows], "time [s]", panels),
     )
 
