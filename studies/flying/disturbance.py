@@ -1,8 +1,9 @@
 """Paper F's section VI.C: the tension of cable 1 with and without D_B, under a quadrotor that moves and pitches.
 
 The paper draws the flight and the pitch and prints no numbers. Assumed, as in `plans`: VI.A's line, pitching by
-0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its thrust pitches; and a circle of radius 0.15 m in {A},
-on which every cable pulls. "Without D_B" means with the D_B of a level, hovering quadrotor, which is the weight alone.
+0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its thrust pitches; and a circle of radius 0.15 m in
+{A}, on which every cable pulls. "Without D_B" means with the D_B of a level, hovering quadrotor, which is the weight
+alone.
 """
 
 from __future__ import annotations

@@ -113,8 +113,8 @@ def _tension(lengths: np.ndarray, tensions: np.ndarray, near: float) -> Claim:
         together,
         holds=together > 0,
         agrees="Length and tension rise together.",
-        differs=f"The opposite holds, on a circle of radius {FEASIBLE:g} m too ({near:.2f}): a long cable is on the far "
-        "side of the platform, and the near cables carry the load.",
+        differs=f"The opposite holds, on a circle of radius {FEASIBLE:g} m too ({near:.2f}): a long cable is on the "
+        "far side of the platform, and the near cables carry the load.",
         figure="turn",
     )
 
