@@ -28,8 +28,8 @@ EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long
 ROBOT = "wang-flying"
 
-# Not called by a user: exceptions and status words, what an author of a method writes or gets, and results, which
-# towline makes (their methods are called).
+# Not called by a user: exceptions and status words, what an author of a method or a condition writes or gets, and
+# results, which towline makes (their methods are called).
 NOT_CALLED = {
     "InputError",
     "SolverError",
@@ -45,6 +45,7 @@ NOT_CALLED = {
     "Plan",
     "TensionSolution",
     "Timing",
+    "evaluate",  # of a condition: `holds` checks the arguments and calls it
     "load_kernels",  # compiles for half a minute
 }
 
@@ -298,7 +299,7 @@ def subjects() -> dict[str, Subject]:
     objects |= {name: getattr(workspace, name)(**MODELS[name]) for name in MODELS if name not in objects}
     for name, value in objects.items():
         for method, bound in public_methods(value):
-            if method != "model_validate":
+            if method not in {"model_validate", *NOT_CALLED}:
                 result[f"{name}.{method}"] = of_function(f"{name}.{method}", bound)
     for name, method in towline.methods().items():
         options = list(method.options or {})
