@@ -18,7 +18,7 @@ LARGEST = 1e9  # of any number in a file: beyond it squares and products stop be
 
 
 def _plain_number(value: Any) -> Any:
-    if isinstance(value, bool | str):
+    if isinstance(value, bool | str | complex):
         raise ValueError("must be a number")
     return value
 

@@ -19,7 +19,7 @@ from ..inputs import finite_array, required
 from ..text import quantity
 from ..tolerances import NEGLIGIBLE, RANK
 from .box_least_squares import Projection, project
-from .problem import Array, TensionProblem
+from .problem import Array, TensionProblem, accepted_error
 
 __all__ = ["Certificate", "CertificateText", "certificate_along", "certify", "sharpest"]
 
@@ -256,7 +256,7 @@ def _outside_range(problem: TensionProblem) -> Array | None:
 
 def _along(problem: TensionProblem, vector: Array, closest: Array, any_length: bool = False) -> Certificate | None:
     """Return the certificate along a scaled wrench [N], or None if it, or its shortfall, is below the tolerance."""
-    tolerance = problem.accepted_error(closest)
+    tolerance = accepted_error(problem, closest)
     size = np.sqrt(vector @ vector)
     if not (0.0 if any_length else tolerance) < size < np.inf:
         return None

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..tolerances import FEASIBILITY
 from .box_least_squares import Projection, project
-from .problem import Array, TensionProblem
+from .problem import Array, TensionProblem, accepted_error
 
 # Relative error of the wrench at an optimum where the cost is proportional to the wrench: 1e-22, far below rounding.
 # Where the cost is K times as sensitive the error is K times as large.
@@ -34,7 +34,7 @@ def exact_optimum(problem: TensionProblem, projection: Projection | None = None)
     """
     nearest = (projection or project(problem)).closest
     size = problem.weights @ (nearest - problem.t_ref) ** 2
-    wrench = problem.accepted_error(nearest) / FEASIBILITY
+    wrench = accepted_error(problem, nearest) / FEASIBILITY
     _, exponent = np.frexp(size / wrench / wrench / _ERROR if size > 0.0 and wrench > 0.0 else 1.0)
     rho = Fraction(2) ** int(exponent)
 

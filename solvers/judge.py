@@ -8,7 +8,7 @@ from .box_least_squares import project
 from .certificate import Certificate, sharpest
 from .exact_arithmetic import exact_optimum
 from .methods.method import Method, Proposal
-from .problem import Array, TensionProblem
+from .problem import Array, TensionProblem, accepted_error
 from .standard_form import StandardForm
 from .status import Status
 
@@ -72,4 +72,4 @@ def judge(
 
 def _gives_wrench(problem: TensionProblem, tensions: Array) -> bool:
     error = problem.scaled_A @ tensions - problem.scaled_w
-    return bool(np.sqrt(error @ error) <= problem.accepted_error(tensions))
+    return bool(np.sqrt(error @ error) <= accepted_error(problem, tensions))

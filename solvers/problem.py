@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..inputs import real_array
 from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 
-__all__ = ["Array", "TensionProblem"]
+__all__ = ["Array", "TensionProblem", "accepted_error"]
 
 Array = NDArray[np.float64]
 
@@ -174,13 +174,15 @@ class TensionProblem:
         if not isinstance(tensions, np.ndarray) or tensions.shape != self.t_min.shape or tensions.dtype != np.float64:
             tensions = _per_cable("tensions", tensions, self.m)
             _require_finite("tensions", tensions)
-        return self.accepted_error(tensions)
+        return accepted_error(self, tensions)
 
-    def accepted_error(self, tensions: Array) -> float:
-        """Return `tolerance` [N] of tensions (m,) of float64 that are known to be numbers."""
-        nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
-        required = np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero)
-        return float(FEASIBILITY * required + ROUNDING * (self.column_norms @ (np.abs(tensions) + np.abs(self.t_ref))))
+
+def accepted_error(problem: TensionProblem, tensions: Array) -> float:
+    """Return `TensionProblem.tolerance` [N] of tensions (m,) of float64 that are known to be numbers."""
+    nearest_to_zero = np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max)
+    norms = problem.column_norms
+    required = np.sqrt(problem.scaled_w @ problem.scaled_w) + norms @ np.abs(nearest_to_zero)
+    return float(FEASIBILITY * required + ROUNDING * (norms @ (np.abs(tensions) + np.abs(problem.t_ref))))
 
 
 def _real_array(name: str, value: ArrayLike) -> Array:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 import towline
 from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along
@@ -48,6 +49,9 @@ NOT_CALLED = {
     "evaluate",  # of a condition: `holds` checks the arguments and calls it
     "load_kernels",  # compiles for half a minute
 }
+
+# Called by towline with what it has checked, and written by the author of a condition.
+HOOKS = {"evaluate"}
 
 WRONG: dict[str, Any] = {
     "none": None,
@@ -271,7 +275,9 @@ def public_methods(value: Any) -> Iterator[tuple[str, Callable[..., Any]]]:
     for name in dir(type(value)):
         static = inspect.getattr_static(type(value), name)
         function = static.__func__ if isinstance(static, classmethod | staticmethod) else static
-        if name[0] != "_" and inspect.isfunction(function) and function.__module__.startswith("towline"):
+        if name[0] == "_" or name in HOOKS or hasattr(BaseModel, name):  # pydantic answers for its own
+            continue
+        if inspect.isfunction(function) and function.__module__.startswith("towline"):
             yield name, getattr(value, name)
 
 
