@@ -4,7 +4,8 @@ from .planner import Planner, plan
 from .result import Plan
 from .status import MotionStatus
 from .tasks.task import Task, read_task
-from .timing.timing import Timing, time_along
+from .timing.fastest_law import time_along
+from .timing.timing import Timing
 
 __all__ = [
     "MotionStatus",

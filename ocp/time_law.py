@@ -15,7 +15,8 @@ from .tasks.path import AnyPath, LinePath, RestPath, WaypointPath
 from .tasks.scenario import Scenario
 from .tasks.task import Tube
 from .tasks.task_limits import TaskLimits
-from .timing.timing import KNOWN_LIMITS, Timing, time_along
+from .timing.fastest_law import KNOWN_LIMITS, time_along
+from .timing.timing import Timing
 
 __all__ = ["BOUND", "fastest"]
 

@@ -47,9 +47,9 @@ class AuditedMotion:
 
     def limited(self) -> list[np.ndarray]:
         """Return what each limit bounds over time, (n, k), in its unit."""
-        carriers = zip(*(np.moveaxis(part, 1, 0) for part in self.carriers), strict=True)
-        bodies = [np.hstack(parts) for parts in (self.motion, *carriers)]
-        return self.scenario.limits.over(self.times, bodies, self.tensions, self.off_path)
+        limits = self.scenario.limits
+        values = limits.along(self.motion, self.carriers, self.tensions, self.off_path)
+        return [limit.over(self.times, its) for limit, its in zip(limits, values, strict=True)]
 
 
 def excesses(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:

@@ -28,8 +28,8 @@ class CarrierSpeed(Magnitude):
     name, unit = "carrier_speed", "m/s"
 
     def __init__(self, robot: Robot, index: int, most: float):
+        super().__init__(most)
         self.labels = (robot.carriers[index].name,)
-        self.high = self.scale = most
         self.hull = Hull(index, 1, (0, 1, 2))
         self._index = index
 
@@ -44,8 +44,8 @@ class CarrierAcceleration(Magnitude):
     name, unit = "carrier_acceleration", "m/s^2"
 
     def __init__(self, robot: Robot, index: int, most: float):
+        super().__init__(most)
         self.labels = (robot.carriers[index].name,)
-        self.high = self.scale = most
         self.hull = Hull(index, 2, (0, 1, 2))
         self._index = index
 
@@ -60,7 +60,8 @@ class CarrierTilt(Angle):
     name = "carrier_tilt"
 
     def __init__(self, robot: Robot, index: int, most: float):
-        self.labels, self.high = (robot.carriers[index].name,), most
+        super().__init__(most)
+        self.labels = (robot.carriers[index].name,)
         self.hull = Hull(index, 0, (3, 4))  # {cos r cos p >= c} is convex
         self._index = index
 

@@ -164,6 +164,9 @@ class Magnitude(Limit):
     is then 5e-7 too large. On Bernstein points the square is limited, which has no corner.
     """
 
+    def __init__(self, most: float):
+        self.high = self.scale = most
+
     @override
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
         if self.is_convex:
@@ -181,6 +184,9 @@ class Angle(Limit):
     """A limit of an angle [rad]: `values` is its cosine, which has a derivative at zero too; `high` is the angle."""
 
     unit = "rad"
+
+    def __init__(self, most: float):
+        self.high = most
 
     @property
     def _least(self) -> float:

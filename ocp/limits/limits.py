@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,8 @@ from .limit import Limit
 from .state import Body, State
 
 __all__ = ["Limits"]
+
+Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,24 +102,26 @@ class Limits:
             raise InputError(f"limit {limit.name!r} must depend only on what its hull names, got {hull}")
         return ca.Function("hull", [part], [values])
 
-    def over(
-        self, times: np.ndarray, bodies: list[np.ndarray], tensions: np.ndarray, off_path: np.ndarray
+    def along(
+        self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None
     ) -> list[np.ndarray]:
-        """Return what each limit bounds along a motion, one array (n, k) a limit, in its unit.
+        """Return the values of each limit along a motion in {G}, (n, k).
 
         Parameters
         ----------
-        times
-            (n,) [s].
-        bodies
-            Motions of platform and carriers in {G}, (n, 18) each.
+        platform, carriers
+            Pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
         tensions
-            (n, m) [N]; where they are nan, so are the values that depend on them.
+            (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
         off_path
-            Offset of the platform from its path, (n, 6) [m, rad].
+            Offset of the platform from its path, (n, 6) [m, rad]. Default: zeros.
         """
         if not self.all:
             return []
-        arguments = (*(body.T for body in bodies), tensions.T, off_path.T)
-        values = self.function.map(len(times))(*arguments).full().T
-        return [limit.over(times, values[:, place]) for limit, place in zip(self, self.places, strict=True)]
+        n = len(platform[0])
+        bodies = [platform, *zip(*(np.moveaxis(part, 1, 0) for part in carriers), strict=True)]
+        arguments = [np.hstack(body) for body in bodies]
+        arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
+        arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
+        values = self.function.map(n)(*(each.T for each in arguments)).full().T
+        return [values[:, place] for place in self.places]

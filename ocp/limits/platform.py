@@ -17,9 +17,6 @@ class PlatformSpeed(Magnitude):
 
     name, unit = "platform_speed", "m/s"
 
-    def __init__(self, most: float):
-        self.high = self.scale = most
-
     @override
     def values(self, state: State) -> ca.SX:
         return state.platform.velocity[:3]
@@ -29,9 +26,6 @@ class PlatformAcceleration(Magnitude):
     """Limit the acceleration of the platform frame's origin."""
 
     name, unit = "platform_acceleration", "m/s^2"
-
-    def __init__(self, most: float):
-        self.high = self.scale = most
 
     @override
     def values(self, state: State) -> ca.SX:
@@ -43,9 +37,6 @@ class PlatformTurn(Magnitude):
 
     name, unit = "platform_turn", "rad/s"
 
-    def __init__(self, most: float):
-        self.high = self.scale = most
-
     @override
     def values(self, state: State) -> ca.SX:
         return body_rate(state.platform.pose[3:6], state.platform.velocity[3:6])
@@ -55,9 +46,6 @@ class PlatformTilt(Angle):
     """Limit the angle of the platform's z axis to the vertical."""
 
     name = "platform_tilt"
-
-    def __init__(self, most: float):
-        self.high = most
 
     @override
     def values(self, state: State) -> ca.SX:

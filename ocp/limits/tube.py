@@ -20,7 +20,7 @@ class TubePosition(Magnitude):
     hull = Hull(None, 0, (0, 1, 2))
 
     def __init__(self, radius: float):
-        self.high = self.scale = radius
+        super().__init__(radius)
         self.shown = radius > 0
 
     @override

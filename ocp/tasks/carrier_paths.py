@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol, TypeVar
-
 from ...errors import InputError
 from ...models import Robot
 from .path import AnyPath, RestPath
 from .task import GivenBase, HoldBase, Task
 
-__all__ = ["by_index", "carrier_paths"]
+__all__ = ["carrier_paths"]
 
 
-class _Framed(Protocol):
-    @property
-    def frame(self) -> str: ...
-
-
-Framed = TypeVar("Framed", bound=_Framed)
-
-
-def by_index(robot: Robot, paths: Mapping[str, Framed], field: str) -> dict[int, Framed]:
-    """Return paths given by the names of carriers by the index of their carrier; a message names `field`.
+def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
+    """Return the carriers' reference paths by the index of the carrier; the others stay at home.
 
     Raises
     ------
     InputError
         If a name is unknown or that of a carrier that never moves, or if a path is not given in {G}.
     """
-    names = [carrier.name for carrier in robot.carriers]
+    base = task.base
+    if isinstance(base, HoldBase):
+        paths: dict[str, AnyPath] = {name: RestPath(kind="rest", pose=pose) for name, pose in base.poses.items()}
+        key = "poses"
+    elif isinstance(base, GivenBase):
+        paths, key = base.paths, "paths"
+    else:
+        paths, key = base.around, "around"
+    field, names = f"task {task.name!r}: base.{key}", [carrier.name for carrier in robot.carriers]
     paths_by_index = {}
     for name, path in paths.items():
         if name not in names:
@@ -41,22 +38,3 @@ def by_index(robot: Robot, paths: Mapping[str, Framed], field: str) -> dict[int,
             raise InputError(f"{field}.{name}.frame must be world, got {path.frame!r}")
         paths_by_index[names.index(name)] = path
     return paths_by_index
-
-
-def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
-    """Return the carriers' reference paths by the index of the carrier; the others stay at home.
-
-    Raises
-    ------
-    InputError
-        As `by_index` does.
-    """
-    base = task.base
-    if isinstance(base, HoldBase):
-        paths: dict[str, AnyPath] = {name: RestPath(kind="rest", pose=pose) for name, pose in base.poses.items()}
-        field = "poses"
-    elif isinstance(base, GivenBase):
-        paths, field = base.paths, "paths"
-    else:
-        paths, field = base.around, "around"
-    return by_index(robot, paths, f"task {task.name!r}: base.{field}")

@@ -14,7 +14,7 @@ import numpy as np
 from ...distribution import wrench_problem
 from ...solvers import TensionProblem, capacity_margin
 from ..tasks.path import TimedPath
-from .parametrised_path import ParametrisedPath, PathLimits
+from .parametrised_path import ParametrisedPath, PathLimits, relative
 
 __all__ = ["Bottleneck", "bottlenecks"]
 
@@ -33,7 +33,7 @@ class Bottleneck(NamedTuple):
     seconds
         How long the motion takes there.
     limit
-        What is at its limit: "t_max of cables 2, 5", "platform speed".
+        What is at its limit: "t_max of cables 2, 5", "speed of platform".
     """
 
     start: float
@@ -55,21 +55,20 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     edges = np.linspace(0.0, path.times[-1], LOOKS + 1)
     s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
     platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
-    speeds = parametrised.relative_speeds(platform, carriers, limits)
-    names, values = [*speeds.names], [*speeds.values.T]
-    for index, most in limits.carrier_acceleration.items():
-        names.append(f"acceleration of {parametrised.robot.carriers[index].name}")
-        values.append(np.linalg.norm(carriers.acceleration[:, index, :3], axis=1) / most)
+    names, shares = [], []
+    for each in limits:
+        names += [f"{limit.name.partition('_')[2]} of {label}" for limit in each for label in limit.labels]
+        shares.append(relative(each, platform, carriers))
+    reached = np.hstack(shares)
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)
     w = parametrised.dynamics.required_wrench(*platform, wind=parametrised.wind)
     low, high = parametrised.robot.t_min + margin, parametrised.robot.t_max - margin
     reached_limits = []
     for k in range(LOOKS):
-        fastest = int(np.argmax([value[k] for value in values]))
-        reached = values[fastest][k] >= REACHED
-        reached_limits.append(
-            names[fastest] if reached else _tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high))
-        )
+        if reached[k].max(initial=0.0) >= REACHED:
+            reached_limits.append(names[int(reached[k].argmax())])
+        else:
+            reached_limits.append(_tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high)))
     at, stretches, first = path.law(edges)[0], [], 0
     for limit, run in groupby(reached_limits):
         after = first + len(list(run))

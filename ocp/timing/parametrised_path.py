@@ -11,17 +11,14 @@ only through the wrench matrix, so their motion along s enters A(s) and, if the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from ...errors import InputError
 from ...models import Dynamics, Robot
-from ...models.batch import call
 from ...models.part import COORDINATES
+from ..limits.limits import Limits
 from ..tasks.path import CirclePath, Curve, Motion, RestPath
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
@@ -31,21 +28,11 @@ SIDES = 64  # of the polygon inside the circle of accelerations: it gives away 0
 LOOKS = 2001  # points at which the geometry is checked
 
 
-@dataclass(frozen=True)
-class PathLimits:
-    """The limits beside those of the tensions; infinity stands for no limit."""
+class PathLimits(NamedTuple):
+    """The limits beside those of the tensions, all of whose values are proportional to speeds or to accelerations."""
 
-    speed: float  # of the platform [m/s]
-    cable_speed: np.ndarray  # (m,) [m/s]
-    carrier_speed: dict[int, float]  # of those that move [m/s]
-    carrier_acceleration: dict[int, float]  # [m/s^2]
-
-
-class RelativeSpeeds(NamedTuple):
-    """The speeds of the parts of a motion: names, and values (n, k) in parts of their limits."""
-
-    names: list[str]
-    values: np.ndarray
+    speeds: Limits
+    accelerations: Limits
 
 
 class Wrench(NamedTuple):
@@ -135,55 +122,25 @@ class ParametrisedPath:
     def speed_limit(self, platform: Motion, carriers: Motion, limits: PathLimits) -> np.ndarray:
         """Return the largest ds/dt that the limits of speed allow, (n,) [1/s]."""
         with np.errstate(divide="ignore"):
-            return 1.0 / self.relative_speeds(platform, carriers, limits).values.max(axis=1)
+            return 1.0 / relative(limits.speeds, platform, carriers).max(axis=1, initial=0.0)
 
-    def relative_speeds(self, platform: Motion, carriers: Motion, limits: PathLimits) -> RelativeSpeeds:
-        """Return the speeds of a motion, by s or by time, in parts of their limits."""
-        speeds = {"platform speed": np.linalg.norm(platform.velocity[:, :3], axis=1) / limits.speed}
-        if np.isfinite(limits.cable_speed).any():
-            of_cables = np.abs(self.length_rates(platform, carriers)) / limits.cable_speed
-            speeds |= {f"speed of cable {i + 1}": values for i, values in enumerate(of_cables.T)}
-        for index, limit in limits.carrier_speed.items():
-            speed = np.linalg.norm(carriers.velocity[:, index, :3], axis=1)
-            speeds[f"speed of {self.robot.carriers[index].name}"] = speed / limit
-        return RelativeSpeeds(list(speeds), np.stack(list(speeds.values()), axis=1))
-
-    def carrier_rows(self, carriers: Motion, limits: PathLimits) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Return the limits of the carriers' accelerations as a u + b x + c <= 0, (n, SIDES) each, relative.
+    def acceleration_rows(
+        self, carriers: Motion, limits: PathLimits
+    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Return the limits of accelerations as a u + b x + c <= 0, (n, SIDES) each, relative.
 
         |P' u + P'' x| lies in the plane of P' and P''; a polygon inside the circle there stands for it.
         """
-        rows = []
         angle = np.arange(SIDES) * 2 * np.pi / SIDES
         around = np.stack([np.cos(angle), np.sin(angle)])  # (2, SIDES)
-        for index, most in limits.carrier_acceleration.items():
-            if not np.isfinite(most):
-                continue
-            pair = np.stack([carriers.velocity[:, index, :3], carriers.acceleration[:, index, :3]], axis=2)
-            R = np.asarray(np.linalg.qr(pair, mode="r"))  # (n, 2, 2)
-            a, b = (R[:, :, k] @ around / most for k in (0, 1))
+        still = Motion(*(np.zeros_like(part[:, 0]) for part in carriers))
+        by_each = (limits.accelerations.along(still, carriers._replace(acceleration=part)) for part in carriers[1:])
+        rows = []
+        for limit, first, second in zip(limits.accelerations, *by_each, strict=True):
+            R = np.asarray(np.linalg.qr(np.stack([first, second], axis=2), mode="r"))  # (n, 2, 2)
+            a, b = (R[:, :, k] @ around / limit.high for k in (0, 1))
             rows.append((a, b, np.full_like(a, -np.cos(np.pi / SIDES))))
         return rows
-
-    def length_rates(self, platform: Motion, carriers: Motion) -> np.ndarray:
-        """Return the derivatives of the cable lengths by s, (n, m) [m], or for derivatives by time by time [m/s]."""
-        arguments = {
-            "pose": platform.pose,
-            "carrier_pose": carriers.pose,
-            "velocity": platform.velocity,
-            "carrier_velocity": carriers.velocity,
-        }
-        rates = call(self._length_rate, arguments)["rate"]
-        return rates.reshape(len(platform.pose), self.robot.m)
-
-    @cached_property
-    def _length_rate(self) -> ca.Function:
-        lengths = self.dynamics.functions["cable_lengths"]
-        at = [ca.SX.sym(name, *lengths.size_in(name)) for name in lengths.name_in()]
-        by = [ca.SX.sym(name, *lengths.size_in(name)) for name in lengths.name_in()]
-        names = [*lengths.name_in(), "velocity", "carrier_velocity"]
-        rate = ca.jtimes(lengths(*at), ca.veccat(*at), ca.veccat(*by))
-        return ca.Function("length_rate", [*at, *by], [rate], names, ["rate"])
 
     def _frame(self) -> bool:
         only = self.robot.carriers[0].name if len(self.robot.carriers) == 1 else None
@@ -235,3 +192,14 @@ def _refuse(s: np.ndarray, bad: np.ndarray, must: str, got: str) -> None:
     """Raise InputError of what must be and what is at the first `bad` s, if there is one."""
     if bad.any():
         raise InputError(f"{must}, got {got} at s = {s[np.argmax(bad)]:.4g}")
+
+
+def relative(limits: Limits, platform: Motion, carriers: Motion) -> np.ndarray:
+    """Return the sizes of all values along a motion, by s or by time, in parts of their bounds, (n, k)."""
+    values = limits.along(platform, carriers)
+    # Of a motion by s there are no times; no limit that a time law keeps is one of a rate.
+    sizes = (
+        np.abs(limit.over(np.arange(len(platform.pose)), its)) / limit.high
+        for limit, its in zip(limits, values, strict=True)
+    )
+    return np.hstack([np.zeros((len(platform.pose), 0)), *sizes])

@@ -106,7 +106,7 @@ def phase_plane(
     available = facets(A, np.minimum(robot.t_min + margin, middle), np.maximum(robot.t_max - margin, middle))
     _check_span(s, wrench, available)
     x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
-    lowered = [(a, b, c * (1 - shrink)) for a, b, c in parametrised.carrier_rows(carriers, limits)]
+    lowered = [(a, b, c * (1 - shrink)) for a, b, c in parametrised.acceleration_rows(carriers, limits)]
     return PhasePlane(wrench, available, x_max, lowered)
 
 
