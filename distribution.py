@@ -66,8 +66,8 @@ def tensions(
     from .models.files import as_robot
     from .solvers.solve import solve
 
-    moving = (velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
-    problem = pose_problem(dynamics_of(as_robot(robot)), pose, *moving, wind=wind, t_ref=t_ref)
+    motion = (pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
+    problem = pose_problem(dynamics_of(as_robot(robot)), *motion, wind=wind, t_ref=t_ref)
     return solve(problem, method, backend, **options)
 
 
@@ -89,10 +89,10 @@ def pose_problem(
     InputError
         If an argument has a wrong type, shape or value, or a cable has no length.
     """
-    robot = dynamics.robot
-    given = {"pose": pose, "velocity": velocity, "acceleration": acceleration, "carrier_pose": carrier_pose}
-    given |= {"carrier_velocity": carrier_velocity, "carrier_acceleration": carrier_acceleration, "wind": wind}
-    for name, value in given.items():
+    from .models.motion import Motion
+
+    motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
+    for name, value in {**motion._asdict(), "wind": wind}.items():
         if value is None:
             continue
         array = real_array(name, value)
@@ -100,17 +100,13 @@ def pose_problem(
             raise InputError(f"{name} must be that of one instant, got an array of shape {array.shape}")
         if np.isfinite(array).all() and np.abs(array).max(initial=0.0) > LARGEST:
             raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {np.abs(array).max():g}")
-    rate = np.zeros(6) if velocity is None else velocity
-    rate_rate = np.zeros(6) if acceleration is None else acceleration
     short = np.flatnonzero(~(dynamics.cable_lengths(pose, carrier_pose) > COINCIDENT))
     if short.size:
         raise InputError(
             f"pose must leave every cable a length, got one at which the ends of cable {short[0] + 1} coincide"
         )
-    A = dynamics.wrench_matrix(pose, carrier_pose)
-    carriers = (carrier_pose, carrier_velocity, carrier_acceleration)
-    w = dynamics.required_wrench(pose, rate, rate_rate, *carriers, wind=wind)
-    return wrench_problem(robot, A, w, t_ref=t_ref)
+    w = dynamics.required_wrench(*motion.at_rest_by_default(), wind=wind)
+    return wrench_problem(dynamics.robot, dynamics.wrench_matrix(pose, carrier_pose), w, t_ref=t_ref)
 
 
 def wrench_problem(

@@ -69,6 +69,26 @@ def call(
     return outputs
 
 
+def as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
+    """Return `value` as floats whose last dimensions are `core`, or raise InputError unless all are finite."""
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiubO":
+            raise TypeError
+        array = given.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
+    if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
+        raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")
+    # A sum is finite, unless an element is not finite or near the largest float. That of squares is the quickest of few
+    # elements; of many, BLAS would share it among threads.
+    total = np.vdot(array, array) if array.size < ELEMENTS_OF_ONE_THREAD else array.sum()
+    if not math.isfinite(total) and not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{name} must be finite numbers, got {array[index]} at index {index}")
+    return array
+
+
 def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
     """Check arguments, each a value and its shape without leading dimensions, and return them as arrays of floats.
 
@@ -77,7 +97,7 @@ def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
     InputError
         Naming the argument whose shape or value does not fit; also if the leading dimensions do not broadcast.
     """
-    checked = {name: _as_array(name, value, core) for name, (value, core) in values.items()}
+    checked = {name: as_array(name, value, core) for name, (value, core) in values.items()}
     _leading(checked, {name: core for name, (_, core) in values.items()})
     return list(checked.values())
 
@@ -149,7 +169,7 @@ class _Evaluator:
             if name not in self.inputs:
                 raise InputError(f"{name} must be an input of {self.name}, which has {', '.join(self.inputs)}")
         return {
-            name: _as_array(name, arguments[name], core) if name in arguments else np.full(core, self._defaults[name])
+            name: as_array(name, arguments[name], core) if name in arguments else np.full(core, self._defaults[name])
             for name, core in self._cores.items()
         }
 
@@ -254,7 +274,7 @@ def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, A
                 raise InputError(f"{name} must have the shape {size}, got an expression of shape {value.shape}")
             result[name] = value
         else:
-            array = _as_array(
+            array = as_array(
                 name, value.full().reshape(_core(size)) if isinstance(value, ca.DM) else value, _core(size)
             )
             if array.shape != _core(size):
@@ -272,25 +292,6 @@ def _leading(arrays: dict[str, np.ndarray], cores: dict[str, tuple[int, ...]]) -
         shapes = ", ".join(str(shape) for shape in leading.values())
         message = f"{', '.join(leading)} must have leading dimensions that are equal or 1, got {shapes}"
         raise InputError(message) from None
-
-
-def _as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiubO":
-            raise TypeError
-        array = given.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
-    if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
-        raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")
-    # A sum is finite, unless an element is not finite or near the largest float. That of squares is the quickest of few
-    # elements; of many, BLAS would share it among threads.
-    total = np.vdot(array, array) if array.size < ELEMENTS_OF_ONE_THREAD else array.sum()
-    if not math.isfinite(total) and not np.isfinite(array).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{name} must be finite numbers, got {array[index]} at index {index}")
-    return array
 
 
 def _shape(core: tuple[int, ...]) -> str:

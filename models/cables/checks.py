@@ -32,22 +32,6 @@ def count(name: str, value: Any, least: int) -> int:
     return int(value)
 
 
-def array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Return `value` as finite floats whose last dimensions are `shape` (None for any), or raise InputError."""
-    sizes = ", ".join("n" if size is None else str(size) for size in shape)
-    try:
-        numbers = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be an array of numbers of shape (..., {sizes}), got {value!r}") from None
-    last = numbers.shape[numbers.ndim - len(shape) :]
-    if numbers.ndim < len(shape) or any(want not in (None, got) for want, got in zip(shape, last, strict=True)):
-        raise InputError(f"{name} must have the shape (..., {sizes}), got {numbers.shape}")
-    if not np.isfinite(numbers).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
-        raise InputError(f"{name} must have finite numbers, got {numbers[index]} at index {index}")
-    return numbers
-
-
 def _number(name: str, value: Any) -> float:
     try:
         return float(value)

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...errors import InputError
+from ..batch import as_array
 from ..dynamics import Dynamics
 from ..points import rotations
 from ..robot import Robot
@@ -126,7 +127,7 @@ def driving_force(
     stiffness, damping = _cable_constants(robot)
     time_step = checks.positive("time_step", time_step)
     elements = checks.count("elements", elements, 1)
-    pose = checks.array("pose", pose, (None, 6))
+    pose = as_array("pose", pose, (6,))
     if pose.ndim != 2:
         raise InputError(f"pose must have the shape (N, 6), one row per instant, got {pose.shape}")
     instants = len(pose)
@@ -174,7 +175,7 @@ def _cable_constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _series(name: str, value: Any, instants: int) -> np.ndarray:
-    array = checks.array(name, value, (6,))
+    array = as_array(name, value, (6,))
     if array.shape not in ((6,), (1, 6), (instants, 6)):
         raise InputError(f"{name} must have the shape ({instants}, 6) like pose, or (6,), got {array.shape}")
     return np.broadcast_to(array, (instants, 6))

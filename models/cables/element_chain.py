@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..batch import as_array
 from . import checks
 
 if TYPE_CHECKING:  # scipy.sparse takes a tenth of a second to import
@@ -67,7 +68,7 @@ class ElementChain:
 
     def __post_init__(self):
         for name in ("anchor", "attachment"):
-            object.__setattr__(self, name, checks.array(name, getattr(self, name), (3,)).reshape(3))
+            object.__setattr__(self, name, as_array(name, getattr(self, name), (3,)).reshape(3))
         checks.positive("stiffness", self.stiffness)
         checks.count("elements", self.elements, 1)
         if self.pretension != np.inf:
@@ -86,11 +87,11 @@ class ElementChain:
 
     def displacements(self, end: Any) -> np.ndarray:
         """Return the displacement of each node in equilibrium [m], (n + 1, 3), if node n moves by `end` (3,) [m]."""
-        return np.arange(self.elements + 1)[:, None] / self.elements * checks.array("end", end, (3,))
+        return np.arange(self.elements + 1)[:, None] / self.elements * as_array("end", end, (3,))
 
     def elongations(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
         """Return c . (dx_j - dx_{j-1}) + de of each element [m], (n,), for node displacements (n + 1, 3) [m]."""
-        nodes = checks.array("displacements", displacements, (self.elements + 1, 3))
+        nodes = as_array("displacements", displacements, (self.elements + 1, 3))
         return np.diff(nodes @ self.direction) + winding
 
     def taut(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
@@ -129,7 +130,7 @@ class ElementChain:
         """
         from scipy.sparse import kron
 
-        nodes = checks.array("displacements", displacements, (self.elements + 1, 3))
+        nodes = as_array("displacements", displacements, (self.elements + 1, 3))
         taut = self.taut(nodes, winding)
         forces = self.K_n(taut) @ nodes.ravel() + self.K_l(taut) @ np.full(self.elements, winding)
         if self.pretension > 0 and not taut.all():
@@ -146,7 +147,7 @@ class ElementChain:
         return self.stiffness * self.elements / self.length
 
     def _switch(self, taut: Any) -> np.ndarray:
-        return np.ones(self.elements) if taut is None else checks.array("taut", taut, (self.elements,))
+        return np.ones(self.elements) if taut is None else as_array("taut", taut, (self.elements,))
 
     def _steps(self) -> csr_array:
         """Return the matrix (n, n + 1) from values at the nodes to their differences over the elements."""

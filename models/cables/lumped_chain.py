@@ -25,6 +25,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..batch import as_array
 from . import checks, elastic
 
 
@@ -65,7 +66,7 @@ class LumpedChain:
             checks.positive(name, getattr(self, name))
         checks.non_negative("damping", self.damping)
         checks.count("segments", self.segments, 2)
-        checks.array("gravity", self.gravity, (3,))
+        as_array("gravity", self.gravity, (3,))
 
     @property
     def segment_length(self) -> float:
@@ -89,7 +90,7 @@ class LumpedChain:
 
     def straight(self, start: Any, end: Any) -> np.ndarray:
         """Return the state at rest with the nodes evenly on the line between the ends [m, m/s], (6 (n - 1),)."""
-        start, end = checks.array("start", start, (3,)), checks.array("end", end, (3,))
+        start, end = as_array("start", start, (3,)), as_array("end", end, (3,))
         share = np.arange(1, self.segments)[:, None] / self.segments
         positions = start + share * (end - start)
         return np.concatenate([positions.ravel(), np.zeros(positions.size)])

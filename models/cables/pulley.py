@@ -32,6 +32,7 @@ import casadi as ca
 import numpy as np
 
 from ...errors import InputError
+from ..batch import as_array
 from ..rotation import Matrix
 from . import checks
 
@@ -76,7 +77,7 @@ def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -
     InputError
         If a radius is below zero.
     """
-    radii = checks.array("radius", radius, ()).ravel()
+    radii = as_array("radius", radius, ()).ravel()
     if not (radii >= 0).all():
         raise InputError(f"radius must have numbers >= 0, got {radii.min():g}")
     columns = []
@@ -132,8 +133,8 @@ def pulley_motion(anchor: Any, axis: Any, radius: float) -> ca.Function:
     InputError
         If an argument has a wrong shape or value.
     """
-    anchor = checks.array("anchor", anchor, (3,)).reshape(3)
-    axis = checks.array("axis", axis, (3,)).reshape(3)
+    anchor = as_array("anchor", anchor, (3,)).reshape(3)
+    axis = as_array("axis", axis, (3,)).reshape(3)
     axis = axis / checks.positive("the length of axis", np.linalg.norm(axis))
     radius = checks.non_negative("radius", radius)
     motion = [ca.SX.sym(name, 3) for name in ("attachment", "velocity", "acceleration")]

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, SolverError
+from ..batch import as_array
 from . import checks
 
 TOLERANCE = 1e-14  # how exactly the ends have to meet, in unstrained lengths or spans, the longer ones
@@ -81,7 +82,7 @@ class SaggingCable:
 
     def points(self, fractions: Any) -> np.ndarray:
         """Return the points at fractions (k,) of the unstrained length from the start [m], (..., k, 3)."""
-        share = checks.array("fractions", fractions, (None,))
+        share = as_array("fractions", fractions, ())
         if share.ndim != 1 or not ((share >= 0) & (share <= 1)).all():
             raise InputError(f"fractions must be a list of numbers from 0 to 1, got {fractions!r}")
         unit = (self.weight * self.length)[..., None]
@@ -92,7 +93,7 @@ class SaggingCable:
 
     def tension(self, fractions: Any) -> np.ndarray:
         """Return the tension at fractions (k,) of the unstrained length from the start [N], (..., k)."""
-        return np.hypot(self.H[..., None], self._V(checks.array("fractions", fractions, (None,))))
+        return np.hypot(self.H[..., None], self._V(np.atleast_1d(as_array("fractions", fractions, ()))))
 
     def _V(self, share: Any) -> np.ndarray:
         """Return the vertical component of the tension at one fraction of the length, (...), or at k, (..., k)."""
@@ -129,12 +130,12 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     """
     stiffness = checks.positive("stiffness", stiffness, infinite=True)
     weight = checks.positive("weight", weight)
-    upward = checks.array("up", up, (3,)).reshape(3)
+    upward = as_array("up", up, (3,)).reshape(3)
     upward = upward / checks.positive("the length of up", np.linalg.norm(upward))
     start, end, length = (
-        checks.array("start", start, (3,)),
-        checks.array("end", end, (3,)),
-        checks.array("length", length, ()),
+        as_array("start", start, (3,)),
+        as_array("end", end, (3,)),
+        as_array("length", length, ()),
     )
     try:
         batch = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], length.shape)
