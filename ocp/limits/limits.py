@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,8 @@ from .state import Body, State
 __all__ = ["Limits"]
 
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
+
+BLOCK = 64  # instants: to make a map of all costs more than to evaluate it
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,5 +125,18 @@ class Limits:
         arguments = [np.hstack(body) for body in bodies]
         arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
-        values = self.function.map(n)(*(each.T for each in arguments)).full().T
-        return [values[:, place] for place in self.places]
+        whole = [np.concatenate([each, np.repeat(each[-1:], -n % BLOCK, axis=0)]) for each in arguments]
+        values = np.empty((len(whole[0]), self.places[-1].stop))
+        buffer: Any  # in place: as DM the arguments would take longer than all that is computed
+        buffer, evaluate = self._of_block.buffer()
+        for start in range(0, len(values), BLOCK):
+            block = slice(start, start + BLOCK)
+            for i, each in enumerate(whole):
+                buffer.set_arg(i, each[block].data)
+            buffer.set_res(0, values[block].data)
+            evaluate()
+        return [values[:n, place] for place in self.places]
+
+    @cached_property
+    def _of_block(self) -> ca.Function:
+        return self.function.map(BLOCK)
