@@ -50,9 +50,6 @@ NOT_CALLED = {
     "load_kernels",  # compiles for half a minute
 }
 
-# Called by towline with what it has checked, and written by the author of a condition.
-HOOKS = {"evaluate"}
-
 WRONG: dict[str, Any] = {
     "none": None,
     "empty text": "",
@@ -275,7 +272,7 @@ def public_methods(value: Any) -> Iterator[tuple[str, Callable[..., Any]]]:
     for name in dir(type(value)):
         static = inspect.getattr_static(type(value), name)
         function = static.__func__ if isinstance(static, classmethod | staticmethod) else static
-        if name[0] == "_" or name in HOOKS or hasattr(BaseModel, name):  # pydantic answers for its own
+        if name[0] == "_" or name in NOT_CALLED or hasattr(BaseModel, name):  # pydantic answers for its own
             continue
         if inspect.isfunction(function) and function.__module__.startswith("towline"):
             yield name, getattr(value, name)
