@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .stopping import end, listen, requested
+from .stopping import end, ignore, listen, requested
 
 
 def main() -> None:
@@ -16,6 +16,8 @@ def main() -> None:
         if requested():
             end()
         raise
+    finally:
+        ignore()
 
 
 if __name__ == "__main__":

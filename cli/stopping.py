@@ -17,7 +17,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-__all__ = ["end", "listen", "requested", "unlisten"]
+__all__ = ["end", "ignore", "listen", "requested", "unlisten"]
 
 GRACE = 0.3  # [s] to leave what is running, and to remove what it has begun to write
 CODE = 128 + signal.SIGINT
@@ -41,6 +41,13 @@ def unlisten() -> None:
     if signal.getsignal(signal.SIGINT) is _interrupt:
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def ignore() -> None:
+    """Ignore interrupts from here on: all is done and written, and Python's own end would be cut off without a word."""
+    if signal.getsignal(signal.SIGINT) is _interrupt:
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def requested() -> bool:

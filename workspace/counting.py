@@ -9,7 +9,8 @@ from __future__ import annotations
 import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -44,10 +45,6 @@ class Counter:
     keep: str
     samples: int
 
-    def packed(self) -> bytes:
-        """Return it as bytes, to be sent to other processes with every job."""
-        return pickle.dumps(self)
-
     def prepare(self) -> None:
         """Compile the kernels of a large run once, before its processes start: each would compile them for itself."""
         if self.samples >= WORTH_KERNELS:
@@ -76,14 +73,14 @@ class Counter:
 
 
 def count(
-    packed: bytes, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
+    shared: Shared, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
 ) -> tuple[Counts, list[bytes]]:
     """Count some chunks, one after the other, with one processor.
 
     Parameters
     ----------
-    packed
-        From `Counter.packed`.
+    shared
+        The run's counter.
     first
         Number of the first chunk.
     known
@@ -97,7 +94,7 @@ def count(
     -------
     The counts, and of each chunk which samples are accepted, one bit a sample.
     """
-    counter = _unpacked(packed)
+    counter = shared.counter()
     counts, flags = Counts(counter.domain), []
     with processors.at_most(1):
         for offset, bits in enumerate(known):
@@ -110,10 +107,28 @@ def count(
     return counts, flags
 
 
+class Shared:
+    """A counter for all jobs of a run: pickled once for those of other processes, and not at all for this one's."""
+
+    def __init__(self, counter: Counter) -> None:
+        self._counter, self._ready = counter, False
+
+    @cached_property
+    def _packed(self) -> bytes:
+        return pickle.dumps(self._counter)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpacked, (self._packed,)
+
+    def counter(self) -> Counter:
+        """Return it, with the kernels loaded for a large run; the bits do not depend on it."""
+        if not self._ready and self._counter.samples >= WORTH_KERNELS:
+            load_kernels(self._counter.domain.robot)
+        self._ready = True
+        return self._counter
+
+
 @lru_cache(maxsize=2)
-def _unpacked(packed: bytes) -> Counter:
-    """Unpack once for all jobs of a run, and load the kernels for a large run; the bits do not depend on it."""
-    counter: Counter = pickle.loads(packed)
-    if counter.samples >= WORTH_KERNELS:
-        load_kernels(counter.domain.robot)
-    return counter
+def _unpacked(packed: bytes) -> Shared:
+    """Unpack once for all jobs of a run."""
+    return Shared(pickle.loads(packed))

@@ -18,7 +18,7 @@ from ..inputs import file_path, flag, one_of, required, shown, whole_number
 from ..models import Robot
 from .checkpoint import Checkpoint, open_checkpoint
 from .condition import Condition, condition_from
-from .counting import Counter, count
+from .counting import Counter, Shared, count
 from .counts import Counts
 from .dataset import dataset
 from .domain import Domain
@@ -195,7 +195,7 @@ class _Run:
         checkpoint: Checkpoint | None,
         progress: Progress | None,
     ):
-        self._packed, self._total = counter.packed(), counter.samples
+        self._shared, self._total = Shared(counter), counter.samples
         self._counts, self._workers, self._checkpoint, self._progress = counts, workers, checkpoint, progress
         self._chunk = 0
 
@@ -228,7 +228,7 @@ class _Run:
             some = range(start, min(start + together, chunks))
             known = [self._checkpoint and self._checkpoint.flags(first + i, size_of(i, samples)) for i in some]
             units = None if points is None else [points[i * CHUNK : (i + 1) * CHUNK] for i in some]
-            yield self._packed, first + start, known, units, self._counts.left > 0
+            yield self._shared, first + start, known, units, self._counts.left > 0
 
 
 def _region(region: Region | Mapping[str, Any] | None) -> Region:
