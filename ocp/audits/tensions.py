@@ -7,6 +7,7 @@ largest such distance of the winds that decide (`wind_set`), and if that is none
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -63,13 +64,8 @@ class Distribution:
         robot, dof = scenario.robot, len(scenario.robot.platform.dof)
         self.scenario, self.A = scenario, A
         self._scaled_A = scaled(scenario, A)
-        # One decomposition for the rank and the inverses: nothing else in an audit takes as long.
-        U, sigma, Vt = np.linalg.svd(self._scaled_A, full_matrices=False)
-        self.few = robot.m < dof or bool((sigma[:, dof - 1] < INDEPENDENT * sigma[:, 0]).any())
+        self.few, self._inverse = _few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
         self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if self.few and scenario.count else TOLERANCE
-        kept = sigma > (INDEPENDENT if self.few else RANK) * sigma[:, :1]
-        reciprocal = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=kept)
-        self._inverse = (Vt.swapaxes(1, 2) * reciprocal[:, None]) @ U.swapaxes(1, 2)  # (n, m, 6)
 
     def unlimited(self, w: np.ndarray) -> np.ndarray:
         """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""
@@ -132,6 +128,24 @@ class Distribution:
         if not self.few:
             return np.full(problem.m, np.nan), violation, certificate
         return closest, violation, certify(_inside_range(problem)) or certificate
+
+
+def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
+    """Return whether some matrix of A (n, 6, m) has fewer than `dof` independent columns, and the inverses (n, m, 6).
+
+    Nothing else in an audit takes as long as a decomposition of each matrix. Square ones that are far from singular by
+    their condition in the Frobenius norm, which is never less than that of the singular values, need none.
+    """
+    if A.shape[1] == A.shape[2] == dof:
+        with suppress(np.linalg.LinAlgError):
+            inverse = np.linalg.inv(A)
+            if (np.linalg.norm(A, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2)) * INDEPENDENT < 1.0).all():
+                return False, inverse
+    U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
+    few = A.shape[2] < dof or bool((sigma[:, dof - 1] < INDEPENDENT * sigma[:, 0]).any())
+    kept = sigma > (INDEPENDENT if few else RANK) * sigma[:, :1]
+    reciprocal = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=kept)
+    return few, (Vt.swapaxes(1, 2) * reciprocal[:, None]) @ U.swapaxes(1, 2)
 
 
 def in_all_winds(
