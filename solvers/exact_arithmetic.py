@@ -14,7 +14,7 @@ the cost by a part in a million, w is known no better than that.
 """
 
 from fractions import Fraction
-from math import gcd
+from math import lcm
 
 import numpy as np
 
@@ -95,9 +95,7 @@ def _solved(matrix: list[list[Fraction]], right: list[Fraction]) -> list[Fractio
     rows = []
     for row, value in zip(matrix, right, strict=True):
         together = [*row, value]
-        denominator = 1
-        for each in together:
-            denominator = denominator * each.denominator // gcd(denominator, each.denominator)
+        denominator = lcm(*(each.denominator for each in together))
         rows.append([int(each * denominator) for each in together])
     size, before = len(rows), 1
     for k in range(size):

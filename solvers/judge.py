@@ -17,7 +17,7 @@ _UNPROVEN = "gives the wrench, but multipliers do not prove it optimal"
 
 
 class Judgement(NamedTuple):
-    """What is known of a problem after a proposal: the fields are those of a `TensionSolution`."""
+    """Hold what is known of a problem after a proposal, in the fields of a `TensionSolution`."""
 
     status: Status
     tensions: Array | None = None  # (m,)
