@@ -22,36 +22,32 @@ __all__ = [
 ]
 
 
-class CarrierSpeed(Magnitude):
+class _Motion(Magnitude):
+    """Limit the first or second `derivative` of a carrier's position."""
+
+    derivative: int
+
+    def __init__(self, robot: Robot, index: int, most: float):
+        super().__init__(most)
+        self.labels = (robot.carriers[index].name,)
+        self.hull = Hull(index, self.derivative, (0, 1, 2))
+        self._index = index
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.carriers[self._index][self.derivative][:3]
+
+
+class CarrierSpeed(_Motion):
     """Limit the speed of a carrier."""
 
-    name, unit = "carrier_speed", "m/s"
-
-    def __init__(self, robot: Robot, index: int, most: float):
-        super().__init__(most)
-        self.labels = (robot.carriers[index].name,)
-        self.hull = Hull(index, 1, (0, 1, 2))
-        self._index = index
-
-    @override
-    def values(self, state: State) -> ca.SX:
-        return state.carriers[self._index].velocity[:3]
+    name, unit, derivative = "carrier_speed", "m/s", 1
 
 
-class CarrierAcceleration(Magnitude):
+class CarrierAcceleration(_Motion):
     """Limit the acceleration of a carrier."""
 
-    name, unit = "carrier_acceleration", "m/s^2"
-
-    def __init__(self, robot: Robot, index: int, most: float):
-        super().__init__(most)
-        self.labels = (robot.carriers[index].name,)
-        self.hull = Hull(index, 2, (0, 1, 2))
-        self._index = index
-
-    @override
-    def values(self, state: State) -> ca.SX:
-        return state.carriers[self._index].acceleration[:3]
+    name, unit, derivative = "carrier_acceleration", "m/s^2", 2
 
 
 class CarrierTilt(Angle):

@@ -8,6 +8,7 @@ rates of change (`Rate`) derive from the formula what a program can differentiat
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from copy import copy
 from typing import NamedTuple, Self
 
@@ -60,7 +61,7 @@ class Rows(NamedTuple):
     high: float
 
 
-class Limit:
+class Limit(ABC):
     """A limit: `values` stay from `low` to `high` along the whole motion. Subclass it for a limit of your own.
 
     Attributes
@@ -93,9 +94,9 @@ class Limit:
     hull: Hull | None = None
     shown: bool = True
 
+    @abstractmethod
     def values(self, state: State) -> ca.SX:
         """Return the values at one instant, (k, 1), as an expression of its symbols."""
-        raise NotImplementedError(f"{type(self).__name__} must define values(state)")
 
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
         """Return the limit as rows of a program, in parts of `scale`.
