@@ -33,7 +33,7 @@ from .start import deviation_from
 from .status import MotionStatus
 from .tasks.deviation import Deviation
 from .tasks.lay_out import lay_out
-from .tasks.path import AnyPath
+from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
 from .tasks.task import Task, read_task
 from .time_law import BOUND, fastest

@@ -14,7 +14,7 @@ from ..models.part import Part
 from .nlp.guess import initial_guess
 from .result import Plan
 from .tasks.deviation import Deviation
-from .tasks.path import AnyPath, PathBase, RestPath
+from .tasks.paths import AnyPath, PathBase, RestPath
 from .tasks.scenario import Scenario
 from .timing.timing import Timing
 

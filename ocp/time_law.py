@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError, SolverError
 from ..text import quantity
-from .tasks.path import AnyPath, LinePath, RestPath, WaypointPath
+from .tasks.paths import AnyPath, LinePath, RestPath, WaypointPath
 from .tasks.scenario import Scenario
 from .tasks.task import Tube
 from .tasks.task_limits import TaskLimits

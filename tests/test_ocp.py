@@ -17,7 +17,7 @@ from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
 from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
-from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
+from towline.ocp.tasks.paths import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
 from towline.ocp.violation import relative_violation
 
 GRAVITY = 9.81

@@ -5,7 +5,7 @@ import pytest
 
 from towline.models import Dynamics, load
 from towline.ocp import plan
-from towline.ocp.tasks.path import Motion
+from towline.ocp.tasks.paths import Motion
 from towline.studies.flying import plans as flying_plans
 from towline.studies.towing import plans as towing_plans
 

@@ -10,7 +10,7 @@ from towline.errors import InputError, SolverError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import MotionStatus, Task, plan, time_along
-from towline.ocp.tasks.path import CirclePath, LinePath, RestPath, SamplePath, TimedPath, WaypointPath
+from towline.ocp.tasks.paths import CirclePath, LinePath, RestPath, SamplePath, TimedPath, WaypointPath
 from towline.solvers import TensionProblem, capacity_margin, solve
 from towline.solvers.available_wrench import facets
 

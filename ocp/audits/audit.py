@@ -15,7 +15,7 @@ from ...distribution import wrench_problem
 from ...errors import InputError
 from ...solvers import Certificate, certify
 from ..tasks.deviation import Deviation
-from ..tasks.path import Motion
+from ..tasks.paths import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
 from .checks import END_TOLERANCE, AuditedMotion, excesses
 from .drift import Drift, drift

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...models.part import COORDINATES
 from ..tasks.deviation import Deviation
-from ..tasks.path import Motion, WaypointPath
+from ..tasks.paths import Motion, WaypointPath
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 from ..tasks.task import FreeBase
 from .excess import Excess

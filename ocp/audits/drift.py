@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..tasks.path import Motion
+from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
 __all__ = ["WINDOW", "Drift", "drift"]

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...distribution import wrench_problem
 from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
-from ..tasks.path import Motion
+from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
 from .checks import UNDERACTUATED_TOLERANCE

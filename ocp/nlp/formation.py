@@ -15,7 +15,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ..tasks.path import Motion
+from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
 
 __all__ = ["Formation", "clear_formation"]

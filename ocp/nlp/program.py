@@ -25,7 +25,7 @@ import numpy as np
 
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
-from ..tasks.path import WaypointPath
+from ..tasks.paths import WaypointPath
 from ..tasks.scenario import ATTITUDE, Scenario
 from .interval import Points, interval_of, points
 from .layout import DURATION, MARGIN, Layout

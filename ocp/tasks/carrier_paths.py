@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...errors import InputError
 from ...models import Robot
-from .path import AnyPath, RestPath
+from .paths import AnyPath, RestPath
 from .task import GivenBase, HoldBase, Task
 
 __all__ = ["carrier_paths"]

@@ -16,7 +16,7 @@ from ...models.ranges import PositiveRange
 from ..limits.limit import Hull
 from ..limits.limits import Limits
 from .deviation import Deviation
-from .path import AnyPath, Motion, RestPath
+from .paths import AnyPath, Motion, RestPath
 from .scheme import SCHEMES, Scheme
 from .task import Task
 from .wind_set import WindBox, as_wind, choices, decisive_winds_at

@@ -14,7 +14,7 @@ from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
 from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
 from ...models.ranges import PositiveRange
-from .path import AnyPath
+from .paths import AnyPath
 from .scheme import SchemeName
 from .task_limits import TaskLimits
 from .wind_set import WindBox

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...distribution import wrench_problem
 from ...solvers import TensionProblem, capacity_margin
-from ..tasks.path import TimedPath
+from ..tasks.paths import TimedPath
 from .parametrised_path import ParametrisedPath, PathLimits, relative
 
 __all__ = ["Bottleneck", "bottlenecks"]

@@ -26,7 +26,7 @@ from ..status import MotionStatus
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.lay_out import check_margin
 from ..tasks.limit_list import limit_list
-from ..tasks.path import AnyPath, CirclePath, Curve, LinePath, SamplePath, TimedPath, WaypointPath
+from ..tasks.paths import AnyPath, CirclePath, Curve, LinePath, SamplePath, TimedPath, WaypointPath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from ..tasks.task import FreeBase, Task, read_task
 from ..tasks.wind_set import WindBox

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...models import Dynamics, Robot
 from ...models.part import COORDINATES
 from ..limits.limits import Limits
-from ..tasks.path import CirclePath, Curve, Motion, RestPath
+from ..tasks.paths import CirclePath, Curve, Motion, RestPath
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
 SAME = 1e-7  # [m, rad]

@@ -17,7 +17,7 @@ from ...solvers import Certificate, TensionProblem
 from ...text import quantity
 from ...writing import whole_file
 from ..status import MotionStatus
-from ..tasks.path import (
+from ..tasks.paths import (
     AnyPath,
     Curve,
     Motion,

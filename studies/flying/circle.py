@@ -18,7 +18,7 @@ from ...figures import style
 from ...models import load
 from ...ocp import Plan, Task, plan
 from ...ocp.nlp.solver import Progress
-from ...ocp.tasks.path import AnyPath, CirclePath, RestPath
+from ...ocp.tasks.paths import AnyPath, CirclePath, RestPath
 from ...ocp.tasks.task import FreeBase, HoldBase
 
 HOVER = (50.0, 50.0, 100.0, 0.0, 0.0, 0.0)  # paper F, section VI.B [m, rad]

@@ -14,7 +14,7 @@ from ...figures.curve_in_space import curve_in_space
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
-from ...ocp.tasks.path import Motion
+from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, stated, undetermined
 from .helix import flight

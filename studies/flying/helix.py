@@ -8,7 +8,7 @@ from ...figures.curve_in_space import curve_in_space
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
-from ...ocp.tasks.path import LinePath, Motion
+from ...ocp.tasks.paths import LinePath, Motion
 from ...solvers import TensionProblem, solve
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, compared, stated

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ...models.rotation import rotation
-from ...ocp.tasks.path import Motion
+from ...ocp.tasks.paths import Motion
 
 COUNT = 200
 ANGLES, RATES, ACCELERATIONS = 0.3, 0.6, 1.0  # largest of each [rad, rad/s, rad/s^2], and of positions in metres

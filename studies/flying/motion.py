@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...models import Dynamics
-from ...ocp.tasks.path import CirclePath, Motion
+from ...ocp.tasks.paths import CirclePath, Motion
 from .plans import BELOW, RATE, SECONDS
 
 RADIUS = 1.0  # of the circle in VI.A and VI.B [m]

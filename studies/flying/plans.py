@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...ocp import Task
-from ...ocp.tasks.path import CirclePath, LinePath, SamplePath
+from ...ocp.tasks.paths import CirclePath, LinePath, SamplePath
 from ...ocp.tasks.task import FreeBase, GivenBase
 from .circle import tasks
 

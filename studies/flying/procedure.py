@@ -19,7 +19,7 @@ from ...models.cables import ElementChain
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...models.diagnosis import diagnose
 from ...models.rotation import rotation
-from ...ocp.tasks.path import Motion
+from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
 from .motion import FEASIBLE, TIMES, circle

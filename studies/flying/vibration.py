@@ -16,7 +16,7 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.cables.driving_force import DrivingForce, driving_force
-from ...ocp.tasks.path import Motion
+from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
 from .motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions

@@ -16,7 +16,7 @@ from ...models import Robot, load
 from ...models.ranges import PositiveRange
 from ...models.statics import equilibria
 from ...ocp import Task
-from ...ocp.tasks.path import AnyPath, LinePath
+from ...ocp.tasks.paths import AnyPath, LinePath
 from ...ocp.tasks.task import AnyBase, FreeBase, HoldBase, Objective, Tube
 
 Drive = Literal["fixed-length", "variable-length", "both"]

@@ -1,0 +1,33 @@
+"""Paths as data: a pose and its first two time derivatives at every time, from a few numbers of a task file."""
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from .base import PathBase, PoseOrPosition
+from .circle import CirclePath
+from .curve import Curve
+from .line import LinePath
+from .motion import Motion
+from .rest import RestPath
+from .samples import SamplePath
+from .timed import TimedPath
+from .waypoints import WaypointPath
+
+__all__ = [
+    "AnyPath",
+    "CirclePath",
+    "Curve",
+    "LinePath",
+    "Motion",
+    "PathBase",
+    "PoseOrPosition",
+    "RestPath",
+    "SamplePath",
+    "TimedPath",
+    "WaypointPath",
+]
+
+AnyPath: TypeAlias = Annotated[
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath, Field(discriminator="kind")
+]

@@ -1,0 +1,64 @@
+"""`PathBase`: what every path has: a frame, a duration or none, and a pose at every time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from ....models.part import Part, Pose
+from .motion import Motion
+
+__all__ = ["PathBase", "PoseOrPosition", "check_times"]
+
+
+def _with_level_attitude(value: object) -> object:
+    """Complete (x, y, z) to a level pose."""
+    if not isinstance(value, list | tuple) or len(value) not in (3, 6):
+        raise ValueError("must be 3 numbers (x y z) or 6 (x y z roll pitch yaw)")
+    return (*value, 0.0, 0.0, 0.0) if len(value) == 3 else value
+
+
+PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]
+
+
+class PathBase(Part):
+    """The base of all paths."""
+
+    frame: str = Field(default="world", description="frame of the path: world, or the name of the only carrier")
+
+    @property
+    def natural_duration(self) -> float | None:
+        """Return the duration by the path's own numbers [s], or None if the task gives it."""
+        return None
+
+    @property
+    def stretches(self) -> bool:
+        """Return whether another duration means the same places, later or sooner."""
+        return False
+
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        """Return pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
+        raise TypeError(f"{type(self).__name__} is not a path")
+
+    def by_fraction(self, s: np.ndarray, until: float | None = None) -> Motion:
+        """Return pose and derivatives by s, the fraction of the path's own time, from 0 to 1.
+
+        `until` is the end of the path by its own time [s]; default: its natural duration, or 1 s.
+        """
+        whole = until or self.natural_duration or 1.0
+        motion = self.at(np.asarray(s) * whole, whole)
+        return Motion(motion.pose, motion.velocity * whole, motion.acceleration * whole**2)
+
+
+def check_times(times: tuple[float, ...], count: int) -> None:
+    """Refuse times that are not one for each point, from 0 on and increasing."""
+    if len(times) != count:
+        raise ValueError(f"times must have one number for each of the {count} points, got {len(times)}")
+    if times[0] != 0:
+        raise ValueError(f"times must start at 0 s, got {times[0]:g} s")
+    for index, (before, after) in enumerate(pairwise(times)):
+        if after <= before:
+            raise ValueError(f"times must increase, got times[{index + 1}] = {after:g} s after {before:g} s")

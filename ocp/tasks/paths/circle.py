@@ -1,0 +1,47 @@
+"""`CirclePath`: a circle or a helix."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import override
+
+from ....models.part import Finite, NonNegative, Vector3
+from .base import PathBase
+from .motion import Motion
+
+__all__ = ["CirclePath"]
+
+
+class CirclePath(PathBase):
+    """A circle about the vertical at constant speed, with an optional drift of its centre: a helix."""
+
+    kind: Literal["circle"]
+    centre: Vector3 = Field(description="[m]")
+    radius: NonNegative = Field(description="[m]")
+    rate: Finite = Field(description="[rad/s], positive: counter-clockwise from above")
+    phase: Finite = Field(default=0.0, description="angle at the start, from the x axis [rad]")
+    drift: Vector3 = Field(default=(0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
+    attitude: Vector3 = Field(default=(0.0, 0.0, 0.0), description="constant (roll, pitch, yaw) [rad]")
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return 2 * np.pi / abs(self.rate) if self.rate else None
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        angle = self.phase + self.rate * times
+        zero = np.zeros_like(times)
+        arm = self.radius * np.stack([np.cos(angle), np.sin(angle), zero], axis=-1)
+        turned = self.radius * np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
+        drift = np.array(self.drift)
+        still = np.zeros((len(times), 3))
+        attitude = np.tile(np.array(self.attitude), (len(times), 1))
+        return Motion(
+            np.hstack([np.array(self.centre) + arm + times[:, None] * drift, attitude]),
+            np.hstack([self.rate * turned + drift, still]),
+            np.hstack([-(self.rate**2) * arm, still]),
+        )

@@ -1,0 +1,18 @@
+"""`Curve`: a path of any kind without a time law of its own."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from .circle import CirclePath
+from .line import LinePath
+from .rest import RestPath
+from .samples import SamplePath
+from .waypoints import WaypointPath
+
+__all__ = ["Curve"]
+
+
+Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]

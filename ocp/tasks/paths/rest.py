@@ -1,0 +1,31 @@
+"""`RestPath`: a pose that is held."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import override
+
+from .base import PathBase, PoseOrPosition
+from .motion import Motion
+
+__all__ = ["RestPath"]
+
+
+class RestPath(PathBase):
+    """A pose that is held."""
+
+    kind: Literal["rest"]
+    pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+
+    @property
+    @override
+    def stretches(self) -> bool:
+        return True
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        pose = np.tile(np.array(self.pose), (len(times), 1))
+        return Motion(pose, np.zeros_like(pose), np.zeros_like(pose))

@@ -1,0 +1,76 @@
+"""`TimedPath`: a path with a time law of its own."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import override
+
+from ....models.part import Finite, NonNegative, Positive
+from .base import PathBase
+from .curve import Curve
+from .motion import Motion
+
+__all__ = ["TimedPath"]
+
+
+class TimedPath(PathBase):
+    """A path with a time law of its own: d2s/dt2 is constant between the given points of it, then it rests at its end.
+
+    `time_along` makes such.
+    """
+
+    kind: Literal["timed"]
+    along: Curve = Field(description="the path; s is the fraction of its own time")
+    until: Positive | None = Field(
+        default=None, description="end of the path by its own time [s]; default: its natural duration"
+    )
+    s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, increasing")
+    speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
+
+    @model_validator(mode="after")
+    def _law_fits(self) -> Self:
+        if len(self.s) != len(self.speeds):
+            raise ValueError(f"speeds must have one number for each of the {len(self.s)} s, got {len(self.speeds)}")
+        if self.s[0] != 0 or self.s[-1] != 1:
+            raise ValueError(f"s must go from 0 to 1, got {self.s[0]:g} to {self.s[-1]:g}")
+        for index, (before, after) in enumerate(pairwise(self.s)):
+            if after <= before:
+                raise ValueError(f"s must increase, got s[{index + 1}] = {after:g} after {before:g}")
+        for index, (before, after) in enumerate(pairwise(self.speeds)):
+            if before == after == 0:
+                raise ValueError(f"speeds must not be 0 twice in a row, got 0 at {index} and {index + 1}")
+        if self.frame != self.along.frame:
+            raise ValueError(f"frame must be that of along, {self.along.frame!r}, got {self.frame!r}")
+        return self
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Return the time at which the path is at each s, (n,) [s]."""
+        speeds = np.array(self.speeds)
+        return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (speeds[1:] + speeds[:-1]))])
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return float(self.times[-1])
+
+    def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
+        knots, s, speeds = self.times, np.array(self.s), np.array(self.speeds)
+        k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+        rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (2 * (s[k + 1] - s[k]))
+        since = np.minimum(times, knots[-1]) - knots[k]
+        # The last instant belongs to the motion, as the first does: d2s/dt2 counts there too.
+        over = times > knots[-1] * (1 + 1e-12)
+        at = s[k] + since * (speeds[k] + since * rate / 2)
+        return np.minimum(at, 1.0), np.where(over, 0.0, speeds[k] + since * rate), np.where(over, 0.0, rate)
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        s, sd, sdd = self.law(times)
+        return self.along.by_fraction(s, self.until).timed(sd, sdd)
