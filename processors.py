@@ -23,3 +23,19 @@ def at_most(count: int) -> Iterator[None]:
         yield
     finally:
         _most.reset(token)
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Let processes that start inside the block do linear algebra with one thread: there is a process a processor.
+
+    This process does so too if it loads its libraries inside the block. Environment variables that the user has set
+    keep their values.
+    """
+    names = [name for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS") if name not in os.environ]
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name in names:
+            os.environ.pop(name, None)

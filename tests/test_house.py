@@ -18,7 +18,7 @@ FLOORS = [
     {"viewer"},
     {"cli"},
 ]
-COMMON = {"errors", "inputs", "netcdf", "processors", "text", "tolerances", "writing"}
+COMMON = {"checkpoint", "errors", "execution", "inputs", "netcdf", "processors", "text", "tolerances", "writing"}
 CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from towline.checkpoint import begin, open_checkpoint
 from towline.errors import InputError
 from towline.models import load
 from towline.solvers import compiled
 from towline.workspace import Condition, StaticEquilibrium, sample, save
-from towline.workspace.checkpoint import MAGIC, begin, open_checkpoint
+from towline.workspace.checkpoint import KIND
 from towline.workspace.sampling import CHUNK
 
 TOWLINE = Path(sys.executable).with_name("towline")
@@ -158,9 +159,9 @@ def test_a_checkpoint_of_another_robot_is_refused(tmp_path, whole):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda content: b"", "which is no checkpoint of towline"),
-        (lambda content: b"robot: mine\n" * 100, "which is no checkpoint of towline"),
-        (lambda content: content[: len(MAGIC) + 2], "with a damaged header"),
+        (lambda content: b"", "which is no checkpoint of towline's workspace"),
+        (lambda content: b"robot: mine\n" * 100, "which is no checkpoint of towline's workspace"),
+        (lambda content: content[: len(KIND.magic) + 2], "with a damaged header"),
         (lambda content: content[:60] + b"?" + content[61:], "with a damaged header"),
         (lambda content: content[: -2 * RECORD] + b"?" + content[-2 * RECORD + 1 :], "is damaged after chunk"),
         (lambda content: content + content, "is damaged after chunk 4"),
@@ -225,7 +226,10 @@ def test_a_full_disk_is_told_and_what_is_there_is_gone_on_with(tmp_path, whole):
 def test_one_run_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
     file = tmp_path / "run.checkpoint"
-    with open_checkpoint(file, {"a": 1}, False), pytest.raises(InputError, match="to which another run is writing"):
-        open_checkpoint(file, {"a": 1}, True).__enter__()
-    with open_checkpoint(file, {"a": 1}, True) as again:
+    with (
+        open_checkpoint(file, KIND, {"a": 1}, False),
+        pytest.raises(InputError, match="to which another run is writing"),
+    ):
+        open_checkpoint(file, KIND, {"a": 1}, True).__enter__()
+    with open_checkpoint(file, KIND, {"a": 1}, True) as again:
         assert again.stored == 0

@@ -7,9 +7,10 @@ import time
 
 import pytest
 
+from towline import execution
 from towline.errors import InputError
 from towline.models import load
-from towline.workspace import StaticEquilibrium, execution, sample, save
+from towline.workspace import StaticEquilibrium, sample, save
 
 distributed = pytest.importorskip("distributed")
 

@@ -14,15 +14,15 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
+from ..execution import Workers, start_workers
 from ..inputs import file_path, flag, one_of, required, shown, whole_number
 from ..models import Robot
-from .checkpoint import Checkpoint, open_checkpoint
+from .checkpoint import ChunkCheckpoint, open_chunks
 from .condition import Condition, condition_from
 from .counting import Counter, Shared, count
 from .counts import Counts
 from .dataset import dataset
 from .domain import Domain
-from .execution import Workers, start_workers
 from .refinement import Refinement
 from .region import Region
 from .sampling import CHUNK, Sampler, check_sampling, chunks_of, size_of
@@ -155,7 +155,7 @@ def sample(
     counter = Counter(condition, domain, sampler, keep, total)
     counts = Counts(domain, points_max if keep != "none" else 0)
     header = _header(robot, {**requested, "samples": total, "size": size})
-    opened = open_checkpoint(file, header, resume) if file is not None else nullcontext()
+    opened = open_chunks(file, header, resume) if file is not None else nullcontext()
     if workers > 1 and scheduler is None:
         counter.prepare()
     with start_workers(workers, scheduler) as started, opened as stored:
@@ -192,7 +192,7 @@ class _Run:
         counter: Counter,
         counts: Counts,
         workers: Workers,
-        checkpoint: Checkpoint | None,
+        checkpoint: ChunkCheckpoint | None,
         progress: Progress | None,
     ):
         self._shared, self._total = Shared(counter), counter.samples

@@ -1,4 +1,4 @@
-"""Where jobs run: in this process, in processes of this machine, or on a Dask cluster; results keep their order.
+"""Where jobs run: in this process, in processes of this machine, or on a Dask cluster.
 
 Each of the three is an executor of `concurrent.futures`. Enough jobs are submitted at once that no worker waits, and
 no more: memory does not grow with the number of jobs.
@@ -12,14 +12,15 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from ..errors import InputError, SolverError
-from ..inputs import shown
+from . import processors
+from .errors import InputError, SolverError
+from .inputs import shown
 
 AHEAD = 3  # jobs for each worker, one of which it works on
 CONNECT_WITHIN = 5.0  # [s]
@@ -53,13 +54,42 @@ class Workers:
             If workers end before their work is done.
         """
         under_way: deque[Future[Result]] = deque()
-        try:
+        with self._ending(under_way):
             for job in jobs:
                 under_way.append(self.executor.submit(function, *job))
                 if len(under_way) >= self.limit():
                     yield under_way.popleft().result()
             while under_way:
                 yield under_way.popleft().result()
+
+    def as_completed(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
+        """Yield `function(*job)` of each job as soon as it is there, so that no worker waits for a slow one.
+
+        Raises
+        ------
+        SolverError
+            If workers end before their work is done.
+        """
+        under_way: set[Future[Result]] = set()
+        with self._ending(under_way):
+            for job in jobs:
+                under_way.add(self.executor.submit(function, *job))
+                while len(under_way) >= self.limit():
+                    yield from self._done(under_way)
+            while under_way:
+                yield from self._done(under_way)
+
+    def _done(self, under_way: set[Future[Result]]) -> Iterator[Result]:
+        """Wait until jobs are done; remove them and yield their results."""
+        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+            under_way.remove(future)
+            yield future.result()
+
+    @contextmanager
+    def _ending(self, under_way: Iterable[Future[Any]]) -> Iterator[None]:
+        """Cancel what is under way at the end of the block, and name the workers where they have failed."""
+        try:
+            yield
         except tuple(self.failures) as error:
             message = next(text for kind, text in self.failures.items() if isinstance(error, kind))
             raise SolverError(message.format(error)) from None
@@ -126,7 +156,7 @@ def _processes(workers: int) -> Iterator[Executor]:
     context = multiprocessing.get_context("spawn")
     alive, stop = context.Pipe(duplex=False)
     pool = _Processes(workers, mp_context=context, initializer=_begin_worker, initargs=(alive,))
-    with alive, stop, _one_thread_each():
+    with alive, stop, processors.one_thread_each():
         try:
             yield pool
         except BaseException:
@@ -134,21 +164,6 @@ def _processes(workers: int) -> Iterator[Executor]:
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Let processes that start inside the block do linear algebra with one thread: there is a process a processor.
-
-    Environment variables that the user has set keep their values.
-    """
-    names = [name for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS") if name not in os.environ]
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name in names:
-            os.environ.pop(name, None)
 
 
 def _begin_worker(alive: Any) -> None:
