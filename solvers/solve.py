@@ -19,7 +19,7 @@ from .methods.active_set import ActiveSet
 from .methods.method import Method, Proposal
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
-from .standard_form import standard_forms
+from .standard_form import StandardForm
 from .status import STATUSES
 
 __all__ = ["methods", "solve"]
@@ -69,21 +69,15 @@ def solve(
             return TensionSolution(problem, given, STATUSES[code], method, loaded.backend, spent, proof=proof)
     chosen, backend = _look_up(method, backend, options)
     used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the kernel was not sure
-    forms = standard_forms(problem)
-    while True:
-        form = forms.pop(0)
+
+    def propose(form: StandardForm) -> Proposal:
         if chosen.seeks_reference and form.holds_reference:
-            proposal = Proposal(np.zeros(form.moving.size))
-        else:
-            proposal = chosen.propose(form, backend, **options)
-        tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-        judgement = judge(problem, form, chosen, proposal, tensions, settle=not forms)
-        if judgement is not None:
-            status, tensions, certificate, detail = judgement
-            spent = time.perf_counter() - start
-            return TensionSolution(
-                problem, tensions, status, chosen.name, used, spent, proposal.iterations, detail, certificate
-            )
+            return Proposal(np.zeros(form.moving.size))
+        return chosen.propose(form, backend, **options)
+
+    status, tensions, iterations, detail, certificate = judge(problem, chosen, propose)
+    spent = time.perf_counter() - start
+    return TensionSolution(problem, tensions, status, chosen.name, used, spent, iterations, detail, certificate)
 
 
 def _prove(problem: TensionProblem) -> Certificate | None:

@@ -18,8 +18,9 @@ class Status(StrEnum):
     if w is in its range the problem may well be optimal."""
 
     INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance: read `residual` before using them. Either no certificate proves
-    that w is out of reach, or one does and the method is one that answers all the same (`Method.always_answers`)."""
+    """The tensions miss w by more than the tolerance, or are not proven to be the method's answer: read `residual` and
+    `detail` before using them. Either no certificate proves that w is out of reach, or one does and the method is one
+    that answers all the same (`Method.always_answers`)."""
 
     INVALID = "invalid"
     """A row of a batch whose numbers are no problem: NaN, crossed limits, a weight that is not positive. A single

@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from towline.benchmarks.continuity import JUMP, KINDS, SMOOTH, Motion, continuity, leaving, smoothness
+from towline.benchmarks.exactness import awkward_problem
 from towline.errors import InputError
 from towline.solvers import TensionProblem, capacity_margin, certify, limit_rate, methods, solve
 
@@ -155,6 +156,65 @@ def test_barrier_methods_are_stationary_and_strictly_inside():
             pull = mu * (1 / (T_MAX - t) - 1 / (t - T_MIN))
             gradient = pull if method == "analytic-centre" else t - problem.t_ref + pull
             assert np.abs(null @ gradient).max() <= 1e-7 * np.abs(gradient).max()
+
+
+def on_a_face(rng):
+    """Return a problem in which four cables share 3 N and the others must be at limits, and the tensions of those.
+
+    The rows are mixed by a random rotation, so that w is on the boundary but for rounding.
+    """
+    n = int(rng.integers(2, 6))
+    A = np.zeros((n, n + 4))
+    A[0, :4], A[1:, 4 : n + 3], A[-1, -1] = 1.0, np.eye(n - 1), -1.0
+    t_max = np.r_[np.full(4, 60.0), rng.uniform(3, 9, n)]
+    held = np.r_[t_max[4:-1], 0.0]
+    A = np.linalg.qr(rng.normal(size=(n, n)))[0] @ A
+    t = np.r_[3.0, 0.0, 0.0, 0.0, held]
+    return TensionProblem(A, A @ t, 0.0, t_max, t_ref=rng.uniform(0, 5, n + 4)), held
+
+
+def test_on_the_boundary_methods_keep_their_own_criterion():
+    """Least squares to t_ref, which differs for each of the four, are neither their centre nor least with a barrier."""
+    rng = np.random.default_rng(46)
+    for _ in range(20):
+        problem, held = on_a_face(rng)
+        nearest = solve(problem)
+        assert nearest.feasible
+        for method in ("centroid", "analytic-centre", "log-barrier"):
+            solution = solve(problem, method)
+            assert solution.feasible
+            t = solution.tensions[:4]
+            np.testing.assert_allclose(solution.tensions[4:], held, rtol=0, atol=1e-9)
+            assert np.abs(t - nearest.tensions[:4]).max() > 0.1
+            if method == "log-barrier":
+                gradient = t - problem.t_ref[:4] + 0.6**2 * (1.0 / (60.0 - t) - 1.0 / t)
+                np.testing.assert_allclose(gradient, gradient.mean(), rtol=0, atol=1e-6)
+            else:
+                np.testing.assert_allclose(t, 0.75, rtol=0, atol=1e-6)
+
+
+def test_where_one_distribution_is_left_every_method_has_it():
+    rng = np.random.default_rng(47)
+    for m in (6, 8, 10):
+        A = geometric_matrix(rng, m)
+        corner = np.where(rng.normal(size=6) @ A > 0, T_MAX, T_MIN)
+        problem = TensionProblem(A, A @ corner, T_MIN, T_MAX, t_ref=20.0)
+        for method in ALWAYS_FIND:
+            np.testing.assert_allclose(solve(problem, method).tensions, corner, rtol=0, atol=1e-6, err_msg=method)
+
+
+def test_a_barrier_converges_with_tensions_next_to_their_limits():
+    """Rounding of the Newton step is then more than its length at the minimum: no step is a shorter one."""
+    for seed in (8_000_114, 8_000_193, 8_000_399):
+        problem = TensionProblem(*awkward_problem(seed))
+        solution = solve(problem, "log-barrier")
+        assert solution.feasible
+        assert not solution.detail
+        moving = problem.t_min < problem.t_max
+        t, low, high = (x[moving] for x in (solution.tensions, problem.t_min, problem.t_max))
+        gradient = t - problem.t_ref[moving] + (0.01 * (high - low).min()) ** 2 * (1 / (high - t) - 1 / (t - low))
+        null = np.linalg.svd(problem.A[:, moving])[2][np.linalg.matrix_rank(problem.A[:, moving]) :]
+        assert np.abs(null @ gradient).max() <= 1e-6 * np.abs(gradient).max()
 
 
 def test_log_barrier_tends_to_the_least_squares_as_its_weight_falls():

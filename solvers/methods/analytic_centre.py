@@ -13,11 +13,11 @@ from .numerics.barrier_newton import barrier_point
 class AnalyticCentre(Method):
     """Analytic centre of the feasible tensions.
 
-    Existence: wherever the feasible tensions have an interior and are bounded; where they have no interior (w on the
-    very boundary), the nearest to t_ref; failed if they are unbounded. Cables without any limit have no influence. A
-    smooth function of A (of constant rank), w and the limits; t_ref and weights play no part. Like "centroid" without
-    its geometry: any m - rank costs the same, about ten Newton steps, few from the last answer (`start`). Outside the
-    feasible set: a certificate.
+    Existence: wherever the problem is feasible and the feasible tensions are bounded; failed if they are unbounded.
+    With w on the very boundary it is the centre of the cables that have a choice. Cables without any limit have no
+    influence. A smooth function of A (of constant rank), w and the limits; t_ref and weights play no part. Like
+    "centroid" without its geometry: any m - rank costs the same, about ten Newton steps, few from the last answer
+    (`start`). Outside the feasible set: a certificate.
     """
 
     name = "analytic-centre"

@@ -20,8 +20,8 @@ from .numerics.barrier_newton import barrier_point
 class LogBarrier(Method):
     """Continuously differentiable distribution, strictly inside the limits.
 
-    Existence: wherever the feasible tensions have an interior; where they have none (w on the very boundary), the
-    nearest to t_ref. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where
+    Existence: wherever the problem is feasible; with w on the very boundary only the cables that have a choice stay off
+    their limits. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where
     a cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance
     of about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: about
     ten Newton steps from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set:

@@ -44,8 +44,9 @@ class Method(ABC):
     """Where the method is published."""
 
     exact: ClassVar[bool]
-    """True if the method ends at the optimum itself. Where rounding alone makes such a method lose a point on the very
-    boundary of the available wrench set, `solve` computes it in exact arithmetic."""
+    """True if the method ends at the optimum of its own criterion. Where rounding makes such a method lose a point on
+    the very boundary of the available wrench set, `solve` computes least squares in exact arithmetic and, if the
+    criterion is another one, calls the method once more for the cables that have a choice there."""
 
     continuous: ClassVar[bool] = False
     """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior,

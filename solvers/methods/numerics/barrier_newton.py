@@ -23,6 +23,9 @@ _DAMPED_STEPS = 300
 # Squared Newton decrement, in units of mu, below which the next full step would change nothing that counts.
 _CONVERGED = 1e-18
 
+# A decrement below this squares with each step; one that does not fall is rounding, of tensions next to their limits.
+_ROUNDING = 1e-3
+
 # Error in Q s = b from which on plain Newton steps take over.
 _ON_PLANE = 1e-10
 
@@ -140,13 +143,15 @@ def _primal_dual(form: StandardForm, square: float, mu: float, s: Array, warm: b
 
 def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array | None, int]:
     """Take Newton steps from a point inside that gives w: always downhill, never outside."""
+    last = np.inf
     for iteration in range(_DAMPED_STEPS):
         gradient, hessian = _slopes(form, square, mu, s)
         step = _newton_step(form, gradient, hessian, form.b - form.Q @ s)
         decrement = float(np.sqrt(step @ (hessian * step) / mu))
-        if decrement**2 <= _CONVERGED:
+        if decrement**2 <= _CONVERGED or last <= decrement < _ROUNDING:
             # One step more costs nothing and squares the error.
             return s + step, iteration
+        last = decrement
         if not np.abs(s).max(initial=0.0) < _FAR:
             return None, iteration
         length = min(1.0, _FRACTION * _way_to_limits(form, s, step))

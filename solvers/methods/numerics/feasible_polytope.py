@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ....tolerances import AT_LIMIT
 from ..method import Array, StandardForm
 
 # How far a corner may lie beyond a limit, relative to the size of s.
@@ -139,9 +140,11 @@ def _by_qhull(N: Array, low: Array, high: Array) -> Array:
         bounds=(None, None),
         method="highs",
     )
-    if ball.x is None or ball.x[-1] < 0.0:
-        return np.zeros((0, N.shape[0]))
+    none = np.zeros((0, N.shape[0]))
+    if ball.x is None or ball.x[-1] <= AT_LIMIT:
+        return none
     try:
-        return HalfspaceIntersection(np.column_stack([rows, -limits]), ball.x[:-1]).intersections
+        vertices = HalfspaceIntersection(np.column_stack([rows, -limits]), ball.x[:-1]).intersections
     except QhullError:
-        return np.zeros((0, N.shape[0]))
+        return none
+    return vertices if np.isfinite(vertices).all() else none
