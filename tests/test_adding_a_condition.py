@@ -33,7 +33,7 @@ def run(folder, *command):
 
 
 def test_the_example_runs_and_resumes(folder):
-    """What it accepts is at rest and above the ground, computed here by another way."""
+    """Compute in another way that every accepted place is at rest and above the ground."""
     done = run(folder, sys.executable, "conditions_of_mine.py")
     both, lowest, high = done.stdout.split()
     robot = load("cogiro")
