@@ -8,16 +8,17 @@ from .stopping import end, ignore, listen, requested
 def main() -> None:
     """Run the command line."""
     try:
-        listen()
-        from .main import main as run
+        try:
+            listen()
+            from .main import main as run
 
-        run()
+            run()
+        finally:
+            ignore()
     except BaseException:
         if requested():
             end()
         raise
-    finally:
-        ignore()
 
 
 if __name__ == "__main__":

@@ -46,8 +46,8 @@ def unlisten() -> None:
 def ignore() -> None:
     """Ignore interrupts from here on: all is done and written, and Python's own end would be cut off without a word."""
     if signal.getsignal(signal.SIGINT) is _interrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # first, so that nothing can arrive between the two
         signal.set_wakeup_fd(-1)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def requested() -> bool:

@@ -108,3 +108,19 @@ def test_an_interrupt_that_a_library_swallows_ends_the_command_all_the_same(tmp_
     assert time.perf_counter() - sent < PROMPT
     assert process.stderr.read() == "towline: stopped\n"
     assert not os.listdir(tmp_path)
+
+
+def test_an_interrupt_after_the_end_of_a_command_is_ignored(tmp_path):
+    """When all is written, neither Python's own end nor the thread that listens may be cut short by Ctrl-C."""
+    code = (
+        "import os, signal, time\n"
+        "from towline.cli import stopping\n"
+        "stopping.listen()\n"
+        "stopping.ignore()\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+        "time.sleep(2 * stopping.GRACE)\n"
+        "print(stopping.requested())\n"
+    )
+    process = start([sys.executable, "-c", code], tmp_path)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (0, "False\n", "")
