@@ -64,7 +64,7 @@ def call(
         raise InputError(f"threads must be a whole number from 1, or None, got {shown(threads)}")
     outputs = _evaluator(function)(arguments, threads)
     for name in matrices:
-        if function.size_out(name)[1] == 1:
+        if name in outputs and function.size_out(name)[1] == 1:
             outputs[name] = outputs[name][..., None]
     return outputs
 

@@ -78,8 +78,7 @@ class Dynamics:
         carrier_pose
             The same of each carrier, (..., c, 6); default: at home.
         """
-        arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
-        return call(self._functions.wrench_matrix, arguments, matrices=("A",))["A"]
+        return self._call("wrench_matrix", pose=pose, carrier_pose=carrier_pose)["A"]
 
     @one_array
     def cable_lengths(self, pose: Array, carrier_pose: Array | None = None) -> Array:
@@ -87,8 +86,7 @@ class Dynamics:
 
         Over a pulley it is the length of the cable from the anchor around the sheave to the attachment.
         """
-        arguments = {"pose": pose, "carrier_pose": self._carriers(carrier_pose)}
-        return call(self._functions.cable_lengths, arguments)["lengths"]
+        return self._call("cable_lengths", pose=pose, carrier_pose=carrier_pose)["lengths"]
 
     @several_arrays
     def points(self, pose: Array, carrier_pose: Array | None = None) -> tuple[Array, Array]:
@@ -96,9 +94,9 @@ class Dynamics:
 
         Arguments as in `wrench_matrix`.
         """
-        carriers = self._carriers(carrier_pose)
+        carriers = self.robot.carrier_home if carrier_pose is None else carrier_pose
         if is_symbolic(pose) or is_symbolic(carriers):
-            result = call(self._functions.points, {"pose": pose, "carrier_pose": carriers})
+            result = self._call("points", pose=pose, carrier_pose=carriers)
             return result["anchors"], result["attachments"]
         pose, carriers = arrays({"pose": (pose, (6,)), "carrier_pose": (carriers, (len(self.robot.carriers), 6))})
         both = points.anchors(self.robot, carriers), points.attachments(self.robot, pose)
@@ -114,7 +112,7 @@ class Dynamics:
         Arguments as in `wrench_matrix`. The exit is nan for an attachment inside the sheave, where no cable is tangent.
         """
         if is_symbolic(pose) or self.robot.pulley_radii.any():
-            return call(self._functions.exits, {"pose": pose, "carrier_pose": self._carriers(carrier_pose)})["exits"]
+            return self._call("exits", pose=pose, carrier_pose=carrier_pose)["exits"]
         return self.points(pose, carrier_pose)[0]
 
     @one_array
@@ -149,10 +147,7 @@ class Dynamics:
             If an argument has a wrong shape or value, or wind is given and the robot's file has no `platform.aero`.
         """
         motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
-        arguments = motion.arguments(self.robot.carrier_home)
-        if wind is None:
-            return call(self._functions.required_wrench, arguments)["w"]
-        return call(self._functions.required_wrench_in_wind, arguments | {"wind": wind})["w"]
+        return self._in_wind("required_wrench", wind, **motion.arguments(self.robot.carrier_home))["w"]
 
     @one_array
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
@@ -160,8 +155,7 @@ class Dynamics:
 
         Arguments as in `required_wrench`.
         """
-        arguments = {"pose": pose, "velocity": velocity, "wind": wind}
-        return call(self._functions.aerodynamic_wrench, arguments)["W_e"]
+        return self._call("aerodynamic_wrench", pose=pose, velocity=velocity, wind=wind)["W_e"]
 
     @one_array
     def acceleration(
@@ -174,22 +168,10 @@ class Dynamics:
     ) -> Array:
         """Return the second time derivative of `pose` under the tensions, (..., 6) [m/s^2, rad/s^2].
 
-        Parameters
-        ----------
-        pose, velocity
-            (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivative, (..., 6).
-        tensions
-            (..., m) [N]; taken as they are, also beyond their limits.
-        carrier_pose
-            (..., c, 6); default: at home.
-        wind
-            Velocity of the air in {G} [m/s], (..., 3); default: no air at all.
+        Arguments as in `required_wrench`; `tensions`, (..., m) [N], are taken as they are, also beyond their limits.
         """
-        arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
-        arguments["carrier_pose"] = self._carriers(carrier_pose)
-        if wind is None:
-            return call(self._functions.acceleration, arguments)["acceleration"]
-        return call(self._functions.acceleration_in_wind, arguments | {"wind": wind})["acceleration"]
+        state = {"pose": pose, "velocity": velocity, "tensions": tensions, "carrier_pose": carrier_pose}
+        return self._in_wind("acceleration", wind, **state)["acceleration"]
 
     @several_arrays
     def coupled_acceleration(
@@ -221,16 +203,9 @@ class Dynamics:
         -------
         Accelerations of the platform, (..., 6), and of the carriers, (..., c, 6); carriers of other kinds have zero.
         """
-        arguments = {
-            "pose": pose,
-            "velocity": velocity,
-            "carrier_pose": carrier_pose,
-            "carrier_velocity": carrier_velocity,
-            "tensions": tensions,
-            "thrust": thrust,
-            "torque": torque,
-        }
-        result = call(self._functions.coupled_acceleration, arguments)
+        carriers = {"carrier_pose": carrier_pose, "carrier_velocity": carrier_velocity}
+        given = {"tensions": tensions, "thrust": thrust, "torque": torque}
+        result = self._call("coupled_acceleration", pose=pose, velocity=velocity, **carriers, **given)
         return result["acceleration"], result["carrier_acceleration"]
 
     @several_arrays
@@ -246,9 +221,8 @@ class Dynamics:
         A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2 per N]. The tensions stay as they are when
         the platform moves; for elastic cables see `stiffness`.
         """
-        arguments = {"pose": pose, "velocity": velocity, "tensions": tensions}
-        arguments["carrier_pose"] = self._carriers(carrier_pose)
-        result = call(self._functions.linearisation, arguments, matrices=("B",))
+        state = {"pose": pose, "velocity": velocity, "tensions": tensions, "carrier_pose": carrier_pose}
+        result = self._call("linearisation", **state)
         return result["A"], result["B"]
 
     @one_array
@@ -279,9 +253,8 @@ class Dynamics:
                         f"cables[{index}].stiffness must be E A > 0 [N] for every cable, got none in robot "
                         f"{self.robot.name!r}; elastic=False needs no stiffness"
                     )
-        arguments = {"pose": pose, "tensions": tensions, "carrier_pose": self._carriers(carrier_pose)}
-        functions = self._functions
-        return call(functions.stiffness if elastic else functions.tension_stiffness, arguments)["K"]
+        name = "stiffness" if elastic else "tension_stiffness"
+        return self._call(name, pose=pose, tensions=tensions, carrier_pose=carrier_pose)["K"]
 
     def natural_frequencies(
         self, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None, elastic: bool = False
@@ -305,8 +278,7 @@ class Dynamics:
         Frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
         translation of the CoM [m] and rotation vector [rad] in {G}.
         """
-        cores = {"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,))}
-        pose, tensions = arrays(cores)
+        pose, tensions = arrays({"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,))})
         for name, array in (("pose", pose), ("tensions", tensions)):
             if array.ndim != 1:
                 raise InputError(f"{name} must have the shape ({array.shape[-1]},), got {array.shape}")
@@ -332,5 +304,12 @@ class Dynamics:
         """
         return RelativeDynamics(self.robot)
 
-    def _carriers(self, carrier_pose: Array | None) -> Array:
-        return self.robot.carrier_home if carrier_pose is None else carrier_pose
+    def _call(self, name: str, **arguments: Array) -> dict[str, Array]:
+        """Evaluate one of the functions, with its carriers at home if `carrier_pose` is None."""
+        if "carrier_pose" in arguments and arguments["carrier_pose"] is None:
+            arguments["carrier_pose"] = self.robot.carrier_home
+        return call(self._functions.function(name), arguments, matrices=("A", "B"))
+
+    def _in_wind(self, name: str, wind: Array | None, **arguments: Array) -> dict[str, Array]:
+        """Evaluate one of the functions that exist without and with wind."""
+        return self._call(name, **arguments) if wind is None else self._call(f"{name}_in_wind", wind=wind, **arguments)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 
 import casadi as ca
@@ -20,18 +20,19 @@ PUBLISHED = ("wrench_matrix", "cable_lengths", "required_wrench", "acceleration"
 
 
 class WorldFunctions(Mapping[str, ca.Function]):
-    """Map the names of the four functions to build on to them; the others are attributes.
+    """Map the names of the four functions to build on to them; `function` has the others too.
 
     Inputs have the names that arguments of `Dynamics` have.
     """
 
     def __init__(self, robot: Robot):
         self._robot = robot
+        self._built: dict[str, ca.Function] = {}
 
     def __getitem__(self, name: str) -> ca.Function:
         if name not in PUBLISHED:
             raise KeyError(name)
-        return getattr(self, name)
+        return self.function(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(PUBLISHED)
@@ -39,96 +40,14 @@ class WorldFunctions(Mapping[str, ca.Function]):
     def __len__(self) -> int:
         return len(PUBLISHED)
 
-    @cached_property
-    def wrench_matrix(self) -> ca.Function:
-        """Return A, (6, m)."""
-        return self._function("wrench_matrix", "pose carrier_pose", A=self._A)
-
-    @cached_property
-    def cable_lengths(self) -> ca.Function:
-        """Return the lengths, (m, 1) [m]."""
-        return self._function("cable_lengths", "pose carrier_pose", lengths=self._exit.lengths)
-
-    @cached_property
-    def points(self) -> ca.Function:
-        """Return anchors and attachments, (m, 3) each [m]."""
-        attachments = kinematics.transform(self._symbols["pose"], self._robot.attachments)
-        return self._function("points", "pose carrier_pose", anchors=self._anchors.T, attachments=attachments.T)
-
-    @cached_property
-    def exits(self) -> ca.Function:
-        """Return where the cables leave their pulleys, (m, 3) [m]."""
-        return self._function("exits", "pose carrier_pose", exits=self._exit.points.T)
-
-    @cached_property
-    def required_wrench(self) -> ca.Function:
-        """Return w, (6, 1) [N, N m], without wind."""
-        return self._function("required_wrench", " ".join(Motion._fields), w=self._w)
-
-    @cached_property
-    def required_wrench_in_wind(self) -> ca.Function:
-        """Return w, (6, 1) [N, N m]."""
-        names = " ".join([*Motion._fields, "wind"])
-        return self._function("required_wrench_in_wind", names, w=self._w - self._W_e)
-
-    @cached_property
-    def aerodynamic_wrench(self) -> ca.Function:
-        """Return W_e, (6, 1) [N, N m]."""
-        return self._function("aerodynamic_wrench", "pose velocity wind", W_e=self._W_e)
-
-    @cached_property
-    def acceleration(self) -> ca.Function:
-        """Return the platform's acceleration, (6, 1) [m/s^2, rad/s^2], without wind."""
-        result = self._acceleration(self._pull)
-        return self._function("acceleration", "pose velocity tensions carrier_pose", acceleration=result)
-
-    @cached_property
-    def acceleration_in_wind(self) -> ca.Function:
-        """Return the platform's acceleration, (6, 1) [m/s^2, rad/s^2]."""
-        result = self._acceleration(self._pull + self._W_e)
-        return self._function("acceleration_in_wind", "pose velocity tensions carrier_pose wind", acceleration=result)
-
-    @cached_property
-    def coupled_acceleration(self) -> ca.Function:
-        """Return the accelerations of the platform, (6, 1), and of the carriers, (c, 6) [m/s^2, rad/s^2]."""
-        robot, symbols = self._robot, self._symbols
-        gravity, carriers = np.array(robot.gravity), []
-        for index, carrier in enumerate(robot.carriers):
-            at, rate = symbols["carrier_pose"][index, :].T, symbols["carrier_velocity"][index, :].T
-            pull = forward.pull_on_carrier(robot, index, self._exit, at, symbols["tensions"])
-            own = carrier.acceleration(at, rate, symbols["thrust"][index], symbols["torque"][index, :].T, pull, gravity)
-            carriers.append(ca.SX.zeros(1, 6) if own is None else own.T)
-        return self._function(
-            "coupled_acceleration",
-            "pose velocity tensions carrier_pose carrier_velocity thrust torque",
-            acceleration=self._acceleration(self._pull),
-            carrier_acceleration=ca.vertcat(*carriers),
-        )
-
-    @cached_property
-    def linearisation(self) -> ca.Function:
-        """Return A, (12, 12), and B, (12, m), of the motion about a state."""
-        names = ("pose", "velocity", "tensions")
-        pose, velocity, tensions = (self._symbols[name] for name in names)
-        rate = ca.vertcat(velocity, self._acceleration(self._pull))
-        A, B = ca.jacobian(rate, ca.vertcat(pose, velocity)), ca.jacobian(rate, tensions)
-        return self._function("linearisation", "pose velocity tensions carrier_pose", A=ca.densify(A), B=ca.densify(B))
-
-    @cached_property
-    def tension_stiffness(self) -> ca.Function:
-        """Return K, (6, 6) [N/m, N, N m], under constant tensions."""
-        return self._function("tension_stiffness", "pose tensions carrier_pose", K=self._K_t)
-
-    @cached_property
-    def stiffness(self) -> ca.Function:
-        """Return K, (6, 6) [N/m, N, N m], of elastic cables."""
-        K = elasticity.cable_stiffness(self._robot, self._A, self._exit.lengths, self._symbols["tensions"])
-        return self._function("stiffness", "pose tensions carrier_pose", K=self._K_t + K)
-
-    def _function(self, name: str, inputs: str, **outputs: Matrix) -> ca.Function:
-        names = inputs.split()
-        symbols = [self._symbols[name] for name in names]
-        return ca.Function(name, symbols, list(outputs.values()), names, list(outputs))
+    def function(self, name: str) -> ca.Function:
+        """Return one of the functions in `_DEFINITIONS`."""
+        if name not in self._built:
+            inputs, define = _DEFINITIONS[name]
+            names, outputs = inputs.split(), define(self)
+            symbols = [self._symbols[name] for name in names]
+            self._built[name] = ca.Function(name, symbols, list(outputs.values()), names, list(outputs))
+        return self._built[name]
 
     @cached_property
     def _symbols(self) -> dict[str, ca.SX]:
@@ -177,3 +96,52 @@ class WorldFunctions(Mapping[str, ca.Function]):
 
     def _acceleration(self, wrench: Matrix) -> Matrix:
         return forward.platform_acceleration(self._robot, self._symbols["pose"], self._symbols["velocity"], wrench)
+
+    def _coupled_acceleration(self) -> dict[str, Matrix]:
+        robot, symbols = self._robot, self._symbols
+        gravity, carriers = np.array(robot.gravity), []
+        for index, carrier in enumerate(robot.carriers):
+            at, rate = symbols["carrier_pose"][index, :].T, symbols["carrier_velocity"][index, :].T
+            pull = forward.pull_on_carrier(robot, index, self._exit, at, symbols["tensions"])
+            own = carrier.acceleration(at, rate, symbols["thrust"][index], symbols["torque"][index, :].T, pull, gravity)
+            carriers.append(ca.SX.zeros(1, 6) if own is None else own.T)
+        return {"acceleration": self._acceleration(self._pull), "carrier_acceleration": ca.vertcat(*carriers)}
+
+    def _linearisation(self) -> dict[str, Matrix]:
+        pose, velocity, tensions = (self._symbols[name] for name in ("pose", "velocity", "tensions"))
+        rate = ca.vertcat(velocity, self._acceleration(self._pull))
+        A, B = ca.jacobian(rate, ca.vertcat(pose, velocity)), ca.jacobian(rate, tensions)
+        return {"A": ca.densify(A), "B": ca.densify(B)}
+
+    def _points(self) -> dict[str, Matrix]:
+        attachments = kinematics.transform(self._symbols["pose"], self._robot.attachments)
+        return {"anchors": self._anchors.T, "attachments": attachments.T}
+
+    def _stiffness(self) -> dict[str, Matrix]:
+        K = elasticity.cable_stiffness(self._robot, self._A, self._exit.lengths, self._symbols["tensions"])
+        return {"K": self._K_t + K}
+
+
+_PLACE, _MOTION, _STATE = "pose carrier_pose", " ".join(Motion._fields), "pose velocity tensions carrier_pose"
+# Of each function its inputs, and its outputs by name.
+_DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]]] = {
+    "wrench_matrix": (_PLACE, lambda of: {"A": of._A}),  # (6, m)
+    "cable_lengths": (_PLACE, lambda of: {"lengths": of._exit.lengths}),  # (m, 1)
+    "points": (_PLACE, WorldFunctions._points),  # (m, 3) each
+    "exits": (_PLACE, lambda of: {"exits": of._exit.points.T}),  # (m, 3)
+    "required_wrench": (_MOTION, lambda of: {"w": of._w}),  # (6, 1)
+    "required_wrench_in_wind": (f"{_MOTION} wind", lambda of: {"w": of._w - of._W_e}),  # (6, 1)
+    "aerodynamic_wrench": ("pose velocity wind", lambda of: {"W_e": of._W_e}),  # (6, 1)
+    "acceleration": (_STATE, lambda of: {"acceleration": of._acceleration(of._pull)}),  # (6, 1)
+    "acceleration_in_wind": (
+        f"{_STATE} wind",
+        lambda of: {"acceleration": of._acceleration(of._pull + of._W_e)},  # (6, 1)
+    ),
+    "coupled_acceleration": (
+        f"{_STATE} carrier_velocity thrust torque",
+        WorldFunctions._coupled_acceleration,  # (6, 1) and (c, 6)
+    ),
+    "linearisation": (_STATE, WorldFunctions._linearisation),  # (12, 12) and (12, m)
+    "tension_stiffness": ("pose tensions carrier_pose", lambda of: {"K": of._K_t}),  # (6, 6)
+    "stiffness": ("pose tensions carrier_pose", WorldFunctions._stiffness),  # (6, 6)
+}
