@@ -37,7 +37,7 @@ _FOLDER = Path(__file__).parent / "kernels"
 _SHARED = Path(tolerances.__file__)  # its numbers are in the machine code
 _MODULES = (
     *("codes", "dual_active_set", "lanes", "lanes_newton", "lanes_proof", "lanes_slabs", "memory", "proof"),
-    *("reduction", "row_alone", "rows", "single", "slabs", "wide"),
+    *("reduction", "row_alone", "rows", "single", "wide"),
 )
 
 _lock = threading.Lock()

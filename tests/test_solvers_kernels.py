@@ -211,7 +211,7 @@ def test_threads_is_a_whole_number(threads):
 def test_machine_code_of_other_sources_is_forgotten(tmp_path, monkeypatch):
     folder = tmp_path / "kernels"
     (folder / "__pycache__").mkdir(parents=True)
-    index, source = folder / "__pycache__" / "rows.solve_rows-1.py311.nbi", folder / "slabs.py"
+    index, source = folder / "__pycache__" / "rows.solve_rows-1.py311.nbi", folder / "single.py"
     monkeypatch.setattr(compiled, "_FOLDER", folder)
     monkeypatch.setattr(compiled, "_SHARED", tmp_path / "tolerances.py")
     assert Path(tolerances.__file__).is_file()

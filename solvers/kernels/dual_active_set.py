@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from .codes import DECISIVE, DEPENDENT, PARALLEL, STATIONARY
+from .codes import DECISIVE, DEPENDENT, PARALLEL, SLACK, STATIONARY
 from .jit import compilable
-from .slabs import rounding_of
 
 __all__ = ["dual_active_set"]
 
@@ -146,7 +145,8 @@ def _is_optimal(N, k, s, lower, upper, mm, slack, u, side, active, q):
         if u[j] < -STATIONARY * size:
             return False
         i = active[j]
-        if u[j] * rounding_of(lower[i], upper[i], slack) > DECISIVE * square:
+        # Rounding moves a limit relative to the limit itself, at most by the slack.
+        if u[j] * min(slack, SLACK * max(abs(lower[i]), abs(upper[i]))) > DECISIVE * square:
             return False
     for c in range(k):
         rest = 0.0

@@ -1,8 +1,9 @@
 """Many problems at once with at most two more cables than equations: reduction, then one slab after another.
 
-The same steps as `reduction` and `slabs`, without branches and without pivoting: a matrix that would need it, or one
-without full rank, is left to `single`. For a problem without tensions the limits that exclude them give the direction
-that proves it.
+Each cable is a slab in the plane of the null space. The slabs are taken one after another (Seidel 1991): an optimum
+that the next slab forbids moves onto its edge, cut to an interval by the slabs before. The reduction is `reduction`
+without pivoting: a matrix that would need it, or one without full rank, is left to `single`. For a problem without
+tensions the limits that exclude them give the direction that proves it.
 """
 
 from __future__ import annotations
@@ -161,7 +162,7 @@ def slabs_in_lanes(n, m, W, V):
         shift = where(start > stop, 0.5 * (start + stop), shift)
         z0 = where(moves, base0 + shift * along0, z0)
         z1 = where(moves, base1 + shift * along1, z1)
-        # z is the sum of the two normals, each times its multiplier; see `slabs`.
+        # z is the sum of the two normals, each times its multiplier.
         other = where(shift > 0.0, shift / den_start, where(shift < 0.0, shift / den_stop, splat(0.0)))
         dot = where(shift > 0.0, dot_start, dot_stop)
         own = ((a * z0 + b * z1) - other * dot) / where(cuts, square, splat(1.0))

@@ -78,10 +78,10 @@ def _soft(A, w, lower, upper, ref, weights, length, soft, n, m, t, d, info, work
         missing /= length if n == 6 and i >= 3 else 1.0
         total += missing * missing
     info[2] = math.sqrt(total)
-    required, rounded = what_counts(A, w, lower, upper, ref, t, length, n, m)
-    if info[2] <= FEASIBILITY * required + ROUNDING * rounded:
+    required, rounding, largest = what_counts(A, w, lower, upper, ref, t, length, n, m)
+    if info[2] <= FEASIBILITY * required + ROUNDING * rounding:
         return OPTIMAL
-    if proves(A, w, lower, upper, ref, n, m, 1.0 / length, e, info) == INFEASIBLE:
+    if proves(A, w, lower, upper, n, m, 1.0 / length, required, rounding, largest, e, info) == INFEASIBLE:
         for i in range(n):
             d[i] = e[i]
     else:

@@ -6,10 +6,8 @@ $$
 
 B is reduced by Householder reflections from the right with row pivoting (B = P^T L Q_1^T; Golub and Van Loan, 5.4).
 That gives the least-norm s_0, orthogonal to the orthonormal null-space basis N; what remains is the z of least norm
-inside slabs, one for each cable. In up to two dimensions the slabs are taken one after another (Seidel 1991): an
-optimum that the next slab forbids moves onto its edge, cut to an interval by the slabs before. Beyond two dimensions a
-dual active-set method (Goldfarb and Idnani 1983) adds the most violated limit and drops those whose multiplier would
-change sign.
+inside slabs, one for each cable. A dual active-set method (Goldfarb and Idnani 1983) adds the most violated limit and
+drops those whose multiplier would change sign.
 
 Nothing here is believed that the data do not confirm. Tensions count only if, inside their limits, their wrench error
 is below `TensionProblem.tolerance` and the multipliers of the limits prove that they are optimal; a direction only if
@@ -26,9 +24,8 @@ from .codes import INFEASIBLE, OPTIMAL, SINGULAR, SLACK, UNSURE
 from .dual_active_set import dual_active_set
 from .jit import GIVEN, VECTOR, compilable
 from .memory import floats, integers
-from .proof import outside_range, proves
+from .proof import proves
 from .reduction import reduce, reflect
-from .slabs import nearest_in_slabs
 
 __all__ = ["solve_one", "solve_packed", "what_counts", "work_size"]
 
@@ -36,27 +33,31 @@ __all__ = ["solve_one", "solve_packed", "what_counts", "work_size"]
 @compilable()
 def work_size(n: int, m: int) -> int:
     """Return how many numbers of scratch one problem needs."""
-    return n * m + 6 * n + 6 * m + (m * m + 2 * m) + (2 * m * m + 6 * m + 2) + n * n + n
+    return n * m + 6 * n + 5 * m + m * m + (2 * m * m + 5 * m + 1)
 
 
 @compilable()
 def what_counts(A, w, lower, upper, ref, t, length, n, m):
-    """Return what the problem requires, and the sum of the terms that are rounded: see `TensionProblem.tolerance`."""
+    """Return what the problem requires, the sum of the terms that are rounded, and the largest norm of a column.
+
+    See `TensionProblem.tolerance`.
+    """
     per_length = 1.0 / length
-    required, rounding = 0.0, 0.0
+    required, rounding, largest = 0.0, 0.0, 0.0
     for i in range(n):
         x = w[i] * (per_length if n == 6 and i >= 3 else 1.0)
         required += x * x
-    needed = math.sqrt(required)
+    required = math.sqrt(required)
     for c in range(m):
         square = 0.0
         for i in range(n):
             x = A[i * m + c] * (per_length if n == 6 and i >= 3 else 1.0)
             square += x * x
         norm = math.sqrt(square)
-        needed += norm * abs(min(max(lower[c], 0.0), upper[c]))
+        largest = max(largest, norm)
+        required += norm * abs(min(max(lower[c], 0.0), upper[c]))
         rounding += norm * (abs(t[c]) + abs(ref[c]))
-    return needed, rounding
+    return required, rounding, largest
 
 
 # One signature, so that Numba does not compile it once more for arrays that may be written.
@@ -81,8 +82,8 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     low, high, s = work[at : at + m], work[at + m : at + 2 * m], work[at + 2 * m : at + 3 * m]
     unit, push = work[at + 3 * m : at + 4 * m], work[at + 4 * m : at + 5 * m]
     at += 5 * m
-    N = work[at : at + m * m + 2 * m]
-    at += m * m + 2 * m
+    N = work[at : at + m * m]
+    at += m * m
     rest = work[at:]
     counts = integers(n + 2 * m)
     order, moving, active = counts[:n], counts[n : n + m], counts[n + m :]
@@ -114,19 +115,25 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
         for c in range(mm):
             B[i * mm + c] = A[i * m + moving[c]] * scale * unit[c]
 
-    rank = reduce(B, n, mm, order, diag, tau, norms) if mm else 0
+    rank = reduce(B, n, mm, order, diag, tau, norms)
     if rank < 0:
         return UNSURE
-    total = 0.0
+    square = 0.0
     for j in range(rank):
         x = b[order[j]]
         for i in range(j):
             x -= B[j * mm + i] * y[i]
         y[j] = x / diag[j]
-        total += y[j] * y[j]
+        square += y[j] * y[j]
         s[j] = y[j]
-    size = max(size, math.sqrt(total))
-    slack = SLACK * size
+    slack = SLACK * max(size, math.sqrt(square))
+    missing, worst, side = 0.0, -1, 0.0  # the part of w that is farthest outside the range of A
+    for j in range(rank, n):
+        x = b[order[j]]
+        for i in range(rank):
+            x -= B[j * mm + i] * y[i]
+        if abs(x) > missing:
+            missing, worst, side = abs(x), j, math.copysign(1.0, x)
     for c in range(rank, mm):
         s[c] = 0.0
     for j in range(rank - 1, -1, -1):
@@ -140,23 +147,19 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
     outcome = 0
     k = mm - rank
     if outside:
-        for c in range(max(k, 2) * mm):
+        for c in range(k * mm):
             N[c] = 0.0
         for c in range(k):
             N[c * mm + rank + c] = 1.0
             for j in range(rank - 1, -1, -1):
                 reflect(B, tau, j, mm, N, c * mm)
-        if k <= 2:
-            outcome = nearest_in_slabs(N[:mm], N[mm : 2 * mm], s, low, high, mm, slack, push)
-        else:
-            outcome = dual_active_set(N, k, s, low, high, mm, slack, push, rest, active)
+        outcome = dual_active_set(N, k, s, low, high, mm, slack, push, rest, active)
+    for c in range(mm):
+        t[moving[c]] += unit[c] * s[c]
+    for c in range(m):
+        t[c] = min(max(t[c], lower[c]), upper[c])
+    needed, rounding, largest = what_counts(A, w, lower, upper, ref, t, length, n, m)
     if outcome == 0:
-        for c in range(mm):
-            i = moving[c]
-            t[i] += unit[c] * s[c]
-        for c in range(m):
-            t[c] = min(max(t[c], lower[c]), upper[c])
-        needed, rounding = what_counts(A, w, lower, upper, ref, t, length, n, m)
         error = 0.0
         for i in range(n):
             total = -w[i]
@@ -168,16 +171,17 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
         info[2] = math.sqrt(error)
         if info[2] <= FEASIBILITY * needed + ROUNDING * rounding:
             return OPTIMAL
-    if outcome == 2:
-        return UNSURE
     # A part of w outside the range of A makes the problem singular, whatever else is wrong with it.
-    if rank < n and outside_range(A, w, n, m, per_length, d, rest):
-        return SINGULAR if proves(A, w, lower, upper, ref, n, m, per_length, d, info) == SINGULAR else UNSURE
-    if outcome == 0:
+    singular = missing > 1e-10 * needed
+    if outcome == 2 or (outcome == 0 and not singular):
         return UNSURE
-    # push = B^T d, and push is in the row space of B.
-    for j in range(rank):
-        reflect(B, tau, j, mm, push, 0)
+    # B^T d = push, which is in the row space of B; or 0 with d[worst] = side.
+    if singular:
+        for j in range(rank):
+            push[j] = -side * B[worst * mm + j]
+    else:
+        for j in range(rank):
+            reflect(B, tau, j, mm, push, 0)
     for j in range(rank - 1, -1, -1):
         x = push[j]
         for i in range(j + 1, rank):
@@ -185,8 +189,10 @@ def solve_one(A, w, lower, upper, ref, weights, length, n, m, t, d, info, work):
         y[j] = x / diag[j]
     for i in range(n):
         d[order[i]] = y[i] if i < rank else 0.0
-    verdict = proves(A, w, lower, upper, ref, n, m, per_length, d, info)
-    return INFEASIBLE if verdict == INFEASIBLE else UNSURE
+    if singular:
+        d[order[worst]] = side
+    verdict = proves(A, w, lower, upper, n, m, per_length, needed, rounding, largest, d, info)
+    return verdict if verdict == (SINGULAR if singular else INFEASIBLE) else UNSURE
 
 
 @compilable("int64", GIVEN, "int64", "int64", VECTOR)
