@@ -36,7 +36,7 @@ def is_symbolic(value: Any) -> bool:
 def call(
     function: ca.Function, arguments: dict[str, Any], threads: int | None = None, matrices: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """Evaluate `function` on named arguments; the outputs have the common leading dimensions of the inputs.
+    """Evaluate `function` on named arguments; the outputs, in order, have the common leading dimensions of the inputs.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ def call(
         If CasADi cannot evaluate the Function, which happens only with external or iterative functions.
     """
     if any(is_symbolic(value) for value in arguments.values()):
-        return function(**_as_symbols(function, arguments))
+        outputs = function(**_as_symbols(function, arguments))
+        return {name: outputs[name] for name in function.name_out()}  # CasADi's are in the order of the alphabet
     if threads is not None and (not isinstance(threads, int) or threads < 1):
         raise InputError(f"threads must be a whole number from 1, or None, got {shown(threads)}")
     outputs = _evaluator(function)(arguments, threads)

@@ -140,6 +140,15 @@ def test_motion_in_world_by_differences():
         np.testing.assert_allclose(acceleration, second, rtol=1e-6, atol=1e-6)
 
 
+def test_motion_in_world_of_symbols_is_that_of_arrays():
+    relative = Dynamics(load("wang-flying")).relative
+    symbols = [ca.SX.sym("x", 6) for _ in range(6)]
+    motion = list(0.3 * np.random.default_rng(4).normal(size=(6, 6)))
+    function = ca.Function("motion", symbols, list(relative.motion_in_world(*symbols)))
+    for symbolic, array in zip(function(*motion), relative.motion_in_world(*motion), strict=True):
+        np.testing.assert_allclose(symbolic.full().ravel(), array, rtol=1e-12)
+
+
 def test_printed_angular_acceleration_is_not_in_the_code():
     """Paper F's (31), alpha = dP dTheta + ddTheta, is off by several per cent of the moment; ours is not."""
     robot = load("wang-flying")
