@@ -7,7 +7,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -30,24 +30,14 @@ def whole_file(path: Path) -> Iterator[Path]:
         If the file cannot be written. An existing file is not changed.
     """
     target = check_writable(path)
-    try:
+
+    def make() -> str:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         os.close(handle)
-    except (OSError, ValueError) as error:
-        raise _refusal(path, error) from None
-    temporary = Path(name)
-    _unfinished.add(temporary)
-    try:
+        return name
+
+    with _beside(path, target, make, 0o666) as temporary:
         yield temporary
-        temporary.chmod(_mode(target))
-        os.replace(temporary, target)
-    except BaseException as error:
-        temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.errno in NO_ROOM:
-            raise _refusal(path, error) from None
-        raise
-    finally:
-        _unfinished.discard(temporary)
 
 
 @contextmanager
@@ -62,19 +52,24 @@ def whole_folder(path: Path) -> Iterator[Path]:
     if path.exists() or path.is_symlink():
         raise InputError(f"{printable(str(path))} must be a new path, got one that exists")
     target = check_writable(path)
+    with _beside(path, target, lambda: tempfile.mkdtemp(dir=target.parent, prefix="."), 0o777) as temporary:
+        yield temporary
+
+
+@contextmanager
+def _beside(path: Path, target: Path, make: Callable[[], str], mode: int) -> Iterator[Path]:
+    """Yield what `make` makes; it becomes `target` when the block ends, with the permissions of what it replaces."""
     try:
-        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix="."))
+        temporary = Path(make())
     except (OSError, ValueError) as error:
         raise _refusal(path, error) from None
     _unfinished.add(temporary)
     try:
         yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o777 & ~mask)
-        temporary.rename(target)
+        temporary.chmod(_mode(target, mode))
+        temporary.replace(target)
     except BaseException as error:
-        shutil.rmtree(temporary, ignore_errors=True)
+        _remove(temporary)
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             raise _refusal(path, error) from None
         raise
@@ -86,10 +81,14 @@ def remove_unfinished() -> None:
     """Remove unfinished files, for a process that ends without unwinding its blocks."""
     for temporary in tuple(_unfinished):
         with suppress(OSError):
-            if temporary.is_dir():
-                shutil.rmtree(temporary, ignore_errors=True)
-            else:
-                temporary.unlink(missing_ok=True)
+            _remove(temporary)
+
+
+def _remove(temporary: Path) -> None:
+    if temporary.is_dir():
+        shutil.rmtree(temporary, ignore_errors=True)
+    else:
+        temporary.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> Path:
@@ -122,10 +121,10 @@ def _refusal(path: Path, error: Exception) -> InputError:
     return InputError(f"{printable(str(path))}: cannot be written ({reason})")
 
 
-def _mode(target: Path) -> int:
-    """Return the permissions of the file to replace, or those that this process gives to new files."""
+def _mode(target: Path, new: int) -> int:
+    """Return the permissions of the file to replace, or those that this process gives to `new` ones."""
     if target.exists():
         return stat.S_IMODE(target.stat().st_mode)
     mask = os.umask(0)
     os.umask(mask)
-    return 0o666 & ~mask
+    return new & ~mask

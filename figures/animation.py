@@ -16,7 +16,6 @@ from ..errors import InputError
 from ..inputs import number
 from . import film, style
 from .hull import faces
-from .plan import equal_scales, name_axes
 from .robot import box_edges
 
 if TYPE_CHECKING:
@@ -127,14 +126,13 @@ class _Stage:
 
     def __init__(self, scene: Scene, when: Timing):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 
         self._scene, self._when = scene, when
         self._map, self._norm = _tension_colours(scene)
         self._figure = style.figure(*SIZE)
         self._figure.set_dpi(DPI)
         self._canvas = FigureCanvasAgg(self._figure)
-        self._axes: Any = self._figure.add_subplot(projection=Axes3D.name)
+        self._axes = style.axes_in_space(self._figure)
         self._draw_surroundings()
         self._make_actors()
         self._canvas.draw()
@@ -185,10 +183,9 @@ class _Stage:
         if edges:
             reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
             named.append(ax.add_collection3d(reach))
-        name_axes(ax)
         corners = [corner for box in scene.boxes for corner in box]
         shown = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
-        equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]))
+        style.equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]))
         outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
         if outlines:
             keep_out = Line3DCollection(outlines, colors=style.colour(1), linewidths=0.8, label="keep out")

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import style
-from .plan import equal_scales, name_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,15 +15,12 @@ if TYPE_CHECKING:
 
 def curve_in_space(ways: Mapping[str, np.ndarray]) -> Figure:
     """Draw curves (n, 3) [m] with their names and equal scales; a dot marks the start of each."""
-    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
-
     canvas = style.figure(5.0, 4.4)
-    ax: Any = canvas.add_subplot(projection=Axes3D.name)
+    ax = style.axes_in_space(canvas)
     for index, (name, points) in enumerate(ways.items()):
         look = {"color": style.colour(index), "linestyle": style.line_style(index)}
         ax.plot(*points.T, **look, label=name)
         ax.plot(*points[0], "o", color=style.colour(index), markersize=4)
-    name_axes(ax)
-    equal_scales(ax, np.concatenate(list(ways.values())))
+    style.equal_scales(ax, np.concatenate(list(ways.values())))
     ax.legend(fontsize="small", loc="upper left")
     return canvas

@@ -59,10 +59,7 @@ def curves(
     """
     canvas = style.figure(5.0, 1.2 + 2.0 * len(panels))
     looks: dict[str, int] = {}
-    for row, panel in enumerate(panels):
-        last = row + 1 == len(panels)
-        ax = style.axes(canvas, xlabel if last else "", panel.label, (len(panels), 1, row + 1))
-        ax.tick_params(labelbottom=last)
+    for ax, panel in zip(style.panels_below(canvas, xlabel, [panel.label for panel in panels]), panels, strict=True):
         ax.set_xscale("log" if logarithmic else "linear")
         ax.set_yscale("log" if panel.logarithmic else "linear")
         for name, values in panel.curves.items():

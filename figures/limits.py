@@ -43,10 +43,8 @@ def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
     """Draw quantities over `times` (n,) [s], with a panel for each."""
     canvas = style.figure(5.0, 0.9 + 1.5 * len(quantities))
     looks: dict[str, int] = {}
-    for row, quantity in enumerate(quantities):
-        last = row + 1 == len(quantities)
-        ax = style.axes(canvas, "time [s]" if last else "", f"[{quantity.unit}]", (len(quantities), 1, row + 1))
-        ax.tick_params(labelbottom=last)
+    panels = style.panels_below(canvas, "time [s]", [f"[{quantity.unit}]" for quantity in quantities])
+    for ax, quantity in zip(panels, quantities, strict=True):
         _panel(ax, times, quantity, looks)
     style.legend_below(canvas, *canvas.axes)
     return canvas

@@ -13,15 +13,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
 
 
 def path(trajectory: xr.Dataset) -> Figure:
     """Draw the paths of platform and carriers in {G}, with the lines between them at a few instants."""
-    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
-
     canvas = style.figure(5.0, 4.4)
-    ax = canvas.add_subplot(projection=Axes3D.name)
+    ax = style.axes_in_space(canvas)
     position = trajectory["pose"].values[:, :3]
     carriers = trajectory["carrier_pose"].values[:, :, :3]
     ax.plot(*position.T, color=style.colour(0), label="platform")
@@ -36,9 +33,8 @@ def path(trajectory: xr.Dataset) -> Figure:
         for row in np.linspace(0, len(position) - 1, 9).astype(int):
             ax.plot(*np.stack([position[row], carriers[row, index]]).T, color="#bbbbbb", linewidth=0.6)
     ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
-    name_axes(ax)
     moving = trajectory["carrier_moves"].values
-    equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
+    style.equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
     ax.legend(fontsize="small", loc="upper left")
     return canvas
 
@@ -115,27 +111,3 @@ def _draw_limit(ax: Axes, value: float, text: str, above: bool) -> None:
     ax.axhline(value, **style.LIMIT)
     place, side = ("axes fraction", "data"), "bottom" if above else "top"
     ax.annotate(text, (1, value), xycoords=place, ha="right", va=side, fontsize=8)
-
-
-def equal_scales(ax: Any, points: np.ndarray) -> None:
-    """Set the same scale on all three axes, so that a circle looks like a circle."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
-    for axis, centre in zip("xyz", (low + high) / 2, strict=True):
-        getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
-    ax.set_box_aspect((1, 1, 1))
-
-
-def name_axes(ax: Any) -> None:
-    """Label axes in space with coordinates and units, and set few ticks."""
-    for axis in "xyz":
-        # Numbers run across the label of z: it stands off. Below, the others' labels would leave the figure.
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7 if axis == "z" else 4)
-        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
-
-
-def few_ticks() -> MaxNLocator:
-    """Set few enough tick marks that a small 3-D axis stays legible."""
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4, prune="both")

@@ -9,7 +9,6 @@ import numpy as np
 
 from . import style
 from .hull import faces
-from .plan import equal_scales, name_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,10 +49,9 @@ class RobotSketch:
 def draw(sketch: RobotSketch) -> Figure:
     """Draw a robot."""
     from matplotlib import cm, colormaps, colors
-    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 
     canvas = style.figure(5.6, 4.6)
-    ax: Any = canvas.add_subplot(projection=Axes3D.name)
+    ax = style.axes_in_space(canvas)
     inside = sketch.positions[sketch.feasible]
     if len(inside):
         ax.scatter(*inside.T, s=5, color=style.colour(2), alpha=0.5, linewidths=0, label="can rest here")
@@ -70,8 +68,7 @@ def draw(sketch: RobotSketch) -> Figure:
             ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
     for position, name in zip(sketch.carriers, sketch.names, strict=True):
         ax.text(*position, name, fontsize=7)
-    name_axes(ax)
-    equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
+    style.equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
     ax.set_title(sketch.title, fontsize=9)
     ax.legend(fontsize="x-small", loc="upper left")
     if scale is not None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..writing import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
 # Okabe and Ito (2008), distinct for every kind of colour vision; black and yellow last.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442"]
@@ -42,6 +46,44 @@ def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] =
     ax.grid(True, color="#dddddd", linewidth=0.6)
     ax.spines[["top", "right"]].set_visible(False)
     return ax
+
+
+def panels_below(canvas: Figure, xlabel: str, ylabels: Sequence[str]) -> list[Axes]:
+    """Return axes below each other, of which only the last has numbers and a label on its horizontal axis."""
+    every = []
+    for row, ylabel in enumerate(ylabels, 1):
+        last = row == len(ylabels)
+        every.append(axes(canvas, xlabel if last else "", ylabel, (len(ylabels), 1, row)))
+        every[-1].tick_params(labelbottom=last)
+    return every
+
+
+def axes_in_space(canvas: Figure) -> Any:
+    """Return axes of a 3-D picture, with coordinates and units as labels, and few ticks."""
+    from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
+
+    ax: Any = canvas.add_subplot(projection=Axes3D.name)
+    for axis in "xyz":
+        # Numbers run across the label of z: it stands off. Below, the others' labels would leave the figure.
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7 if axis == "z" else 4)
+        getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    return ax
+
+
+def equal_scales(ax: Any, points: np.ndarray) -> None:
+    """Set the same scale on all three axes, so that a circle looks like a circle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
+    for axis, centre in zip("xyz", (low + high) / 2, strict=True):
+        getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
+    ax.set_box_aspect((1, 1, 1))
+
+
+def few_ticks() -> MaxNLocator:
+    """Set few enough tick marks that a small 3-D axis stays legible."""
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(4, prune="both")
 
 
 def legend_below(canvas: Figure, *panels: Axes) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from . import style
 from .hull import outline
-from .plan import few_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,4 +61,4 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
     ax.set_aspect("equal", adjustable="datalim")
     ax.autoscale_view()
     for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(few_ticks())
+        axis.set_major_locator(style.few_ticks())

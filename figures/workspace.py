@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import style
-from .plan import few_ticks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,8 +104,8 @@ def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) ->
     if marks is not None:
         ax.plot(*marks.T, "^", color="#000000", markersize=4, label="anchors")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.xaxis.set_major_locator(few_ticks())
-    ax.yaxis.set_major_locator(few_ticks())
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(style.few_ticks())
 
 
 def _reached_along(canvas: Figure, result: xr.Dataset, along: str) -> None:

@@ -54,7 +54,7 @@ def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:
     lengths = dynamics.cable_lengths(robot.home)
     singular_values = np.linalg.svd(A, compute_uv=False)[: len(robot.platform.dof)]
     level, tilted = _poses_about_home(robot, lengths)
-    rank = _rank(A)
+    rank = int(_ranks(A))
     return Diagnosis(
         rank=rank,
         rank_level=int(_ranks(dynamics.wrench_matrix(level) * scale * rows).max()),
@@ -79,10 +79,6 @@ def _poses_about_home(robot: Robot, lengths: np.ndarray) -> tuple[np.ndarray, np
 def _ranks(A: np.ndarray) -> np.ndarray:
     values = np.linalg.svd(A, compute_uv=False)
     return (values > RANK_TOLERANCE * values[..., :1]).sum(axis=-1)
-
-
-def _rank(A: np.ndarray) -> int:
-    return int(_ranks(A[None])[0])
 
 
 def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:

@@ -25,18 +25,14 @@ def transform(pose: Matrix, points: np.ndarray) -> Matrix:
 
 def anchors(points: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
     """Place anchors `points` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), in {G}: (3, m) [m]."""
-    columns = []
-    for point, carrier in zip(points, carrier_of_cable, strict=True):
-        columns.append(transform(carrier_pose[int(carrier), :].T, point[None]))
-    return ca.horzcat(*columns)
+    owners = zip(points, carrier_of_cable.tolist(), strict=True)
+    return ca.horzcat(*(transform(carrier_pose[carrier, :].T, point[None]) for point, carrier in owners))
 
 
 def axes(directions: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
     """Turn axes `directions` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), into {G}: (3, m) [-]."""
-    columns = []
-    for direction, carrier in zip(directions, carrier_of_cable, strict=True):
-        columns.append(rotation(carrier_pose[int(carrier), 3:6].T) @ ca.DM(direction))
-    return ca.horzcat(*columns)
+    owners = zip(directions, carrier_of_cable.tolist(), strict=True)
+    return ca.horzcat(*(rotation(carrier_pose[carrier, 3:6].T) @ ca.DM(direction) for direction, carrier in owners))
 
 
 def cables(

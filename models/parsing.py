@@ -115,7 +115,8 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
 def _sentence(detail: Any, model: type[BaseModel]) -> str:
     """Return "field must be ..., got ..." for one complaint of pydantic."""
     place, kind, value, context = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
-    field, holder = _walk(place, json_schema(model))
+    field, holder, node = _walk(place, json_schema(model))
+    tags = sorted(node.get("discriminator", {}).get("mapping", {}))
     key = str(place[-1]) if place else ""
     field = printable(field, LONGEST_TEXT // 2)  # leaves enough of the line for what is wrong with it
     if kind == "extra_forbidden":
@@ -124,22 +125,21 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
         description = holder.get("properties", {}).get(key, {}).get("description")
         return f"{field} is missing" + (f": {description}" if description else "")
     if kind == "union_tag_invalid":
-        tags = _tags(place, model)
         meant = _close(str(context["tag"]), tags)
         return f"{field}.kind must be one of {', '.join(tags)}, got {shown(context['tag'])}{meant}"
     if kind == "union_tag_not_found":
-        return f"{field}.kind is missing: one of {', '.join(_tags(place, model))}"
+        return f"{field}.kind is missing: one of {', '.join(tags)}"
     if kind == "too_short":
         return f"{field} must have at least {context['min_length']} items, got {context['actual_length']}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        message = f"must be a mapping with {_keys(_schema_at(place, model))}, got {shown(value)}"
+        message = f"must be a mapping with {_keys(node)}, got {shown(value)}"
     else:
         message = detail["msg"]
         if kind != "value_error" or not isinstance(value, dict):
             message += f", got {shown(value)}"
     if not field:
         return message
-    if message.partition(" ")[0] in _known(_schema_at(place, model)):  # a part's own check names one of its fields
+    if message.partition(" ")[0] in _known(node):  # a part's own check names one of its fields
         return f"{field}.{message}"
     return f"{field} {message}" if message.startswith("must ") else f"{field}: {message}"
 
@@ -273,8 +273,8 @@ def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict
     return _resolve(below if isinstance(below, dict) else {}, schema)
 
 
-def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Return the dotted name of a place in the data, and the schema of the object that holds it.
+def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """Return the dotted name of a place in the data, the schema of the object that holds it, and its own.
 
     Pydantic puts a union's tag into the place (carriers, 0, prescribed, home); a user's file has no such level.
     """
@@ -285,17 +285,4 @@ def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str,
             holder = node
             field += f"[{part}]" if isinstance(part, int) else f".{part}" if field else str(part)
         node = _step(node, part, schema)
-    return field, holder
-
-
-def _schema_at(location: tuple[int | str, ...], model: type[BaseModel]) -> dict[str, Any]:
-    """Return the schema of what stands at a place."""
-    node = json_schema(model)
-    for part in location:
-        node = _step(node, part, json_schema(model))
-    return node
-
-
-def _tags(location: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
-    """Return the tags of the union at a place."""
-    return sorted(_schema_at(location, model).get("discriminator", {}).get("mapping", {}))
+    return field, holder, node

@@ -296,7 +296,7 @@ def test_sag_batches_and_refuses():
         (([0, 0, 0], [1, 0, 0], 0.9, np.inf, 0.1), "length"),
         (([0, 0], [1, 0, 0], 0.9, EA, 0.1), "start"),
         (([0, 0, 0], [1, 0, np.inf], 0.9, EA, 0.1), "end"),
-        ((np.zeros((2, 3)), np.ones((3, 3)), 0.9, EA, 0.1), "broadcast"),
+        ((np.zeros((2, 3)), np.ones((3, 3)), 0.9, EA, 0.1), "leading dimensions"),
         (([0, 0, 0], [1, 0, 0], 1.2, EA, 0.1, (0, 0, 0)), "up"),
     ]:
         with pytest.raises(InputError, match=field):

@@ -61,20 +61,11 @@ class Places:
             accepted = f"indices below {len(self)}, flags ({len(self)},) or a slice"
             raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
 
-    def check(self, robot: Robot) -> None:
-        """Check that the shapes are those of a robot.
-
-        Raises
-        ------
-        InputError
-            If one is not.
-        """
-        n, carriers = np.shape(self.pose)[:1], len(required("robot", robot, Robot).carriers)
-        for name, value, shape in (("pose", self.pose, (*n, 6)), ("carriers", self.carriers, (*n, carriers, 6))):
-            if not isinstance(value, np.ndarray) or value.shape != shape or value.dtype.kind not in "fiu":
-                raise InputError(f"places.{name} must be an array of numbers of shape {shape}, got {shown(value)}")
-
 
 def check_places(robot: Robot, places: Places) -> None:
     """Check that these are a robot and places of it; raise InputError if they are not."""
-    required("places", places, Places).check(robot)
+    parts = {"pose": required("places", places, Places).pose, "carriers": places.carriers}
+    n, carriers = np.shape(places.pose)[:1], len(required("robot", robot, Robot).carriers)
+    for (name, value), shape in zip(parts.items(), ((*n, 6), (*n, carriers, 6)), strict=True):
+        if not isinstance(value, np.ndarray) or value.shape != shape or value.dtype.kind not in "fiu":
+            raise InputError(f"places.{name} must be an array of numbers of shape {shape}, got {shown(value)}")

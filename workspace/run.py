@@ -124,7 +124,7 @@ def sample(
     start = time.perf_counter()
     required("robot", robot, Robot)
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
-    region = _region(region)
+    region = Region.model_validate({} if region is None else region)
     check_sampling(method, samples, seed)
     whole_number("workers", workers, 1, MOST_WORKERS)
     whole_number("points_max", points_max, 0, MOST_POINTS)
@@ -229,12 +229,6 @@ class _Run:
             known = [self._checkpoint and self._checkpoint.flags(first + i, size_of(i, samples)) for i in some]
             units = None if points is None else [points[i * CHUNK : (i + 1) * CHUNK] for i in some]
             yield self._shared, first + start, known, units, self._counts.left > 0
-
-
-def _region(region: Region | Mapping[str, Any] | None) -> Region:
-    if isinstance(region, Region):
-        return region
-    return Region.model_validate({} if region is None else region)
 
 
 def _header(robot: Robot, requested: dict[str, Any]) -> dict[str, Any]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from ...errors import InputError
 
+MOST_PARTS = 1_000_000  # of a cable
+
 
 def positive(name: str, value: Any, infinite: bool = False) -> float:
     """Return `value` as a float above zero, or raise InputError; `infinite` permits infinity."""
@@ -23,13 +25,6 @@ def non_negative(name: str, value: Any) -> float:
     if not 0 <= number < np.inf:
         raise InputError(f"{name} must be a finite number >= 0, got {number:g}")
     return number
-
-
-def count(name: str, value: Any, least: int) -> int:
-    """Return `value` as a whole number of at least `least`, or raise InputError."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{name} must be a whole number >= {least}, got {value!r}")
-    return int(value)
 
 
 def _number(name: str, value: Any) -> float:

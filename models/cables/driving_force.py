@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...errors import InputError
+from ...inputs import one_of, whole_number
 from ..batch import as_array
 from ..dynamics import Dynamics
 from ..points import rotations
@@ -126,7 +127,7 @@ def driving_force(
     """
     stiffness, damping = _cable_constants(robot)
     time_step = checks.positive("time_step", time_step)
-    elements = checks.count("elements", elements, 1)
+    elements = whole_number("elements", elements, 1, checks.MOST_PARTS)
     pose = as_array("pose", pose, (6,))
     if pose.ndim != 2:
         raise InputError(f"pose must have the shape (N, 6), one row per instant, got {pose.shape}")
@@ -134,8 +135,7 @@ def driving_force(
     vibration = _series("vibration", vibration, instants)
     base = robot.carrier_home[0] if carrier_pose is None else carrier_pose
     base = _series("carrier_pose", base, instants)
-    if winding not in ("paid out", "printed"):
-        raise InputError(f"winding must be 'paid out' or 'printed', got {winding!r}")
+    one_of("winding", winding, ("paid out", "printed"))
     pretension = _pretension(pretension, (instants, robot.m))
 
     dynamics = Dynamics(robot).relative

@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...inputs import whole_number
 from ..batch import as_array
 from . import checks
 
@@ -70,7 +71,7 @@ class ElementChain:
         for name in ("anchor", "attachment"):
             object.__setattr__(self, name, as_array(name, getattr(self, name), (3,)).reshape(3))
         checks.positive("stiffness", self.stiffness)
-        checks.count("elements", self.elements, 1)
+        whole_number("elements", self.elements, 1, checks.MOST_PARTS)
         if self.pretension != np.inf:
             checks.non_negative("pretension", self.pretension)
         checks.positive("the distance of anchor and attachment", self.length)

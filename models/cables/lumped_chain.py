@@ -25,6 +25,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ...inputs import whole_number
 from ..batch import as_array
 from . import checks, elastic
 
@@ -65,7 +66,7 @@ class LumpedChain:
         for name in ("length", "stiffness", "density"):
             checks.positive(name, getattr(self, name))
         checks.non_negative("damping", self.damping)
-        checks.count("segments", self.segments, 2)
+        whole_number("segments", self.segments, 2, checks.MOST_PARTS)
         as_array("gravity", self.gravity, (3,))
 
     @property
