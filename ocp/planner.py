@@ -2,7 +2,8 @@
 
 The planner works in stages, and ends with the first that decides:
 
-1. static check along the path (`rest_margin`): where it is negative at an end with rest, no duration is possible;
+1. ends and path (`blocked`): what is impossible whatever the planner chooses, proven at once; and the capacity margin
+   of rest along the path (`rest_margin`);
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
 3. the nonlinear program (`program`), audited, and refined where the audit reports violations;
 4. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
@@ -21,14 +22,15 @@ from ..inputs import shown
 from ..models import Robot
 from ..models.files import as_robot
 from ..text import quantity
-from .audits.audit import certified_at_rest, other_tensions_may_pass
+from .audits.audit import audit, other_tensions_may_pass
+from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome, Progress, Solver
 from .rest_margin import rest_margin
 from .result import Plan, Relaxed
-from .search import Search
+from .search import ENDS, Search
 from .start import deviation_from
 from .status import MotionStatus
 from .tasks.deviation import Deviation
@@ -137,9 +139,10 @@ def _climb(search: Search, start: Deviation | None) -> Plan:
     scenario = search.scenario
     if scenario.is_fixed:
         return _fixed_motion(search)
-    proven = _rest_along_the_path(search)
+    proven = _blocked(search)
     if proven is not None:
         return proven
+    _rest_along_the_path(search)
     timed, own = _time_law(search) if scenario.count == 0 else (None, True)
     if timed is not None and not (own and timed.feasible):
         return timed
@@ -201,20 +204,27 @@ def _message(left: Durations | None) -> str:
     return f"at least {quantity(left.shortest, 's')}{upper} with the task's time law"
 
 
-def _rest_along_the_path(search: Search) -> Plan | None:
-    """Compute the margin of rest; return a plan only if the motion rests at an end where it provably cannot."""
-    span = search.scenario.duration_range
+def _blocked(search: Search) -> Plan | None:
+    """Return the proof that no motion of the task is possible, if its ends or its path show it; else None."""
+    scenario = search.scenario
+    with search.stage("ends and path") as stage:
+        proof = blocked(scenario)
+        stage.message = "" if proof is None else proof.describe()
+    if proof is None:
+        return None
+    span = scenario.duration_range
+    slowest = scenario if span is None else scenario.lasting(span.max)
+    start = time.perf_counter()
+    proven = proof.of(audit(slowest, None, per_output=1))
+    return Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, time.perf_counter() - start)
+
+
+def _rest_along_the_path(search: Search) -> None:
+    """Compute the margin of rest along the motion that the planner starts from, for the report."""
     with search.stage("static check") as stage:
         margin = rest_margin(search.scenario)
-        may_decide = not search.scenario.count and span is not None and margin.margin[[0, -1]].min() < 0
-        required = may_decide or margin.margin.min() >= 0
+        required = margin.margin.min() >= 0
         stage.message = margin.describe() if required else f"{margin.describe()}; not required here"
-    if span is None or not may_decide:
-        return None
-    slowest = search.scenario.lasting(span.max)
-    audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
-    proven = certified_at_rest(slowest, audit)
-    return None if proven is None else Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, 0.0)
 
 
 def _time_law(search: Search) -> tuple[Plan | None, bool]:
@@ -268,14 +278,14 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
         closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
-            return search.best()
+            short = quantity(closest.slack, "N")
+            return search.best(f"the solver's motion with the least missing wrench is short by {short} at its nodes")
         outcome = search.solve("nonlinear program", Mesh(steps), closest.deviation)
-    _refine(search, outcome)
-    return search.best()
+    return search.best(_refine(search, outcome))
 
 
-def _refine(search: Search, outcome: Outcome) -> None:
-    """Audit a solution, and solve again with more nodes as long as the audit reports violations."""
+def _refine(search: Search, outcome: Outcome) -> str:
+    """Audit a solution, and solve again with more nodes as long as the audit reports violations; return why it ends."""
     scenario, steps = search.scenario, search.scenario.task.steps
     audit = search.audit(outcome)
     reserve, shrink = 0.0, 0.0
@@ -290,3 +300,7 @@ def _refine(search: Search, outcome: Outcome) -> None:
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
         outcome = search.solve("nonlinear program", mesh, outcome.deviation)
         audit = search.audit(outcome)
+    if outcome.success:
+        return f"the audit reports violations up to the finest mesh, {steps} steps"
+    ended = ENDS.get(outcome.message, f"stopped ({outcome.message})")
+    return f"nonlinear program of {steps} steps: {ended}"

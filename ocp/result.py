@@ -44,6 +44,8 @@ class Plan:
         The dense evaluation that decides whether the plan is feasible.
     build_s, solve_s
         Wall time to build and to solve the nonlinear programs [s], over all attempts; 0 if none was solved.
+    reason
+        If the status is `not-found`: why the search ended.
     iterations, message
         Of the last run of the solver: its iterations, and its own message.
     iterates
@@ -61,6 +63,7 @@ class Plan:
     audit: Audit
     build_s: float
     solve_s: float
+    reason: str = ""
     iterations: int = 0
     message: str = ""
     iterates: tuple[tuple[int, float, float], ...] = ()
@@ -113,6 +116,7 @@ class Plan:
         return {
             "feasible": self.feasible,
             "status": self.status.value,
+            "reason": self.reason,
             "tension_min": self.tension_min,
             "tension_max": self.tension_max,
             "margin": self.margin,

@@ -100,9 +100,14 @@ class Search:
         self._audited.append((relative_violation(scenario, audited), outcome, audited))
         return audited
 
-    def best(self) -> Plan:
-        """Return the plan of the audited solution that violates its limits by least; the latest of equal ones."""
+    def best(self, reason: str = "") -> Plan:
+        """Return the plan of the audited solution that violates its limits by least; the latest of equal ones.
+
+        `reason` is why the search ended, if it was not because of the time limit.
+        """
         _, outcome, audited = min(reversed(self._audited), key=itemgetter(0))
+        if self.seconds_left <= 0:
+            reason = f"the time limit of {quantity(self.scenario.task.time_limit, 's')} is reached"
         return Plan(
             scenario=self.scenario.lasting(outcome.duration),
             status=MotionStatus.FEASIBLE if audited.passed else MotionStatus.NOT_FOUND,
@@ -110,6 +115,7 @@ class Search:
             audit=audited,
             build_s=self.build_s,
             solve_s=self.solve_s,
+            reason="" if audited.passed else reason,
             iterations=outcome.iterations,
             message=outcome.message,
             iterates=tuple(self._iterates),

@@ -124,7 +124,9 @@ def test_report_of_a_plan_that_was_not_found_does_not_claim_a_proof(impossible):
     assert "Why it is infeasible" not in lost.report()
     assert facts(lost)["What the closest motion violates", "limit exceeded"] == str(FAST)
     only = replace(lost, audit=replace(lost.audit, certificate=None))
-    assert headline(only).endswith("NOT-FOUND, 1 other limit exceeded")
+    assert headline(only).endswith(f"NOT-FOUND, {FAST}")
+    late = replace(only, reason="the time limit of 10 s is reached")
+    assert headline(late).endswith(f"NOT-FOUND, the time limit of 10 s is reached; closest motion: {FAST}")
 
 
 def test_soft_limits_that_are_passed_are_told_of_a_feasible_plan(free):

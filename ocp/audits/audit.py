@@ -11,18 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ...distribution import wrench_problem
 from ...errors import InputError
-from ...solvers import Certificate, certify
+from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
-from .checks import END_TOLERANCE, AuditedMotion, excesses
+from .checks import AuditedMotion, excesses
 from .drift import Drift, drift
 from .excess import Excess
 from .tensions import INDEPENDENT, TOLERANCE, Distribution, in_all_winds, scaled
 
-__all__ = ["Audit", "audit", "certified_at_rest", "other_tensions_may_pass"]
+__all__ = ["Audit", "audit", "other_tensions_may_pass"]
 
 
 @dataclass(frozen=True)
@@ -101,15 +100,21 @@ def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
-    """Audit the motion of `deviation`, or that of the references alone, at `AUDIT_RATE` or more.
+def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | None = None) -> Audit:
+    """Audit the motion of `deviation`, or that of the references alone.
+
+    Parameters
+    ----------
+    per_output
+        How many instants each sample of the output stands for; default: as many as `AUDIT_RATE` requires, or more.
 
     Raises
     ------
     InputError
         If somewhere a cable has no length.
     """
-    times = np.linspace(0.0, scenario.duration, scenario.output_samples * _audits_per_output(scenario) + 1)
+    intervals = scenario.output_samples * (per_output or _audits_per_output(scenario))
+    times = np.linspace(0.0, scenario.duration, intervals + 1)
     robot = scenario.robot
     motion, carriers = scenario.motion(times, deviation)
     _check_lengths(scenario, times, motion, carriers)
@@ -149,26 +154,6 @@ def audit(scenario: Scenario, deviation: Deviation | None) -> Audit:
         certificate=certificate,
         drift=drift(scenario, times, motion, carriers, tensions) if followed else None,
     )
-
-
-def certified_at_rest(scenario: Scenario, audit: Audit) -> Audit | None:
-    """Return the audit with the certificate of an end at rest where no tensions hold the platform; None if they do.
-
-    What is impossible at rest is impossible for every duration.
-    """
-    low, high = scenario.bounds()
-    for row in (0, -1):
-        motions = [part[row] for part in (*audit.motion, *audit.carriers)]
-        if any(np.abs(motions[k]).max() > END_TOLERANCE for k in (1, 2, 4, 5)):
-            continue
-        A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
-        for wind in scenario.winds_at(*motions[:2]):
-            w = scenario.dynamics.required_wrench(*motions, wind=wind)
-            certificate = certify(wrench_problem(scenario.robot, A, w, low, high))
-            if certificate is not None:
-                at = None if scenario.wind_box is None else wind
-                return replace(audit, certificate=replace(certificate, time=float(audit.times[row]), wind=at))
-    return None
 
 
 def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:

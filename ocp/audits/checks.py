@@ -14,6 +14,7 @@ import numpy as np
 
 from ...models.part import COORDINATES
 from ..tasks.deviation import Deviation
+from ..tasks.ends import at_rest_without_acceleration, carrier_ends, platform_ends
 from ..tasks.paths import Motion, WaypointPath
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 from ..tasks.task import FreeBase
@@ -24,11 +25,13 @@ __all__ = ["END_TOLERANCE", "UNDERACTUATED_TOLERANCE", "AuditedMotion", "excesse
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 PATH_TOLERANCE = 1e-7  # [m, rad], of ends and waypoints
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers and platform start and end
+END_ACCELERATION_TOLERANCE = 1e-4  # [m/s^2, rad/s^2], of second differences
 STILL_TOLERANCE = 1e-6  # [m/s, m/s^2, rad], of carriers that keep their place or attitude
 LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 DURATION_TOLERANCE = 1e-7  # relative
 JUMP_TOLERANCE = 1e-6  # [m, rad]; ten times that of speeds [m/s, rad/s]: programs meet their equations to 1e-8
 STEP = 1e-5  # [s], of differences
+CURVED_STEP = 1e-4  # [s], of second differences: rounding divides by its square
 
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
@@ -125,22 +128,26 @@ def _lengths(audited: AuditedMotion) -> list[Excess]:
 
 
 def _tube_ends(audited: AuditedMotion) -> list[Excess]:
-    """Check that the platform starts and ends on its path and at its speed, by differences of position."""
+    """Check that the platform starts and ends on its path and moves as it does there, by differences of position."""
     scenario, exceeded = audited.scenario, []
-    if scenario.task.tube.ends != "exact":
+    word = platform_ends(scenario.task)
+    if word not in ("rest", "exact"):
         return []
-    for end, inwards in ((0.0, STEP), (scenario.duration, -STEP)):
-        at, near, far = _off_path(audited, end + inwards * np.arange(3))
-        speed = (-3 * at + 4 * near - far) / (2 * inwards)
-        for values, units, tolerance in (
-            (at, _UNITS, PATH_TOLERANCE),
-            (speed, [f"{unit}/s" for unit in _UNITS], END_TOLERANCE),
-        ):
-            for place, unit in ((slice(0, 3), units[0]), (slice(3, 6), units[3])):
+    for end, inwards in ((0.0, 1.0), (scenario.duration, -1.0)):
+        steps = inwards * np.array([0.0, STEP, 2 * STEP, *(CURVED_STEP * np.arange(1, 4))])
+        at, near, far, *further = _off_path(audited, end + steps)
+        speed = (-3 * at + 4 * near - far) / (2 * inwards * STEP)
+        acceleration = np.array([2.0, -5.0, 4.0, -1.0]) @ np.stack([at, *further]) / CURVED_STEP**2
+        values_of = [(at, "", PATH_TOLERANCE), (speed, "/s", END_TOLERANCE)]
+        values_of += [(acceleration, "/s^2", END_ACCELERATION_TOLERANCE)] * (word == "rest")
+        for values, per, tolerance in values_of:
+            for place, unit in ((POSITION, "m"), (ATTITUDE, "rad")):
                 off = float(np.linalg.norm(values[place]))
-                if not off <= tolerance:
-                    why = "off its path at an end"
-                    exceeded.append(Excess("tube.ends", "platform", end, off, 0.0, unit, "exactly", why))
+                counts = word == "exact" or unit == "m" or per == "/s"
+                counts |= per == "/s^2" and at_rest_without_acceleration(scenario.robot, None, place[0])
+                if counts and not off <= tolerance:
+                    why = "off its path at an end" if word == "exact" or not per else "an end at which it should rest"
+                    exceeded.append(Excess("tube.ends", "platform", end, off, 0.0, unit + per, "exactly", why))
     return exceeded
 
 
@@ -169,15 +176,21 @@ def _off_path(audited: AuditedMotion, times: np.ndarray) -> np.ndarray:
 def _base_ends(audited: AuditedMotion) -> list[Excess]:
     """Check that free carriers start and end as the task requires."""
     scenario, base = audited.scenario, audited.scenario.task.base
-    if not isinstance(base, FreeBase) or base.ends == "free":
+    word = carrier_ends(scenario.task)
+    if not isinstance(base, FreeBase) or word == "free":
         return []
     exceeded = []
     moving = sorted({index for index, _ in scenario.carrier_free})
     ends = [0, -1]
-    if base.ends == "rest":
-        off = [np.abs(audited.carriers.velocity[end, moving]).max() for end in ends]
-        about, unit, why = "carriers", "m/s", "an end at which they should be at rest"
-    elif base.ends == "periodic":
+    if word == "rest":
+        _, speeds, accelerations = audited.carriers
+        off = [np.abs(speeds[end, moving]).max() for end in ends]
+        if at_rest_without_acceleration(scenario.robot, moving[0], 0):
+            off = [
+                max(speed, np.abs(accelerations[end, moving, :3]).max()) for end, speed in zip(ends, off, strict=True)
+            ]
+        about, unit, why = "carriers", "m/s, m/s^2", "an end at which they should be at rest"
+    elif word == "periodic":
         off = [max(np.abs(part[0, moving] - part[-1, moving]).max() for part in audited.carriers)]
         ends, about, unit, why = [-1], "carriers", "m, m/s, m/s^2", "away from where they started"
     else:

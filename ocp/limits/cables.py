@@ -54,7 +54,7 @@ class CableLength(Limit):
 class CableClearance(Limit):
     """Keep cables apart that share neither anchor nor attachment."""
 
-    name, unit = "cable_clearance", "m"
+    name, unit, per_metre = "cable_clearance", "m", 2.0
 
     def __init__(self, robot: Robot, least: float):
         self.low, self.scale = least, least

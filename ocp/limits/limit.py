@@ -82,6 +82,9 @@ class Limit(ABC):
         The part of the motion on which it depends, if it is convex: it then holds between the nodes too.
     shown
         Whether figures have curves of it and reports name it.
+    per_metre
+        How much a value can change while each point of the platform moves by at most one metre and all else stays;
+        infinite if that is not known. Of a distance it is one. With it the planner proves that a place is in the way.
     """
 
     name: str = "limit"
@@ -93,6 +96,7 @@ class Limit(ABC):
     soft: float | None = None
     hull: Hull | None = None
     shown: bool = True
+    per_metre: float = np.inf
 
     @abstractmethod
     def values(self, state: State) -> ca.SX:

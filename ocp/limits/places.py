@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import casadi as ca
+import numpy as np
 from typing_extensions import override
 
 from ...models import Robot
@@ -34,10 +35,12 @@ class _Outside(Limit):
         Distance to keep [m].
     """
 
-    unit = "m"
+    unit, per_metre = "m", 1.0
 
     def __init__(self, place: Place, called: str, riding: bool, least: float):
         self._place, self._called, self._riding, self.low = place, called, riding, least
+        if riding:  # what is far from the platform moves farther in its frame than its points in {G}
+            self.per_metre = np.inf
 
     @override
     def about(self, index: int) -> str:

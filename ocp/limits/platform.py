@@ -55,7 +55,7 @@ class PlatformTilt(Angle):
 class PlatformBox(Limit):
     """Keep one coordinate of the platform frame's origin in {G} inside a range."""
 
-    name, unit = "platform_box", "m"
+    name, unit, per_metre = "platform_box", "m", 1.0
 
     def __init__(self, axis: int, low: float, high: float):
         self._axis, self.low, self.high = axis, low, high

@@ -15,6 +15,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
 
@@ -216,6 +217,8 @@ def _best(
 def _end_cost(scenario: Scenario, size: np.ndarray) -> np.ndarray:
     """Return what formations (tries, 4) cost at an end that the task prescribes."""
     kept = np.zeros(4)
-    kept[[LATERAL, VERTICAL, YAW]] = scenario.task.tube.ends == "exact"
-    kept[SQUEEZE] = getattr(scenario.task.base, "ends", "free") in ("exact", "periodic")
+    of_platform, of_carriers = platform_ends(scenario.task), carrier_ends(scenario.task)
+    kept[[LATERAL, VERTICAL]] = of_platform in ("rest", "exact")
+    kept[YAW] = of_platform == "exact"
+    kept[SQUEEZE] = of_carriers in ("exact", "periodic")
     return VIOLATION**2 * np.abs(size) @ kept

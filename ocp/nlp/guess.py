@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..tasks.deviation import Deviation
+from ..tasks.ends import fixed_values
 from ..tasks.scenario import POSITION, Scenario
 from .formation import clear_formation
 
@@ -65,11 +66,10 @@ def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
     """Return cubic splines through q (n, count) at `nodes`, at rest at the ends where the task requires it."""
     from scipy.interpolate import CubicSpline  # loads for longer than a plan takes that does not need it
 
-    ends = scenario.task.tube.ends, getattr(scenario.task.base, "ends", "free")
     v, a = np.zeros_like(q), np.zeros_like(q)
-    for column, (owner, _) in enumerate(scenario.owners()):
-        resting = ends[0] == "exact" if owner is None else ends[1] in ("rest", "exact")
-        curve = CubicSpline(nodes, q[:, column], bc_type="clamped" if resting else "not-a-knot")
+    resting = {column for _, column, order, _ in fixed_values(scenario) if order == 1}
+    for column in range(q.shape[1]):
+        curve = CubicSpline(nodes, q[:, column], bc_type="clamped" if column in resting else "not-a-knot")
         v[:, column], a[:, column] = curve(nodes, 1), curve(nodes, 2)
     return Deviation(nodes, q, v, a, np.zeros((len(nodes), scenario.robot.m)))
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
+from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths import WaypointPath
 from ..tasks.scenario import ATTITUDE, Scenario
 from .interval import Points, interval_of, points
@@ -192,7 +193,7 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, ste
     """Return the rows that occur once: periodic ends, waypoints, start and end of the acceleration."""
     blocks = _waypoint_rows(scenario, layout, X, X_end, steps)
     carriers: list[int] = []
-    if getattr(scenario.task.base, "ends", None) == "periodic":
+    if carrier_ends(scenario.task) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
         picked = [block * layout.n + i for block in range(layout.derivatives) for i in carriers]
         rows: list[Row] = [("periodic", 0.0, 0.0)] * len(picked)
@@ -248,15 +249,10 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
         lower[:, place], upper[:, place] = span.min / scenario.duration, span.max / scenario.duration
     if (place := layout.at(MARGIN)) is not None:
         lower[:, place] = 0.0
-    tube, ends = scenario.task.tube, getattr(scenario.task.base, "ends", "free")
-    references = scenario.references(nodes[[0, -1]])[1]
+    turn = scenario.task.tube.turn
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         if owner is None and coordinate in ATTITUDE:
-            lower[:, column], upper[:, column] = -tube.turn, tube.turn
-        for end in (0, -1):
-            if (tube.ends if owner is None else ends) == "exact":
-                lower[end, [column, n + column]] = upper[end, [column, n + column]] = 0.0
-            elif owner is not None and ends == "rest":
-                # The deviation undoes what speed the reference has there.
-                lower[end, n + column] = upper[end, n + column] = -references[owner].velocity[end, coordinate]
+            lower[:, column], upper[:, column] = -turn, turn
+    for end, column, order, value in fixed_values(scenario):
+        lower[end, order * n + column] = upper[end, order * n + column] = value
     return lower.ravel(), upper.ravel()

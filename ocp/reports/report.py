@@ -35,7 +35,9 @@ class Table(NamedTuple):
 
 def headline(plan: Plan) -> str:
     """Return the result in one line: robot, task, status, and what decided it."""
-    return f"{plan.scenario.robot.name}, {plan.scenario.task.name}: {plan.status.value.upper()}, {_decisive(plan)}"
+    about, reason = f"{plan.scenario.robot.name}, {plan.scenario.task.name}", plan.reason
+    because = f"{reason}; closest motion: " if reason else ""
+    return f"{about}: {plan.status.value.upper()}, {because}{_decisive(plan)}"
 
 
 def sections(plan: Plan) -> list[Section]:
@@ -112,14 +114,20 @@ def _decisive(plan: Plan) -> str:
         if plan.margin is None or plan.margin < WORTH_A_NUMBER:
             return "every tension inside its limits"
         return f"every tension at least {quantity(plan.margin, 'N')} inside its limits"
-    certificate, count = plan.certificate, len(plan.audit.excess)
-    exceeded = f"{count} other limit{'s' * (count > 1)} exceeded" if count else ""
+    certificate, excess = plan.certificate, plan.audit.excess
+    if certificate is None and excess:
+        return f"{excess[0]}{_more(len(excess) - 1)}"
     if certificate is None:
-        return exceeded or "see the stages"
+        return "see the stages"
     short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
     if certificate.wind is not None:
         short += f" in wind {_wind(certificate.wind)}"
-    return f"{short}, {exceeded}" if exceeded else short
+    return f"{short}{_more(len(excess))}"
+
+
+def _more(count: int) -> str:
+    """Return the number of limits that a sentence leaves out, to follow it; empty for none."""
+    return f", {count} other limit{'s' * (count > 1)} exceeded" if count else ""
 
 
 def _reasons(plan: Plan) -> list[Fact]:

@@ -11,6 +11,7 @@ from ..limits.clearance import point_outside
 from ..limits.limit import Rate
 from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
+from .ends import carrier_ends
 from .limit_list import limit_list
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
 from .scheme import SCHEMES
@@ -119,7 +120,7 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
 
 def _check_transcription(task: Task, limits: Limits, where: str) -> None:
     """Refuse what the scheme or the solver cannot do."""
-    if task.solver == "fatrop" and getattr(task.base, "ends", None) == "periodic":
+    if task.solver == "fatrop" and carrier_ends(task) == "periodic":
         raise InputError(
             f"{where}: solver must be ipopt if base.ends is periodic, got fatrop, which cannot couple the "
             "last stage to the first"

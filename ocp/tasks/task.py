@@ -33,8 +33,11 @@ class Tube(Part):
         default=0.0,
         description="range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad",
     )
-    ends: Literal["free", "exact"] = Field(
-        default="free", description="exact: no deviation of position and speed at start and end"
+    ends: Literal["free", "rest", "exact"] | None = Field(
+        default=None,
+        description="free: anywhere in the tube; rest: on the path at start and end, without speed and acceleration; "
+        "exact: no deviation of position and speed there, whatever the acceleration; default: rest if the path goes "
+        "from rest to rest and no carrier moves as given, else free",
     )
     waypoints: Literal["free", "exact"] = Field(
         default="free", description="exact: no deviation at the points of a path of kind waypoints"
@@ -82,10 +85,10 @@ class FreeBase(Part):
         "the limit of the robot's file",
     )
     turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
-    ends: Literal["free", "rest", "periodic", "exact"] = Field(
-        default="free",
-        description="free: any start and end; rest: zero speed at both; periodic: the end equals the start; "
-        "exact: start and end as in `around`",
+    ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
+        default=None,
+        description="free: any start and end; rest: zero speed and acceleration at both; periodic: the end equals the "
+        "start; exact: start and end as in `around`; default: rest if the platform starts and ends at rest, else free",
     )
 
 

@@ -1,0 +1,189 @@
+"""Prove at once that a task is impossible by what no choice of the planner changes: `blocked`.
+
+Where the platform starts and ends, and along a path that it must follow, some coordinates have no freedom. A limit that
+depends on these alone is kept or not, whatever else is chosen; and so are the tensions where the whole robot is given.
+Of a distance from a place the platform can change no more than its points can move: inside the tube, and by turning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..solvers import Certificate
+from .audits.audit import Audit
+from .audits.excess import Excess
+from .audits.tensions import Distribution
+from .limits import Limit, Rate
+from .tasks.ends import fixed_values
+from .tasks.paths import Motion
+from .tasks.scenario import ATTITUDE, Scenario
+
+__all__ = ["Blocked", "blocked"]
+
+PLACES = 41  # along the path
+CERTAIN = 1e-5  # [m], of distances from places, whose formulas are rounded where things touch
+GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
+
+
+class Blocked(NamedTuple):
+    """The proof that no motion keeps a task's limits.
+
+    Attributes
+    ----------
+    excess
+        Each limit that is exceeded whatever the planner chooses, where it is exceeded by most.
+    certificate
+        Of an end at which no tensions exist; None if they do.
+    """
+
+    excess: list[Excess]
+    certificate: Certificate | None
+
+    def describe(self) -> str:
+        """Return one line for a person."""
+        lines = [str(excess) for excess in self.excess[:1]]
+        if self.certificate is not None:
+            lines.append(f"no tensions at t = {self.certificate.time:.3f} s")
+        return "; ".join(lines)
+
+    def of(self, audit: Audit) -> Audit:
+        """Return an audit that shows what is proven, and no more."""
+        return replace(audit, excess=self.excess, certificate=self.certificate)
+
+
+def blocked(scenario: Scenario) -> Blocked | None:
+    """Return the proof that a task is impossible, if its ends or a path that it must follow show it; else None."""
+    times = np.concatenate([[0.0, scenario.duration], np.linspace(0.0, scenario.duration, PLACES)[1:-1]])
+    freedom = [_freedom(scenario, 0), _freedom(scenario, -1), _freedom(scenario, None)]
+    platform, carriers = _at_places(scenario, times, freedom)
+    proven = _exceeded(scenario, times, freedom, platform, carriers)
+    certificate = _without_tensions(scenario, times, freedom, platform, carriers)
+    return Blocked(proven, certificate) if proven or certificate is not None else None
+
+
+def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
+    """Return the freedom of each value of the platform, then of each carrier, (1 + c, 3, 6), at an end or between."""
+    freedom = np.full((1 + len(scenario.robot.carriers), 3, 6), GIVEN)
+    if scenario.duration_range is not None:
+        platform, carriers = scenario.references(np.array([0.0, scenario.duration]))
+        for body, reference in enumerate((platform, *carriers)):
+            for order in (1, 2):
+                moves = reference[order][end].any() if end is not None else reference[order].any() or body == 0
+                freedom[body, order] = FREE if moves else GIVEN
+    for owner, coordinate in scenario.owners():
+        freedom[0 if owner is None else 1 + owner, :, coordinate] = FREE
+        if owner is None:
+            freedom[0, 0, coordinate] = NEAR
+    owners = scenario.owners()
+    for fixed in fixed_values(scenario):
+        owner, coordinate = owners[fixed.column]
+        if fixed.end == end and not (owner is None and fixed.value):
+            freedom[0 if owner is None else 1 + owner, fixed.order, coordinate] = GIVEN
+    if scenario.relative:  # in {G} each value of the platform depends on all of the carrier's, and on its own
+        for order in range(3):
+            freedom[0, order] = FREE if freedom[1:, : order + 1].any() else freedom[0, : order + 1].max()
+    return freedom
+
+
+def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray]) -> tuple[Motion, Motion]:
+    """Return the motion in {G} of platform and carriers at start, end and places between, where it is given."""
+    platform, carriers = scenario.motion(times, None)
+    owners = scenario.owners()
+    for fixed in fixed_values(scenario):
+        owner, coordinate = owners[fixed.column]
+        if owner is not None:
+            carriers[fixed.order][abs(fixed.end), owner, coordinate] += fixed.value
+    return platform, carriers
+
+
+def _reach(scenario: Scenario, freedom: np.ndarray) -> float:
+    """Return how far a point of the platform can be from where the reference has it [m]."""
+    robot, tube = scenario.robot, scenario.task.tube
+    points = np.vstack([robot.attachments, robot.platform.com])
+    turns = tube.turn * (freedom[0, 0, list(ATTITUDE)] == NEAR).sum()
+    moves = tube.radius if (freedom[0, 0, :3] == NEAR).any() else 0.0
+    return float(moves + turns * np.linalg.norm(points, axis=1).max())
+
+
+def _exceeded(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> list[Excess]:
+    """Return the limits that are exceeded whatever the planner chooses, each where it is exceeded by most."""
+    limits, exceeded = scenario.limits, []
+    values = limits.along(platform, carriers)
+    worst: dict[int, tuple[float, Excess]] = {}
+    for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
+        chosen, near = _dependent(scenario, freedom[which])
+        reach = _reach(scenario, freedom[which])
+        for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
+            if limit.soft is not None or isinstance(limit, Rate) or not (found := values[k][rows]).size:
+                continue
+            excess = _excess(limit, times[rows], found, chosen[place], near[place], reach)
+            if excess is not None and (k not in worst or excess[0] > worst[k][0]):
+                worst[k] = excess
+    for _, excess in sorted(worst.values(), key=lambda pair: -pair[0]):
+        if not any(excess.limit == other.limit and excess.about == other.about for other in exceeded):
+            exceeded.append(excess)
+    return exceeded
+
+
+def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which values of all limits depend on what the planner chooses, and which on the tube's freedom alone."""
+    function = scenario.limits.function
+    count = function.numel_out(0)
+    on_platform = freedom[0, 0] != GIVEN
+    of_input = [*freedom.reshape(len(freedom), -1), np.full(scenario.robot.m, FREE), np.where(on_platform, FREE, GIVEN)]
+    chosen, near = np.zeros(count, bool), np.zeros(count, bool)
+    for i, kinds in enumerate(of_input):
+        sparsity = function.jac_sparsity(0, i)
+        rows, columns = np.array(sparsity.row(), int), np.array(sparsity.get_col(), int)
+        chosen[rows[kinds[columns] == FREE]] = True
+        near[rows[kinds[columns] == NEAR]] = True
+    return chosen, near
+
+
+def _excess(
+    limit: Limit, times: np.ndarray, values: np.ndarray, chosen: np.ndarray, near: np.ndarray, reach: float
+) -> tuple[float, Excess] | None:
+    """Return by what part of its scale a limit is exceeded at some of `times`, and the excess itself."""
+    over = limit.over(times, values)
+    if over.shape[1] != values.shape[1]:  # one value of all components
+        chosen, near = (np.array([each.any()]) for each in (chosen, near))
+    room = np.where(chosen, np.inf, np.where(near, limit.per_metre * reach + CERTAIN, 0.0))
+    beyond = np.maximum(limit.low - over, over - limit.high) - room
+    beyond = np.where(np.isnan(beyond), -np.inf, beyond)
+    if beyond.max() <= limit.tolerance:
+        return None
+    row, which = np.unravel_index(beyond.argmax(), beyond.shape)
+    value = float(over[row, which])
+    side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
+    why = "" if not near[which] else f"the tube leaves it at most {room[which]:.3g} {limit.unit} more"
+    about = limit.about(int(which))
+    excess = Excess(limit.name, about, float(times[row]), value, bound, limit.unit, side, why)
+    return float(beyond[row, which]) / limit.scale, excess
+
+
+def _without_tensions(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> Certificate | None:
+    """Return the certificate of an end at which the whole robot is given and no tensions exist; None if they do."""
+    worst: Certificate | None = None
+    for row in (0, 1):
+        if freedom[row].any():
+            continue
+        one = slice(row, row + 1)
+        A = scenario.dynamics.wrench_matrix(platform.pose[one], carriers.pose[one])
+        distribute = Distribution(scenario, A)
+        motion = [part[one] for part in (*platform, *carriers)]
+        for wind in scenario.winds_at(platform.pose[row], platform.velocity[row]):
+            result = distribute(scenario.dynamics.required_wrench(*motion, wind=wind), None)
+            found = result.certificate
+            if found is None or max(float(result.violation[0]), result.beyond) <= distribute.tolerance:
+                continue
+            if worst is None or found.shortfall > worst.shortfall:
+                at = None if scenario.wind_box is None else wind
+                worst = replace(found, time=float(times[row]), wind=at)
+    return worst

@@ -1,0 +1,90 @@
+"""Decide how a motion starts and ends: `Ends`, and which of its values that fixes, `fixed_values`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ...models import Robot
+from .paths import AnyPath, RestPath
+from .scenario import POSITION, Scenario
+from .task import FreeBase, GivenBase, Task
+
+__all__ = ["FixedValue", "at_rest_without_acceleration", "carrier_ends", "fixed_values", "platform_ends"]
+
+Word: TypeAlias = Literal["free", "rest", "periodic", "exact"]
+
+
+class FixedValue(NamedTuple):
+    """A value that the deviation of one free coordinate has at an end.
+
+    Attributes
+    ----------
+    end
+        0 for the start, -1 for the end.
+    column
+        The free coordinate.
+    order
+        0 for its value [m, rad], 1 and 2 for the time derivatives.
+    value
+        What it is, less that of the reference.
+    """
+
+    end: int
+    column: int
+    order: int
+    value: float
+
+
+def platform_ends(task: Task) -> Word:
+    """Return how the platform starts and ends: as the task requires, or else at rest if its path goes to rest."""
+    if task.tube.ends is not None:
+        return task.tube.ends
+    return "rest" if _goes_to_rest(task.path, task.seconds) and not isinstance(task.base, GivenBase) else "free"
+
+
+def carrier_ends(task: Task) -> Word:
+    """Return how free carriers start and end: as the task requires, or else at rest if the platform does."""
+    if not isinstance(task.base, FreeBase):
+        return "free"
+    return task.base.ends or ("rest" if platform_ends(task) == "rest" else "free")
+
+
+def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
+    """Yield what the task fixes of the free coordinates at start and end."""
+    task = scenario.task
+    platform, carriers = scenario.references(np.array([0.0, scenario.duration]))
+    words = platform_ends(task), carrier_ends(task)
+    for column, (owner, coordinate) in enumerate(scenario.owners()):
+        word, reference = (words[0], platform) if owner is None else (words[1], carriers[owner])
+        orders = [0] * (word == "exact" or (word == "rest" and owner is None and coordinate in POSITION))
+        orders += [1] * (word in ("exact", "rest"))
+        orders += [2] * (word == "rest" and at_rest_without_acceleration(scenario.robot, owner, coordinate))
+        for end in (0, -1):
+            for order in orders:
+                # The deviation of what rests undoes the motion of its reference.
+                undone = word == "rest" and order > 0
+                yield FixedValue(end, column, order, -float(reference[order][end, coordinate]) if undone else 0.0)
+
+
+def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: int) -> bool:
+    """Return whether rest excludes an acceleration of a coordinate of the platform (None) or of a carrier.
+
+    Angular accelerations of carriers are left to them: only their own drives feel these. Where cables keep their
+    lengths, or are fewer than the platform's degrees of freedom, lengths and balance determine other coordinates at the
+    nodes, and a polynomial between the nodes then has no freedom left for another condition at its end: there only the
+    platform's position has it.
+    """
+    if robot.fixed_lengths is not None or robot.m < len(robot.platform.dof):
+        return owner is None and coordinate in POSITION
+    return owner is None or coordinate in POSITION
+
+
+def _goes_to_rest(path: AnyPath, seconds: float) -> bool:
+    """Return whether a path goes from rest to rest: without speed and acceleration at both ends."""
+    if isinstance(path, RestPath):
+        return False
+    _, velocity, acceleration = path.at(np.array([0.0, seconds]), seconds)
+    return not velocity.any() and not acceleration.any()

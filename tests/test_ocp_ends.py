@@ -1,0 +1,127 @@
+"""How motions start and end: at rest where the path does; and ends and paths that no choice of the planner frees."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from towline.models import Dynamics, load
+from towline.ocp import MotionStatus, plan
+
+LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
+TUBE = {"position": 0.05, "attitude": 0.1}
+ROBOT = load("ipanema-1")
+
+
+def ends_of(planned):
+    """Pose, and speed and acceleration by differences, of the platform and of each carrier at both ends."""
+    times, poses = planned.audit.times, [planned.audit.motion.pose, *np.moveaxis(planned.audit.carriers.pose, 1, 0)]
+    step = times[1] - times[0]
+    for pose in poses:
+        for rows in (pose[:4], pose[:-5:-1]):
+            speed = (-11 * rows[0] + 18 * rows[1] - 9 * rows[2] + 2 * rows[3]) / (6 * step)
+            acceleration = (2 * rows[0] - 5 * rows[1] + 4 * rows[2] - rows[3]) / step**2
+            yield rows[0], np.abs(speed).max(), np.abs(acceleration).max()
+
+
+@pytest.mark.parametrize("scheme", ["constant", "linear", "hermite", "gauss", "spline"])
+def test_a_line_in_a_tube_starts_and_ends_at_rest_on_its_points(scheme):
+    """By differences of the audited poses: the program's own derivatives are not used."""
+    planned = plan(ROBOT, {"path": LINE, "duration": 2, "tube": TUBE, "scheme": scheme, "steps": 40})
+    assert planned.feasible
+    for (pose, speed, acceleration), point in zip(ends_of(planned), (LINE["start"], LINE["end"]), strict=False):
+        assert pose[:3] == pytest.approx(point, abs=1e-7)
+        assert speed < 1e-4
+        assert acceleration < 1e-2
+
+
+def test_free_ends_may_move():
+    """The default is what the tests above see: a line with free ends leaves its points where that saves tension."""
+    planned = plan(ROBOT, {"path": LINE, "duration": 2, "tube": {**TUBE, "ends": "free"}, "steps": 40})
+    assert planned.feasible
+    assert np.linalg.norm(next(ends_of(planned))[0][:3] - LINE["start"]) > 1e-4
+
+
+def test_carriers_rest_where_the_platform_does():
+    """Three quadrotors carry a load: all are without speed at both ends, and the load without acceleration."""
+    line = {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1]}
+    task = {"path": line, "duration": 4, "tube": {"attitude": 0.3}, "base": {"kind": "free"}, "steps": 20}
+    planned = plan("multi-quadrotor-3", task)
+    assert planned.feasible
+    assert max(speed for _, speed, _ in ends_of(planned)) < 1e-3
+    assert np.abs(planned.audit.motion.acceleration[[0, -1], :3]).max() < 1e-9
+
+
+def ball(centre, radius, **more):
+    return {"limits": {"keep_out": [{"kind": "sphere", "centre": list(centre), "radius": radius, **more}]}}
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    at_end=st.booleans(),
+    towards=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
+    depth=st.floats(-0.3, 0.3).filter(lambda depth: abs(depth) > 1e-3),
+)
+def test_a_ball_about_an_end_blocks_it_exactly_if_the_platform_starts_inside(at_end, towards, depth):
+    """The CoM is `depth` inside a ball of 0.4 m, or outside: then the other points are too, or they block."""
+    point = np.array(LINE["end" if at_end else "start"])
+    centre = point + (0.4 - depth) * np.array(towards) / np.linalg.norm(towards)
+    task = {"path": LINE, "duration": 2, "tube": {"position": 0.6, "attitude": 0.0}, "steps": 20, "time_limit": 1e-3}
+    planned = plan(ROBOT, task | ball(centre, 0.4, cables=None))
+    points = np.array([LINE["start"], LINE["end"]])[:, None] + np.vstack([ROBOT.platform.com, ROBOT.attachments])
+    blocks = (np.linalg.norm(points - centre, axis=2) < 0.4 - 2e-6).any()
+    assert (planned.status is MotionStatus.INFEASIBLE) == blocks
+    if blocks:
+        missing = 0.4 - np.linalg.norm(points - centre, axis=2).min()
+        assert planned.audit.excess[0].value == pytest.approx(-missing, abs=1e-5)
+        assert "keep_out of platform" in planned.report().splitlines()[0]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    angles=st.tuples(*[st.floats(-0.3, 0.3)] * 3),
+    shift=st.tuples(*[st.floats(-1, 1)] * 3),
+    turn=st.floats(0.01, 0.1),
+    share=st.floats(-0.5, 1.5),
+)
+def test_no_end_is_called_blocked_that_a_turn_frees(angles, shift, turn, share):
+    """The platform may turn by `turn`: every pose that is tried keeps out of the ball, or the ball is no proof."""
+    point = np.array(LINE["end"])
+    farthest = int(np.linalg.norm(ROBOT.attachments, axis=1).argmax())
+    attachment = point + ROBOT.attachments[farthest]
+    centre = attachment + share * 0.1 * np.array(shift)
+    task = {"path": LINE, "duration": 2, "tube": {"attitude": turn}, "steps": 20, "time_limit": 1e-3}
+    planned = plan(ROBOT, task | ball(centre, 0.08, cables=None))
+    tried = np.clip(np.array(angles) * turn / 0.3, -turn, turn)
+    turned = Rotation.from_euler("ZYX", tried[::-1]).as_matrix()
+    points = point + np.vstack([ROBOT.platform.com, ROBOT.attachments]) @ turned.T
+    free = (np.linalg.norm(points - centre, axis=1) >= 0.08).all()
+    assert not (free and planned.status is MotionStatus.INFEASIBLE)
+
+
+def test_an_end_without_tensions_is_proven_by_a_linear_program():
+    """Outside the anchors no tensions hold the platform: HiGHS finds none either, and the certificate is true."""
+    line = {**LINE, "end": [0.5, 9, 1.2]}
+    planned = plan(ROBOT, {"path": line, "duration": {"min": 1, "max": 20}, "tube": {"position": 0.2}, "steps": 20})
+    assert planned.status is MotionStatus.INFEASIBLE
+    certificate, pose = planned.certificate, np.array([*line["end"], 0, 0, 0])
+    A, w = Dynamics(ROBOT).wrench_matrix(pose), Dynamics(ROBOT).required_wrench(pose, np.zeros(6), np.zeros(6))
+    assert (
+        linprog(np.zeros(ROBOT.m), A_eq=A, b_eq=w, bounds=list(zip(ROBOT.t_min, ROBOT.t_max, strict=True))).status == 2
+    )
+    along = A.T @ certificate.direction
+    most = np.where(along > 0, along * ROBOT.t_max, along * ROBOT.t_min).sum()
+    assert certificate.direction @ w - most == pytest.approx(certificate.shortfall, rel=1e-6)
+    assert certificate.shortfall > 0
+    assert planned.iterations == 0
+
+
+def test_a_wall_across_a_path_that_must_be_followed_is_a_proof_and_in_a_wide_tube_is_none():
+    wall = {"limits": {"keep_out": [{"kind": "box", "min": [0.2, -1, 0], "max": [0.3, 1, 3], "cables": None}]}}
+    task = {"path": LINE, "duration": {"min": 1, "max": 5}, "time_limit": 1e-3, "steps": 20} | wall
+    assert plan(ROBOT, task | {"tube": {"position": 0.01}}).status is MotionStatus.INFEASIBLE
+    late = plan(ROBOT, task | {"tube": {"position": 2.0}})
+    assert late.status is MotionStatus.NOT_FOUND
+    assert "time limit of 0.001 s is reached" in late.report().splitlines()[0]
