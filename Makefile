@@ -34,11 +34,14 @@ errata: .venv/core.stamp
 	  cp build/$$paper/$$paper-errata.md docs/errata/$$paper.md || exit 1; \
 	done
 
-# Runs the demo, and every example where the README's pictures are; the plans saved there are ignored by git.
+# Runs the demo, every example where the README's pictures are, and a sweep; plans saved there are ignored by git.
 pictures: .venv/core.stamp
 	mkdir -p docs/pictures build
 	cd build && ../$(BIN)/towline demo && cp towline-demo/tensions.png ../docs/pictures/circle.png
 	cd docs/pictures && for example in ../../examples/*.py; do ../../$(BIN)/python $$example || exit 1; done
+	printf 'name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.6, 0.4, 1.6]}\nduration: 3\n' > build/lift.yaml
+	cd build && ../$(BIN)/towline plan ipanema-1 lift.yaml --vary margin=0:40:5 --vary duration=0.2:1.2:0.1 \
+		--figures ../docs/pictures
 
 clean:
 	rm -rf .venv towline-demo build site *.egg-info

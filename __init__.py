@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .distribution import tensions
     from .errors import InputError, SolverError, TowlineError
     from .models import Dynamics, Robot, available, load
-    from .ocp import Plan, Planner, Task, Timing, plan, read_task, time_along
+    from .ocp import Plan, Planner, Sweep, Task, Timing, plan, read_task, sweep, time_along
     from .solvers import Certificate, TensionProblem, TensionSolution, methods, solve, solve_batch
     from .workspace import sample
 
@@ -23,7 +23,7 @@ _HOMES = {
     "models": ("Dynamics", "Robot", "available", "load"),
     "solvers": ("Certificate", "TensionProblem", "TensionSolution", "methods", "solve", "solve_batch"),
     "distribution": ("tensions",),
-    "ocp": ("Plan", "Planner", "Task", "Timing", "plan", "read_task", "time_along"),
+    "ocp": ("Plan", "Planner", "Sweep", "Task", "Timing", "plan", "read_task", "sweep", "time_along"),
     "workspace": ("sample",),
     "errors": ("InputError", "SolverError", "TowlineError"),
 }
@@ -37,6 +37,7 @@ __all__ = [
     "Planner",
     "Robot",
     "SolverError",
+    "Sweep",
     "Task",
     "TensionProblem",
     "TensionSolution",
@@ -50,6 +51,7 @@ __all__ = [
     "sample",
     "solve",
     "solve_batch",
+    "sweep",
     "tensions",
     "time_along",
 ]

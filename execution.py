@@ -6,7 +6,6 @@ no more: memory does not grow with the number of jobs.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import threading
@@ -16,12 +15,14 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, TypeVar
 
 from . import processors
 from .errors import InputError, SolverError
-from .inputs import shown
+from .inputs import shown, whole_number
 
+MOST_WORKERS = 1024
 AHEAD = 3  # jobs for each worker, one of which it works on
 CONNECT_WITHIN = 5.0  # [s]
 WORKERS_WITHIN = 30.0  # [s]
@@ -98,6 +99,19 @@ class Workers:
                 future.cancel()
 
 
+def check_workers(workers: object, scheduler: object) -> None:
+    """Check the arguments of `start_workers`, before anything is started.
+
+    Raises
+    ------
+    InputError
+        If `workers` is not a whole number from 1, or `scheduler` neither a text nor None.
+    """
+    whole_number("workers", workers, 1, MOST_WORKERS)
+    if scheduler is not None and not (isinstance(scheduler, str) and scheduler):
+        raise InputError(f"scheduler must be the address of a Dask scheduler or None, got {shown(scheduler)}")
+
+
 @contextmanager
 def start_workers(workers: int, scheduler: str | None) -> Iterator[Workers]:
     """Start workers, which end with the block.
@@ -150,24 +164,40 @@ class _Processes(ProcessPoolExecutor):
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+class _Spawning(SpawnContext):
+    """Start new processes, and remember them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.started: list[SpawnProcess] = []
+
+    def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Return a process that is not started yet, as the executor makes it."""
+        process = SpawnProcess(*args, **kwargs)
+        self.started.append(process)
+        return process
+
+
 @contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
     # New processes, not copies of this one: a copy would have its locks, but not the threads that hold them.
-    context = multiprocessing.get_context("spawn")
+    context = _Spawning()
     alive, stop = context.Pipe(duplex=False)
     pool = _Processes(workers, mp_context=context, initializer=_begin_worker, initargs=(alive,))
     with alive, stop, processors.one_thread_each():
         try:
             yield pool
         except BaseException:
-            stop.close()  # nobody wants the rest: workers end at once, whatever they are doing
+            for process in context.started:  # nobody wants the rest: they end at once, whatever they are doing
+                if process.pid is not None:
+                    process.kill()
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _begin_worker(alive: Any) -> None:
-    """Leave interrupts to the process that started this one, and end when it ends or closes its end of a pipe."""
+    """Leave interrupts to the process that started this one, and end when it ends, which closes its end of a pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def end_with_it() -> None:

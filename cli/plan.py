@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from .options import JsonOption, RobotArgument, print_json
+from .sweep import Sweeping, sweep
 from .watching import watching
 
 
@@ -46,13 +48,63 @@ def plan(
     ] = None,
     speed: Annotated[float, typer.Option(help="Speed of the film; 1 is real time.")] = 1.0,
     fps: Annotated[float, typer.Option(help="Frames per second of the film.")] = 20.0,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help="Plan for each of some values of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
+            "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
+            "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
+            "--out names its NetCDF file, with a CSV file beside it (default: ROBOT-TASK-sweep.nc); --figures draws "
+            "sweep.png: where plans are feasible, cost and margin. The exit code is 1 if no plan is feasible.",
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")] = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="With --vary: Dask scheduler to use instead of --workers, such as tcp://host:8786 (extra cluster).",
+        ),
+    ] = None,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(
+            "--checkpoint",
+            help="With --vary: file in which to store progress; must not exist. Continue later with --resume.",
+        ),
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            "--resume", metavar="FILE", help="With --vary: checkpoint to continue, or to create if there is none."
+        ),
+    ] = None,
+    keep: Annotated[
+        Path | None,
+        typer.Option("--keep", metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF)."),
+    ] = None,
     as_json: JsonOption = False,
     schema: Annotated[
         bool,
         typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files."),
     ] = False,
 ) -> None:
-    """Plan a motion that keeps every tension inside its limits, or report why none exists."""
+    """Plan a motion that keeps every tension inside its limits, or report why none exists.
+
+    With --vary it plans many, one for each combination of some values, and writes a table.
+    """
+    if vary:
+        for name, value in (("--report", report), ("--animate", animate)):
+            if value is not None:
+                raise InputError(f"{name} must be left out with --vary, got {value}; --keep saves the plans")
+        sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep), out, figures, as_json)
+        return
+    own = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
+    for name, given in {**own, "--resume": resume, "--keep": keep}.items():
+        if given:
+            raise InputError(f"{name} must be left out without --vary: it is an option of many plans")
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task

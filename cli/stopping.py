@@ -17,7 +17,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-__all__ = ["end", "ignore", "listen", "requested", "unlisten"]
+__all__ = ["add_to_message", "end", "ignore", "listen", "requested", "unlisten"]
 
 GRACE = 0.3  # [s] to leave what is running, and to remove what it has begun to write
 CODE = 128 + signal.SIGINT
@@ -25,6 +25,7 @@ SHOW_CURSOR = "\x1b[?25h"  # a progress display hides it
 
 _requested = threading.Event()
 _once = threading.Lock()
+_message = "towline: stopped"
 
 
 def listen() -> None:
@@ -50,6 +51,12 @@ def ignore() -> None:
         signal.set_wakeup_fd(-1)
 
 
+def add_to_message(text: str) -> None:
+    """Set what the line of an interrupt states beside "stopped", such as how to resume."""
+    global _message
+    _message = f"towline: stopped{text}"
+
+
 def requested() -> bool:
     """Return whether an interrupt has arrived."""
     return _requested.is_set()
@@ -62,7 +69,7 @@ def end() -> NoReturn:
     with suppress(OSError, ValueError):
         if sys.stderr.isatty():
             sys.stderr.write(SHOW_CURSOR)
-        sys.stderr.write("towline: stopped\n")
+        sys.stderr.write(f"{_message}\n")
         sys.stderr.flush()
     writing = sys.modules.get("towline.writing")  # nothing is being written where it was never loaded
     if writing is not None:

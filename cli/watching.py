@@ -1,9 +1,9 @@
-"""Show progress while a solver works: attempt, iteration, objective and infeasibility, live on standard error."""
+"""Show progress live on standard error: a solver's iterations, or how much of many samples or plans is done."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -77,3 +77,44 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
     )
     with Progress(*columns, console=to, transient=True, disable=not to.is_terminal) as shown:
         yield Watch(shown, what)
+
+
+@contextmanager
+def counting(what: str, counted: str, quiet: bool = False) -> Iterator[Callable[[int, int, int], None]]:
+    """Show a bar with rate and remaining time while the block runs, if a person is watching, as `watching` does.
+
+    Parameters
+    ----------
+    what
+        What is being done, as the label.
+    counted
+        What the last number counts: "accepted", "feasible".
+    quiet
+        Show nothing, because standard output is for a program (`--json`).
+
+    Yields
+    ------
+    A function of (how many are done, how many there are, how many of those done are counted).
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda done, total, count: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=20),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[detail]}", markup=False),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        line = shown.add_task(what, detail="", total=None)
+
+        def advance(done: int, total: int, count: int) -> None:
+            rate = shown.tasks[line].speed or shown.tasks[line].finished_speed or 0.0
+            detail = f"{rate:,.0f}/s  " if rate >= 1 else ""
+            shown.update(line, completed=done, total=total, detail=f"{detail}{counted} {count / max(done, 1):.2%}")
+
+        yield advance

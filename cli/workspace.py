@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +9,7 @@ import typer
 
 from ..errors import InputError
 from .options import JsonOption, RobotArgument, numbers, print_json
+from .watching import counting
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from ..models import Robot
     from ..workspace import Condition
     from ..workspace.boundary_mesh import Mesh
-    from ..workspace.run import Progress
 
 
 # Each has a file of its own; to load them takes longer than help may.
@@ -140,7 +138,7 @@ def workspace(
             taken[place] = what
     # Before the samples, so that an error in it is reported before hours of work.
     surface = None if mesh is None else _boundary(loaded, required, region)
-    with _progress(f"sampling {loaded.name}", quiet=as_json) as progress:
+    with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as progress:
         result = sample(
             loaded,
             required,
@@ -256,32 +254,6 @@ def _count(samples: float) -> int:
     if not float(samples).is_integer() or samples > 1e15:
         raise InputError(f"--samples must be a whole number from 1, got {samples:g}")
     return int(samples)
-
-
-@contextmanager
-def _progress(what: str, quiet: bool) -> Iterator[Progress]:
-    """Show a bar with rate and remaining time on standard error, if that is a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    to = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=20),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[rate]}", markup=False),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
-        line = shown.add_task(what, rate="", total=None)
-
-        def advance(done: int, total: int, accepted: int) -> None:
-            task = shown.tasks[line]
-            rate = task.speed or task.finished_speed or 0.0
-            text = f"{rate:,.0f}/s  accepted {accepted / max(done, 1):.2%}"
-            shown.update(line, completed=done, total=total, rate=text)
-
-        yield advance
 
 
 def _summary(result: xr.Dataset) -> dict[str, Any]:

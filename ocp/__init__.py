@@ -3,6 +3,8 @@
 from .planner import Planner, plan
 from .result import Plan
 from .status import MotionStatus
+from .sweeps.result import Sweep
+from .sweeps.run import sweep
 from .tasks.task import Task, read_task
 from .timing.fastest_law import time_along
 from .timing.timing import Timing
@@ -11,9 +13,11 @@ __all__ = [
     "MotionStatus",
     "Plan",
     "Planner",
+    "Sweep",
     "Task",
     "Timing",
     "plan",
     "read_task",
+    "sweep",
     "time_along",
 ]

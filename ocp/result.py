@@ -53,6 +53,8 @@ class Plan:
         back to 0 another run begins.
     stages
         The steps of the planner, in order, with their messages and times.
+    objective
+        Value of the objective that the solver reached, where it solved a program; a plan without one has None.
     relaxed
         If not feasible: a task near this one that is feasible, if the planner knows one.
     """
@@ -68,6 +70,7 @@ class Plan:
     message: str = ""
     iterates: tuple[tuple[int, float, float], ...] = ()
     stages: tuple[Stage, ...] = ()
+    objective: float | None = None
     relaxed: Relaxed | None = None
 
     @property

@@ -119,6 +119,7 @@ class Search:
             iterations=outcome.iterations,
             message=outcome.message,
             iterates=tuple(self._iterates),
+            objective=outcome.objective,
         )
 
     def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:

@@ -44,6 +44,7 @@ NOT_CALLED = {
     "Certificate",
     "solvers.Margin",
     "Plan",
+    "Sweep",
     "TensionSolution",
     "Timing",
     "evaluate",  # of a condition: `holds` checks the arguments and calls it
@@ -123,6 +124,11 @@ def a_plan() -> towline.Plan:
 
 
 @cache
+def a_sweep() -> towline.Sweep:
+    return towline.sweep(ROBOT, TASK, {"margin": [0, 1]})
+
+
+@cache
 def time_law() -> towline.Timing:
     return time_along(ROBOT, {"path": LINE}, grid=10)
 
@@ -197,6 +203,9 @@ VALID: dict[str, Callable[[], Any]] = {
     "places": places,
     "carriers": lambda: np.zeros((1, 1, 6)),
     "rows": lambda: slice(0, 1),
+    "vary": lambda: {"margin": [0, 1]},
+    "sweep.keep": lambda: None,
+    "Sweep.plan.index": lambda: 0,
     "result": lambda: sample(robot(), StaticEquilibrium(), samples=20),
 }
 
@@ -235,6 +244,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Planner": lambda: Planner(ROBOT, TASK),
     "Plan": a_plan,
     "Timing": time_law,
+    "Sweep": a_sweep,
     "TensionProblem": problem,
     "TensionSolution": lambda: solve(problem()),
     "Certificate": lambda: infeasible().certificate,

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..execution import Workers, start_workers
+from ..execution import Workers, check_workers, start_workers
 from ..inputs import file_path, flag, one_of, required, shown, whole_number
 from ..models import Robot
 from .checkpoint import ChunkCheckpoint, open_chunks
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 KEEP = ("accepted", "all", "none")
-MOST_WORKERS = 1024
 MOST_POINTS = 10_000_000
 LARGEST_JOB = 8  # chunks
 
@@ -126,11 +125,9 @@ def sample(
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
     region = Region.model_validate({} if region is None else region)
     check_sampling(method, samples, seed)
-    whole_number("workers", workers, 1, MOST_WORKERS)
+    check_workers(workers, scheduler)
     whole_number("points_max", points_max, 0, MOST_POINTS)
     one_of("keep", keep, KEEP)
-    if scheduler is not None and not (isinstance(scheduler, str) and scheduler):
-        raise InputError(f"scheduler must be the address of a Dask scheduler or None, got {shown(scheduler)}")
     file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
     flag("resume", resume)
     if progress is not None and not callable(progress):

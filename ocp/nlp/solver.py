@@ -37,6 +37,7 @@ class Outcome:
     message: str
     iterations: int
     slack: float  # largest missing wrench at a node, in any wind [N], zero in the rigid program
+    objective: float  # of the task; nan in the elastic program, which has another one
 
 
 # A guess or a motion from another mesh or task is near: IPOPT's default 0.1 throws it away, "adaptive" took 8 times as
@@ -160,16 +161,17 @@ class Solver:
         statistics = nlp.stats()
         self._last = result if statistics["success"] else None
         x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
+        objective = float(result["f"])
         message = statistics["return_status"]
         if isinstance(message, int):
             message = FATROP_STATUS.get(message, f"fatrop's status {message}")
             if progress is not None:  # it reports no iterations while it solves
-                progress(iterations, float(result["f"]), watch.infeasibility(result["g"].full().ravel()))
+                progress(iterations, objective, watch.infeasibility(result["g"].full().ravel()))
         met = program.violation(x, result["g"].full().ravel()) <= MET
         if watch.settled or watch.late:
             message = TIME_LIMIT if watch.late else SETTLED
             if len(watch.best):
-                x, met = watch.best, True
+                x, objective, met = watch.best, watch.objective, True
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
@@ -177,6 +179,7 @@ class Solver:
             message=str(message),
             iterations=iterations,
             slack=program.missing(x),
+            objective=np.nan if program.mesh.elastic else objective,
         )
 
     def _abandon(self) -> None:
@@ -217,7 +220,7 @@ class _Watch(ca.Callback):
         self.late = False  # whether the time is up
         self._iteration = 0
         self.best = np.zeros(0)  # iterate of those that meet all constraints
-        self._objective = np.inf  # its
+        self.objective = np.inf  # its
         self._mark = np.inf  # the objective that a later one has to be better than
         self._since = 0  # the last iteration that was on the way to a better one
         self.abandoned = False  # whether nobody waits for the run any more
@@ -276,8 +279,8 @@ class _Watch(ca.Callback):
 
     def _keep(self, x: np.ndarray, g: np.ndarray, objective: float) -> None:
         """Keep the best iterate that meets all constraints."""
-        if self._program.violation(x, g) > MET or objective >= self._objective:
+        if self._program.violation(x, g) > MET or objective >= self.objective:
             return
         if objective < self._better():
             self._mark = objective
-        self.best, self._objective = x.copy(), objective
+        self.best, self.objective = x.copy(), objective

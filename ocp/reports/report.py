@@ -35,9 +35,14 @@ class Table(NamedTuple):
 
 def headline(plan: Plan) -> str:
     """Return the result in one line: robot, task, status, and what decided it."""
-    about, reason = f"{plan.scenario.robot.name}, {plan.scenario.task.name}", plan.reason
-    because = f"{reason}; closest motion: " if reason else ""
-    return f"{about}: {plan.status.value.upper()}, {because}{_decisive(plan)}"
+    about = f"{plan.scenario.robot.name}, {plan.scenario.task.name}"
+    return f"{about}: {plan.status.value.upper()}, {decisive(plan)}"
+
+
+def decisive(plan: Plan) -> str:
+    """Return what decided the result, in one line."""
+    because = f"{plan.reason}; closest motion: " if plan.reason else ""
+    return f"{because}{_of_the_motion(plan)}"
 
 
 def sections(plan: Plan) -> list[Section]:
@@ -109,7 +114,7 @@ def _up(plan: Plan) -> np.ndarray:
     return -np.array(plan.scenario.robot.gravity)
 
 
-def _decisive(plan: Plan) -> str:
+def _of_the_motion(plan: Plan) -> str:
     if plan.feasible:
         if plan.margin is None or plan.margin < WORTH_A_NUMBER:
             return "every tension inside its limits"

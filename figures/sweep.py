@@ -1,0 +1,143 @@
+"""Draw what plans reach over the fields that were varied: curves over one, maps over two, maps side by side over three.
+
+Plans without a value are marked by their status.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
+
+MARKS = {"infeasible": "x", "not-found": "o", "failed": "^"}  # by status; feasible plans have a value
+MOST_TICKS = 8
+NOTHING = "#eeeeee"  # behind marks in a map
+
+
+class Axis(NamedTuple):
+    """A varied field.
+
+    Attributes
+    ----------
+    label
+        Its name, with the unit.
+    values
+        Numbers or words.
+    """
+
+    label: str
+    values: Sequence[float] | Sequence[str]
+
+    @property
+    def texts(self) -> list[str]:
+        """Return the values as text."""
+        return [value if isinstance(value, str) else f"{value:g}" for value in self.values]
+
+
+def sweep(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
+    """Draw each quantity over one, two or three varied fields.
+
+    Parameters
+    ----------
+    status
+        Word for each plan, an axis for each varied field.
+    quantities
+        By their labels, shaped like `status`, nan where a plan has none.
+    """
+    canvas = _curves(axes[0], status, quantities) if len(axes) == 1 else _maps(axes, status, quantities)
+    style.legend_below(canvas, *canvas.axes)
+    return canvas
+
+
+def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
+    """Draw panels below each other, with the plans without a value along the bottom."""
+    from matplotlib.transforms import blended_transform_factory
+
+    canvas = style.figure(5.0, 0.9 + 1.8 * len(quantities))
+    words = isinstance(axis.values[0], str)
+    x = np.arange(len(axis.values)) if words else np.array(axis.values)
+    order = np.argsort(x)
+    beyond = 0.4 if words else 0.04 * float(np.ptp(x)) or 0.5
+    for row, (label, values) in enumerate(quantities.items()):
+        last = row + 1 == len(quantities)
+        ax = style.axes(canvas, axis.label if last else "", label, (len(quantities), 1, row + 1))
+        line = "" if words else "-"  # between words there is nothing
+        ax.plot(x[order], values[order], f"{line}o", color=style.colour(row), markersize=4, clip_on=False)
+        bottom = blended_transform_factory(ax.transData, ax.transAxes)
+        for word, mark in MARKS.items():
+            which = x[status == word]
+            _mark(ax, which, np.full(len(which), 0.06), word, mark, transform=bottom)
+        ax.set_xlim(x.min() - beyond, x.max() + beyond)
+        ax.margins(y=0.18)
+        if words:
+            ax.set_xticks(x, axis.texts)
+        ax.tick_params(labelbottom=last)
+    return canvas
+
+
+def _maps(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
+    """Draw the maps of all quantities side by side; over three fields a row of maps for each quantity."""
+    if len(axes) == 2:
+        canvas = style.figure(0.4 + 3.3 * len(quantities), 3.2)
+        for column, (label, values) in enumerate(quantities.items()):
+            ax = canvas.add_subplot(1, len(quantities), column + 1)
+            image = _map(ax, axes, values, status, _range(values))
+            ax.set_title(label, fontsize=9)
+            ax.set_xlabel(axes[0].label)
+            ax.set_ylabel(axes[1].label if column == 0 else "")
+            canvas.colorbar(image, ax=ax)
+        return canvas
+    third = axes[2]
+    canvas = style.figure(1.2 + 2.0 * len(third.values), 0.9 + 2.2 * len(quantities))
+    panels = canvas.subplots(len(quantities), len(third.values), sharex=True, sharey=True, squeeze=False)
+    for row, (label, values) in enumerate(quantities.items()):
+        for column, ax in enumerate(panels[row]):
+            image = _map(ax, axes, values[..., column], status[..., column], _range(values))
+            if row == 0:
+                ax.set_title(f"{third.label}: {third.texts[column]}", fontsize=9)
+            if column == 0:
+                ax.set_ylabel(axes[1].label)
+            if row + 1 == len(quantities):
+                ax.set_xlabel(axes[0].label)
+            if column + 1 == len(third.values):
+                canvas.colorbar(image, ax=list(panels[row]), label=label)
+    return canvas
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    """Return the range of the colours."""
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+
+
+def _map(
+    ax: Axes, axes: Sequence[Axis], values: np.ndarray, status: np.ndarray, ends: tuple[float, float]
+) -> ScalarMappable:
+    """Draw a cell for each plan, all of one size, since values need not be evenly spaced."""
+    ax.set_facecolor(NOTHING)
+    image = ax.imshow(values.T, origin="lower", aspect="auto", cmap="viridis", vmin=ends[0], vmax=ends[1])
+    for word, mark in MARKS.items():
+        x, y = np.nonzero(status == word)
+        _mark(ax, x, y, word, mark)
+    for axis, set_ticks in zip(axes, (ax.set_xticks, ax.set_yticks), strict=False):
+        texts = axis.texts
+        shown = range(0, len(texts), -(-len(texts) // MOST_TICKS))
+        set_ticks(list(shown), [texts[index] for index in shown])
+    return image
+
+
+def _mark(ax: Axes, x: np.ndarray, y: np.ndarray, word: str, mark: str, **options: Any) -> None:
+    """Mark plans of one status, the mark small enough for many of them."""
+    if not len(x):
+        return
+    size = float(np.clip(40 / np.sqrt(len(x)), 2.5, 6))
+    look = {"markersize": size, "color": "#555555", "markerfacecolor": "none", "linestyle": "none"}
+    ax.plot(x, y, mark, label=word, **look, **options)

@@ -1,0 +1,1 @@
+"""Plan one task many times, with fields of the task or of the robot varied: `sweep`."""

@@ -1,0 +1,98 @@
+"""`Cases`: the robot and the task of each plan of a sweep, for all combinations of the varied values."""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...models import Robot
+from ...models.parsing import validate
+from ..tasks.lay_out import lay_out
+from ..tasks.task import Task
+from .axis import Axis
+
+__all__ = ["Cases"]
+
+
+class Cases:
+    """The combinations of values, numbered from 0 with the last axis fastest.
+
+    Attributes
+    ----------
+    robot, task
+        Without variation.
+    axes
+        The varied fields and their values.
+    shape
+        How many values each axis has.
+    """
+
+    def __init__(self, robot: Robot, task: Task, axes: tuple[Axis, ...]):
+        self.robot, self.task, self.axes = robot, task, axes
+        self.shape = tuple(len(axis.values) for axis in axes)
+        self._data = task.model_dump(exclude_unset=True)
+        if task.limits.own:
+            self._data["limits"]["own"] = task.limits.own
+        self._robots: dict[tuple[int, ...], Robot] = {}
+
+    def __len__(self) -> int:
+        """Return the number of combinations."""
+        return prod(self.shape)
+
+    def indices(self, number: int) -> tuple[int, ...]:
+        """Return the index of the value on each axis."""
+        return tuple(int(index) for index in np.unravel_index(number, self.shape))
+
+    def described(self, number: int) -> str:
+        """Return the values of a combination as text: "margin = 5, duration = 4"."""
+        places = zip(self.axes, self.indices(number), strict=True)
+        return ", ".join(f"{axis.field.key} = {axis.texts[index]}" for axis, index in places)
+
+    def case(self, number: int) -> tuple[Robot, Task]:
+        """Return robot and task of a combination, checked as files are.
+
+        Raises
+        ------
+        InputError
+            If the values are not valid.
+        """
+        data = self._data
+        indices = self.indices(number)
+        for axis, index in zip(self.axes, indices, strict=True):
+            if not axis.field.of_robot:
+                data = axis.field.set(data, axis.values[index])
+        return self._robot(indices), validate(data, Task, f"task {self.task.name!r}")
+
+    def _robot(self, indices: tuple[int, ...]) -> Robot:
+        varied = [(axis, index) for axis, index in zip(self.axes, indices, strict=True) if axis.field.of_robot]
+        if not varied:
+            return self.robot
+        place = tuple(index for _, index in varied)
+        if place not in self._robots:
+            data: Any = self.robot.model_dump(exclude_unset=True)
+            for axis, index in varied:
+                data = axis.field.set(data, axis.values[index])
+            self._robots[place] = validate(data, Robot, f"robot {self.robot.name!r}")
+        return self._robots[place]
+
+    def check(self) -> None:
+        """Check every combination: whether the values are valid and the task fits the robot.
+
+        Raises
+        ------
+        InputError
+            For the first one that is wrong, with its values.
+        """
+        for number in range(len(self)):
+            try:
+                lay_out(*self.case(number))
+            except InputError as error:
+                raise InputError(f"{error} (with {self.described(number)})") from None
+
+    def units(self) -> tuple[str, ...]:
+        """Return the unit of each varied field; empty where it has none."""
+        robot, task = self.case(0)
+        return tuple(axis.field.unit(robot if axis.field.of_robot else task) for axis in self.axes)

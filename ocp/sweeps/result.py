@@ -1,0 +1,265 @@
+"""`Sweep`: the plans of a sweep as a table, files, a figure and a report."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import __version__
+from ...errors import InputError
+from ...inputs import file_path, whole_number
+from ...models.parsing import to_yaml
+from ...netcdf import Contents, Variable, save_netcdf
+from ...text import column, quantity
+from ...writing import check_writable, whole_file
+from ..planner import plan
+from ..result import Plan
+from ..status import MotionStatus
+from .axis import check_figure
+from .cases import Cases
+from .row import FAILED, Row
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["Sweep"]
+
+MOST_LINES = 60  # of the table in a report
+
+
+class _Result(NamedTuple):
+    """Describe one result of a row."""
+
+    name: str
+    unit: str
+    about: str
+
+
+_RESULTS = (
+    _Result("status", "", "feasible, infeasible, not-found, or failed: planning ended with an error"),
+    _Result("reason", "", "why the plan is not feasible"),
+    _Result("cost", "1", "objective of the task, of feasible plans"),
+    _Result("duration", "s", "duration of the motion"),
+    _Result("margin", "N", "smallest distance of any tension from its limits"),
+    _Result("tension_max", "N", "largest tension"),
+    _Result("iterations", "1", "iterations of the last run of the solver"),
+    _Result("seconds", "s", "wall time to plan"),
+)
+_NUMBERS = ("cost", "duration", "margin", "tension_max")  # what a report shows of each plan
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The plans of one task for all combinations of some values of its fields.
+
+    Attributes
+    ----------
+    cases
+        The combinations: robot, task and varied fields.
+    rows
+        What is kept of each plan, in the order of the combinations, the last field fastest.
+    """
+
+    cases: Cases
+    rows: tuple[Row, ...]
+
+    @property
+    def feasible(self) -> int:
+        """Return how many plans are feasible."""
+        return self.counts[MotionStatus.FEASIBLE]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Return how many plans have each status."""
+        return Counter(row.status for row in self.rows)
+
+    @cached_property
+    def table(self) -> xr.Dataset:
+        """Return the table: one dimension for each varied field, `task.margin` for `margin`; units as attributes.
+
+        Variables: plan (its number, see `plan`), status, reason, cost, duration [s], margin [N], tension_max [N],
+        iterations, seconds [s]. Numbers that do not exist are nan.
+        """
+        return self._contents.dataset()
+
+    @cached_property
+    def _contents(self) -> Contents:
+        cases, dims = self.cases, tuple(axis.field.name for axis in self.cases.axes)
+        number = np.arange(len(cases)).reshape(cases.shape)
+        variables = {"plan": Variable(dims, number, {"long_name": "number of the plan, from 0"})}
+        for name, unit, about in _RESULTS:
+            attributes = {"units": unit, "long_name": about} if unit else {"long_name": about}
+            variables[name] = Variable(dims, self._values(name), attributes)
+        coordinates = {
+            axis.field.name: Variable((axis.field.name,), axis.coordinates, {"units": unit} if unit else {})
+            for axis, unit in zip(cases.axes, cases.units(), strict=True)
+        }
+        attributes = {
+            "title": f"towline sweep of {cases.robot.name}: {cases.task.name}",
+            "robot": to_yaml(cases.robot),
+            "task": to_yaml(cases.task.in_file()),
+            "vary": json.dumps({axis.field.key: list(axis.values) for axis in cases.axes}),
+            "towline": __version__,
+        }
+        return Contents(variables, coordinates, attributes)
+
+    def _values(self, name: str) -> np.ndarray:
+        """Return one result of all plans, by the values of the varied fields."""
+        values = [getattr(row, name) for row in self.rows]
+        return np.array(values).reshape(self.cases.shape)
+
+    def plan(self, index: int) -> Plan:
+        """Plan combination `index` of the table again, from 0, for all that the table does not have.
+
+        Raises
+        ------
+        InputError
+            If there is no such plan, or planning ends with an error as it did before.
+        """
+        return plan(*self.cases.case(whole_number("index", index, 0, len(self.rows) - 1)))
+
+    def save(self, file: str | os.PathLike[str]) -> tuple[Path, Path]:
+        """Save the table as NetCDF, and beside it as CSV with the suffix .csv; return both paths.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be written, or ends in .csv, the name of the other one.
+        """
+        path = file_path("file", file)
+        beside = path.with_suffix(".csv")
+        if beside == path:
+            raise InputError(f"file must be a NetCDF file, beside which the CSV is written, got {path}")
+        check_writable(beside)
+        save_netcdf(self._contents, path)
+        with whole_file(beside) as temporary:
+            temporary.write_text(self._csv(), encoding="utf-8")
+        return path, beside
+
+    def _csv(self) -> str:
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        units = [(axis.field.name, unit) for axis, unit in zip(self.cases.axes, self.cases.units(), strict=True)]
+        units += [(name, "" if unit == "1" else unit) for name, unit, _ in _RESULTS]
+        writer.writerow(["plan", *(f"{name} [{unit}]" if unit else name for name, unit in units)])
+        for number, row in enumerate(self.rows):
+            cells = ["" if isinstance(value, float) and math.isnan(value) else value for value in row]
+            places = zip(self.cases.axes, self.cases.indices(number), strict=True)
+            writer.writerow([number, *(axis.labels[index] for axis, index in places), *cells])
+        return stream.getvalue()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `towline plan --vary --json` prints, ready for JSON; numbers that do not exist are None."""
+
+        def existing(value: Any) -> Any:
+            return None if isinstance(value, float) and math.isnan(value) else value
+
+        axes = self.cases.axes
+        rows = []
+        for number, row in enumerate(self.rows):
+            places = zip(axes, self.cases.indices(number), strict=True)
+            varied = {axis.field.key: axis.values[index] for axis, index in places}
+            results = {name: existing(value) for name, value in row._asdict().items()}
+            rows.append({"plan": number, "varied": varied, **results})
+        every = [*(str(status) for status in MotionStatus), FAILED]
+        return {
+            "plans": len(rows),
+            "feasible": self.feasible,
+            "counts": {status: self.counts[status] for status in every},
+            "vary": {axis.field.key: list(axis.values) for axis in axes},
+            "rows": rows,
+        }
+
+    def figure(self) -> Figure:
+        """Draw cost, margin and, where it is not a varied field, duration over the varied fields.
+
+        One field: curves. Two: maps. Three: maps for each value of the third. Plans that are not feasible are marked.
+
+        Raises
+        ------
+        InputError
+            If there are more than three fields, or more than six values of the third.
+        """
+        from ...figures.sweep import Axis, sweep
+
+        check_figure(self.cases.axes)
+        axes = []
+        for axis, unit in zip(self.cases.axes, self.cases.units(), strict=True):
+            label = f"{axis.field.key} [{unit}]" if unit else axis.field.key
+            axes.append(Axis(label, axis.coordinates.tolist()))
+        feasible = self._values("status") == MotionStatus.FEASIBLE
+        quantities = {}
+        for name, unit, _ in _RESULTS:
+            values = np.where(feasible, self._values(name), np.nan) if name in ("cost", "margin", "duration") else None
+            if values is not None and not (name == "duration" and _is_known(self.cases, values)):
+                title = "tension margin" if name == "margin" else name  # the task's margin may be a varied field
+                quantities[title if unit == "1" else f"{title} [{unit}]"] = values
+        return sweep(axes, self._values("status"), quantities)
+
+    def report(self) -> str:
+        """Return the counts, the best plans and, unless it is long, the table, as text."""
+        robot, task, total = self.cases.robot.name, self.cases.task.name, len(self.rows)
+        lines = [f"{robot}, {task}: {quantity(self.feasible)} of {quantity(total)} plans feasible"]
+        others = [f"{quantity(count)} {status}" for status, count in self.counts.items() if status != "feasible"]
+        if others:
+            lines[0] += f", {', '.join(others)}"
+        lines += [f"  {name:<15}  {text}" for name, text in self._best()]
+        if total > MOST_LINES:
+            return "\n".join(lines)
+        return "\n".join([*lines, *(f"  {line}" for line in self._table())])
+
+    def _best(self) -> list[tuple[str, str]]:
+        """Return which feasible plans have the lowest cost, the shortest duration and the largest margin."""
+        known = [number for number, row in enumerate(self.rows) if row.status == MotionStatus.FEASIBLE]
+        lines = []
+        for title, name, unit, sign in (
+            ("lowest cost", "cost", "", 1),
+            ("shortest", "duration", "s", 1),
+            ("largest margin", "margin", "N", -1),
+        ):
+            values = {number: getattr(self.rows[number], name) for number in known}
+            if len(set(values.values())) > 1:
+                best = min(known, key=lambda number: sign * values[number])
+                lines.append((title, f"{quantity(values[best], unit)} with {self.cases.described(best)}"))
+        return lines
+
+    def _table(self) -> list[str]:
+        """Return the table with columns as wide as they need."""
+        units = {name: unit for name, unit, _ in _RESULTS}
+        indices = [self.cases.indices(number) for number in range(len(self.rows))]
+        columns = [
+            [axis.field.key, *(axis.texts[index[place]] for index in indices)]
+            for place, axis in enumerate(self.cases.axes)
+        ]
+        columns.append(["status", *(row.status for row in self.rows)])
+        for name in _NUMBERS:
+            heading = name if units[name] == "1" else f"{name} [{units[name]}]"
+            columns.append([heading, *column([getattr(row, name) for row in self.rows])])
+        columns.append(["reason", *(row.reason for row in self.rows)])
+        widths = [max(map(len, cells)) for cells in columns]
+        rights = [*[axis.numeric for axis in self.cases.axes], False, *[True] * len(_NUMBERS), False]
+        return [
+            "  ".join(
+                cell.rjust(width) if right else cell.ljust(width)
+                for cell, width, right in zip(cells, widths, rights, strict=True)
+            ).rstrip()
+            for cells in zip(*columns, strict=True)
+        ]
+
+
+def _is_known(cases: Cases, durations: np.ndarray) -> bool:
+    """Return whether the durations of feasible plans are those that were varied, or all the same."""
+    known = durations[np.isfinite(durations)]
+    varied = any(axis.field.key == "duration" and axis.numeric for axis in cases.axes)
+    return varied or not known.size or np.ptp(known) == 0

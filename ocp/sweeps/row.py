@@ -1,0 +1,116 @@
+"""`Row`: what a sweep keeps of one plan; `plan_case` plans it, in whatever process."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from ... import processors
+from ...errors import TowlineError
+from ...inputs import printable
+from ...models import Robot
+from ..cost import cost
+from ..planner import plan
+from ..reports.report import decisive
+from ..result import Plan
+from ..tasks.task import Task
+
+__all__ = ["FAILED", "LONGEST", "Row", "plan_case", "read_row", "written_row"]
+
+FAILED = "failed"  # the status of a plan that ended with an error, beside those of `MotionStatus`
+LONGEST = 65_536  # bytes of a row in a checkpoint
+
+
+class Row(NamedTuple):
+    """What a sweep keeps of one plan; numbers that do not exist are nan.
+
+    Attributes
+    ----------
+    status
+        See `MotionStatus`; or `failed`, if planning ended with an error.
+    reason
+        Why it is not feasible, in one line; empty if it is.
+    cost
+        The task's objective, of a feasible plan.
+    duration
+        [s].
+    margin
+        The smallest distance of any tension from its limits [N].
+    tension_max
+        The largest tension [N].
+    iterations
+        Of the last run of the solver.
+    seconds
+        Wall time to plan [s].
+    """
+
+    status: str
+    reason: str
+    cost: float
+    duration: float
+    margin: float
+    tension_max: float
+    iterations: int
+    seconds: float
+
+
+_NO_PLAN = Row(FAILED, "", math.nan, math.nan, math.nan, math.nan, iterations=0, seconds=0.0)
+
+
+def plan_case(number: int, robot: Robot, task: Task, file: Path | None) -> tuple[int, Row]:
+    """Plan one combination with one processor; return its number and its row.
+
+    Parameters
+    ----------
+    number
+        Of the combination, returned as it is.
+    robot, task
+        What to plan.
+    file
+        Where to save the plan, or None.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written. An error of planning is a row.
+    """
+    start = time.perf_counter()
+    try:
+        with processors.at_most(1):
+            planned = plan(robot, task)
+            row = _row(planned)
+    except Exception as error:  # a sweep of a night must not end because of one plan
+        line = str(error) if isinstance(error, TowlineError) else f"{type(error).__name__}: {error}"
+        return number, _NO_PLAN._replace(reason=printable(line), seconds=time.perf_counter() - start)
+    seconds = time.perf_counter() - start
+    if file is not None:
+        planned.save(file)
+    return number, row._replace(seconds=seconds)
+
+
+def _row(planned: Plan) -> Row:
+    least, largest = (math.nan if value is None else value for value in (planned.margin, planned.tension_max))
+    duration = planned.scenario.duration
+    reason = "" if planned.feasible else decisive(planned)
+    return Row(planned.status.value, reason, _cost(planned), duration, least, largest, planned.iterations, 0.0)
+
+
+def _cost(planned: Plan) -> float:
+    """Return the objective of a feasible plan; where no program was solved, from the audited tensions."""
+    if not planned.feasible:
+        return math.nan
+    return cost(planned) if planned.objective is None else planned.objective
+
+
+def written_row(number: int, row: Row) -> bytes:
+    """Return a row as the content of a checkpoint's record."""
+    return json.dumps([number, *row]).encode()
+
+
+def read_row(content: bytes) -> tuple[int, Row]:
+    """Read what `written_row` wrote; floats keep every bit."""
+    number, *values = json.loads(content)
+    return number, Row(*values)

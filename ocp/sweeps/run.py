@@ -1,0 +1,158 @@
+"""`sweep`: plan a task for all combinations of some values, on processes or a cluster, and resume where it stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ... import __version__
+from ...checkpoint import Kind, open_checkpoint
+from ...errors import InputError
+from ...inputs import file_path, flag, shown
+from ...models import Robot
+from ...models.files import as_robot
+from ...writing import check_writable
+from ..status import MotionStatus
+from ..tasks.task import Task, read_task
+from .axis import read_axes
+from .cases import Cases
+from .result import Sweep
+from .row import LONGEST, Row, plan_case, read_row, written_row
+
+__all__ = ["KIND", "plan_file", "sweep"]
+
+KIND = Kind(b"towline sweep checkpoint 1\n", "plan", LONGEST)
+
+Progress = Callable[[int, int, int], None]
+
+
+def sweep(
+    robot: Robot | str | os.PathLike[str],
+    task: Task | dict[str, Any] | str | os.PathLike[str],
+    vary: Mapping[str, Iterable[Any]],
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    keep: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Plan a task for all combinations of some values of its fields.
+
+    Each plan starts from the planner's own guess, so that no plan depends on another one. All combinations are checked
+    before the first is planned. An infeasible plan is an answer; a plan that ends with an error is a row with the
+    status `failed`.
+
+    The table is the same for every number of workers, but for wall times, as long as no plan is stopped by its
+    `time_limit`. Processes use one thread each; so does this one, with `workers=1`, if `OMP_NUM_THREADS` is 1 before
+    towline is imported. With more threads the last digits of some plans differ.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    task
+        A `Task`, a mapping with its keys, or the path of a YAML file.
+    vary
+        Lists of values by dotted keys of a task file: `{"margin": [0, 5, 10], "scheme": ["linear", "spline"]}`.
+        Keys that begin with `robot.` are those of the robot file: `robot.platform.mass`. Items of lists have numbers
+        from 0 on, `limits.keep_out[0].radius`; without a number all items are meant, `robot.cables.t_max`.
+    workers
+        Processes of this machine, each using one processor; 1: this process.
+    scheduler
+        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
+    checkpoint
+        File to which each plan's row is appended as soon as it is there.
+    resume
+        Whether to continue the checkpoint if the file exists. It must be of the same sweep.
+    keep
+        Folder in which to save every plan as NetCDF, named by its number; default: plans are not saved.
+    progress
+        Function that is called with (plans done, plans in total, plans feasible).
+
+    Returns
+    -------
+    Sweep
+        The table of all plans; it can be saved and drawn.
+
+    Raises
+    ------
+    InputError
+        If an argument or a combination of values is wrong, the checkpoint cannot be written, is damaged or of another
+        sweep, or there is no such scheduler. Nothing has been planned then.
+    SolverError
+        If workers end before their work is done, or the extra `cluster` is not installed.
+    """
+    from ...execution import check_workers, start_workers  # imports as long as a short plan takes
+
+    check_workers(workers, scheduler)
+    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    folder = None if keep is None else file_path("keep", keep, "a path or None").resolve()
+    flag("resume", resume)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function or None, got {shown(progress)}")
+    if resume and file is None:
+        raise InputError("checkpoint must be a path if resume is True, got None")
+    cases = Cases(as_robot(robot), read_task(task), read_axes(vary))
+    cases.check()
+    if folder is not None:
+        check_writable(plan_file(folder, cases, 0))
+    opened = nullcontext() if file is None else open_checkpoint(file, KIND, _header(cases, folder), resume)
+    rows: dict[int, Row] = {}
+    with start_workers(workers, scheduler) as started, opened as stored:
+        if stored is not None:
+            rows.update(read_row(content) for content in iter(stored.read, None))
+        feasible = sum(row.status == MotionStatus.FEASIBLE for row in rows.values())
+        _report(progress, rows, cases, feasible)
+        for number, row in started.as_completed(plan_case, _jobs(cases, set(rows), folder)):
+            if stored is not None:
+                stored.append(written_row(number, row))
+            rows[number] = row
+            feasible += row.status == MotionStatus.FEASIBLE
+            _report(progress, rows, cases, feasible)
+    return Sweep(cases, tuple(rows[number] for number in range(len(cases))))
+
+
+def plan_file(folder: Path, cases: Cases, number: int) -> Path:
+    """Return the file in which a plan is saved."""
+    return folder / f"plan-{number:0{len(str(len(cases) - 1))}}.nc"
+
+
+def _report(progress: Progress | None, rows: dict[int, Row], cases: Cases, feasible: int) -> None:
+    if progress is not None:
+        progress(len(rows), len(cases), feasible)
+
+
+def _jobs(cases: Cases, known: set[int], folder: Path | None) -> Iterator[tuple[Any, ...]]:
+    """Yield the arguments of `plan_case` for the plans that are not known yet."""
+    for number in range(len(cases)):
+        if number not in known:
+            yield number, *cases.case(number), None if folder is None else plan_file(folder, cases, number)
+
+
+def _header(cases: Cases, folder: Path | None) -> dict[str, Any]:
+    """Return everything that the rows depend on."""
+    robot, task = cases.robot, cases.task
+    versions = {"towline": __version__, "casadi": ca.CasadiMeta.version(), "numpy": np.__version__}
+    return {
+        "robot": f"{robot.name} {_digest(robot.model_dump(mode='json'))}",
+        "task": f"{task.name} {_digest(task.in_file().model_dump(mode='json'))}",
+        "limits.own": [limit.name for limit in task.limits.own],
+        "order of vary": [axis.field.key for axis in cases.axes],
+        **{f"vary {axis.field.key}": list(axis.values) for axis in cases.axes},
+        "keep": folder is not None,
+        **versions,
+    }
+
+
+def _digest(data: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
