@@ -206,14 +206,13 @@ def _message(left: Durations | None) -> str:
 
 def _blocked(search: Search) -> Plan | None:
     """Return the proof that no motion of the task is possible, if its ends or its path show it; else None."""
-    scenario = search.scenario
+    span = search.scenario.duration_range
+    slowest = search.scenario if span is None else search.scenario.lasting(span.max)
     with search.stage("ends and path") as stage:
-        proof = blocked(scenario)
+        proof = blocked(slowest)
         stage.message = "" if proof is None else proof.describe()
     if proof is None:
         return None
-    span = scenario.duration_range
-    slowest = scenario if span is None else scenario.lasting(span.max)
     start = time.perf_counter()
     proven = proof.of(audit(slowest, None, per_output=1))
     return Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, time.perf_counter() - start)
