@@ -187,7 +187,7 @@ def solve_batch(
         flat.append(np.ascontiguousarray(value).reshape(-1))
 
     tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
-    code = np.full(rows, UNSURE, np.int8)
+    status = np.full(rows, float(UNSURE))
     kernels = compiled.current()
     share, together = 1, max(rows, 1)
     if kernels.rows_at_once is not None:
@@ -197,7 +197,7 @@ def solve_batch(
 
     def work(first: int) -> None:
         stop = min(first + block, rows)
-        kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, code)
+        kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, status)
 
     if share == 1:
         work(0)
@@ -205,6 +205,7 @@ def solve_batch(
         with ThreadPoolExecutor(share) as pool:
             list(pool.map(work, range(0, rows, block)))
 
+    code = status.astype(np.int8)
     t, d, proof = tensions.reshape(rows, m), direction.reshape(rows, n), info.reshape(rows, 2)
     problem = {
         name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()

@@ -23,7 +23,7 @@ import numpy as np
 
 from .. import tolerances
 from ..writing import whole_file
-from .kernels import memory, single, wide
+from .kernels import memory, rows, single
 from .kernels.codes import UNSURE
 
 COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
@@ -37,7 +37,7 @@ _FOLDER = Path(__file__).parent / "kernels"
 _SHARED = Path(tolerances.__file__)  # its numbers are in the machine code
 _MODULES = (
     *("codes", "dual_active_set", "lanes", "lanes_newton", "lanes_proof", "lanes_slabs", "memory", "proof"),
-    *("reduction", "row_alone", "rows", "single", "wide"),
+    *("reduction", "row_alone", "rows", "single"),
 )
 
 _lock = threading.Lock()
@@ -55,7 +55,7 @@ class Kernels:
     backend :
         `COMPILED` or `INTERPRETED`.
     one, many :
-        `solve_packed` of `kernels.single` and `solve_rows` of `kernels.wide`.
+        `solve_packed` of `kernels.single` and `solve_rows` of `kernels.rows`.
     rows_at_once :
         How many rows `many` takes together; threads share multiples of it. None if threads gain nothing.
     """
@@ -100,9 +100,10 @@ def _one_in_python(data: Any, n: int, m: int, t: Any) -> int:
 
 
 def _many_in_numpy(*arguments: Any) -> None:
-    """Solve the rows of a batch on NumPy arrays; see `kernels.wide.solve_rows`."""
+    """Solve the rows of a batch on NumPy arrays; see `kernels.rows.solve_rows`."""
     start = perf_counter()
-    wide.solve_rows(*arguments)
+    with np.errstate(all="ignore"):
+        rows.solve_rows(*arguments)
     _lose(perf_counter() - start)
 
 
@@ -130,9 +131,11 @@ def _compile() -> Kernels:
     from .kernels import simd, simd_llvm
 
     spaces = [dict(vars(import_module(f"{__package__}.kernels.{name}"))) for name in _MODULES]
-    machine: dict[Any, Any] = {getattr(simd, name): getattr(simd_llvm, name) for name in simd.__all__}
-    del machine[simd.WIDTH]
+    machine: dict[Any, Any] = {
+        getattr(simd, name): getattr(simd_llvm, name) for name in simd.__all__ if callable(getattr(simd, name))
+    }
     machine[memory.floats] = numba.njit(lambda size: np.zeros(size))
+    machine[memory.view] = numba.njit(lambda array: array)
     machine[memory.integers] = numba.njit(lambda size: np.zeros(size, np.int64))
     signatures = []
     for space in spaces:
@@ -148,14 +151,11 @@ def _compile() -> Kernels:
         for name, value in space.items():
             if isinstance(value, FunctionType) and value in machine:
                 space[name] = machine[value]
-        if "WIDTH" in space:
-            space["WIDTH"] = simd_llvm.WIDTH
+        space |= {name: getattr(simd_llvm, name) for name in ("WIDTH", "TOGETHER") if name in space}
     for function, signature in signatures:
         function.compile(signature)
         function.disable_compile()
-    packed = machine[single.solve_packed]
-    rows = spaces[_MODULES.index("rows")]["solve_rows"]
-    return Kernels(COMPILED, packed, rows, simd_llvm.WIDTH)
+    return Kernels(COMPILED, machine[single.solve_packed], machine[rows.solve_rows], simd_llvm.WIDTH)
 
 
 def machine_code(function: FunctionType) -> Any:

@@ -185,6 +185,7 @@ def _prepare_limits(n, m, W):
         low, high = (low - ref) * per_unit, (high - ref) * per_unit
         store(W, cable(LOW, m) + c, low)
         store(W, cable(HIGH, m) + c, high)
+        store(W, cable(S_, m) + c, splat(0.0))
         size = maximum(magnitude(minimum(maximum(low, splat(0.0)), high)), size)
         for r in range(n):
             row = wrench(Y, n, m) + r
@@ -194,7 +195,10 @@ def _prepare_limits(n, m, W):
     store(W, SIZE, size)
     store(W, SLACKS, SLACK * size)
     store(W, GOOD, where(good, splat(1.0), splat(0.0)))
-    store(W, PROVEN, splat(0.0))
+    for row in (PROVEN, SUPPORT, SHORTFALL):
+        store(W, row, splat(0.0))
+    for r in range(n):
+        store(W, wrench(D, n, m) + r, splat(0.0))
 
 
 @compilable()

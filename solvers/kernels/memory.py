@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["floats", "integers"]
+__all__ = ["floats", "integers", "view"]
 
 
 def floats(size: int) -> Any:
@@ -18,3 +18,8 @@ def floats(size: int) -> Any:
 def integers(size: int) -> Any:
     """Return so many numbers of type int64."""
     return memoryview(bytearray(8 * size)).cast("q")
+
+
+def view(array: Any) -> Any:
+    """Return an array as memory."""
+    return memoryview(array)

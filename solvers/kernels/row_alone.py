@@ -90,9 +90,10 @@ def _soft(A, w, lower, upper, ref, weights, length, soft, n, m, t, d, info, work
 
 
 @compilable()
-def solve_row(given, per, soft, n, m, row, equal, work, numbers, t, d, info, residual, status):
-    """Solve one row; the arguments are those of `rows.solve_rows`, `equal` (m,) the weights where there are none."""
+def solve_row(given, per, soft, n, m, row, equal, work, numbers, answers):
+    """Solve one row; `given` and `answers` are those of `rows.solve_rows`, `equal` (m,) are weights for want of any."""
     A, w, lower, upper, ref, weights, length = given
+    t, d, info, residual, status = answers
     numbers[0], numbers[1], numbers[2] = np.nan, np.nan, np.nan
     status[row] = _alone(
         A[row * per[0] : row * per[0] + n * m],

@@ -1,94 +1,105 @@
-"""Rows of a batch as machine code: sixteen at a time where that can be trusted, else one by one. See `wide`."""
+"""Rows of a batch: many at a time where that can be trusted, else one by one.
+
+As plain Python a vector has thousands of rows, as machine code sixteen; see `simd`. The rows do not depend on each
+other, so both give the same bits.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .codes import INACCURATE, INFEASIBLE, OPTIMAL, STEPS, UNSURE
+from .codes import INFEASIBLE, STEPS, TURNS, UNSURE
 from .jit import GIVEN, VECTOR, compilable
 from .lanes import GOOD, PROVEN, ROUNDED, S_, SHORTFALL, SUPPORT, D, cable, judge, lane_size, prepare, wrench
 from .lanes_newton import newton_in_lanes, newton_size
 from .lanes_slabs import reduce_lanes, slabs_in_lanes, slabs_size
-from .memory import floats, integers
+from .memory import floats, view
 from .row_alone import solve_row
-from .simd import WIDTH
+from .simd import TOGETHER, WIDTH, any_of, gather, load, places, scatter, splat, store, vectors, where
 from .single import work_size
-from .wide import turns_in_lanes, uses_slabs
 
 __all__ = ["solve_rows"]
 
 
 @compilable()
-def _exchange(y, start, n, members, V, keep):
-    """Keep the multipliers of sixteen problems from the first rows of V, or bring them back."""
-    for e in range(WIDTH):
-        at = (members[e] - start) * n
-        for i in range(n):
-            if keep:
-                y[at + i] = V[i * WIDTH + e]
-            else:
-                V[i * WIDTH + e] = y[at + i]
+def _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, answers):
+    """Solve the rows `members`, and leave those that need more care unsure; `keep` if W has their matrix already.
 
-
-@compilable()
-def _hand_out(soft, n, m, members, W, t, d, info, residual, status):
-    """Copy sixteen answers to where they belong."""
-    for e in range(WIDTH):
-        row = members[e]
-        proven = W[PROVEN * WIDTH + e] > 0.0
-        status[row] = INFEASIBLE if proven and not soft else int(W[GOOD * WIDTH + e])
-        if proven:
-            info[row * 2], info[row * 2 + 1] = W[SUPPORT * WIDTH + e], W[SHORTFALL * WIDTH + e]
+    y, n numbers for each row from `start`, keeps multipliers from one turn to the next.
+    """
+    prepare(given, per, n, m, members, keep, W)
+    by_wrench = places(members, n)
+    if slabs:
+        if not keep:
+            reduce_lanes(n, m, W)
+        slabs_in_lanes(n, m, W, V)
+    else:
+        if turn > 0:
             for i in range(n):
-                d[row * n + i] = W[(wrench(D, n, m) + i) * WIDTH + e]
-        elif status[row] == INACCURATE:
-            info[row * 2], info[row * 2 + 1] = np.nan, np.nan
-        if status[row] == OPTIMAL or status[row] == INACCURATE:
-            residual[row] = W[ROUNDED * WIDTH + e]
-            for c in range(m):
-                t[row * m + c] = W[(cable(S_, m) + c) * WIDTH + e]
+                store(V, i, gather(y, by_wrench, i - start * n))
+        newton_in_lanes(soft, STEPS, turn > 0, n, m, W, V)
+        for i in range(n):
+            scatter(y, by_wrench, i - start * n, load(V, i))
+    judge(soft > 0.0, n, m, W)
+    t, d, info, residual, status = answers
+    code, proven = load(W, GOOD), load(W, PROVEN) > 0.0
+    by_row, by_two, by_cable = places(members, 1), places(members, 2), places(members, m)
+    if soft == 0.0:
+        code = where(proven, splat(1.0 * INFEASIBLE), code)
+    scatter(status, by_row, 0, code)
+    scatter(info, by_two, 1, where(proven, load(W, SHORTFALL), splat(np.nan)))
+    if any_of(proven):
+        scatter(info, by_two, 0, load(W, SUPPORT))
+        for i in range(n):
+            scatter(d, by_wrench, i, load(W, wrench(D, n, m) + i))
+    scatter(residual, by_row, 0, load(W, ROUNDED))
+    for c in range(m):
+        scatter(t, by_cable, c, load(W, cable(S_, m) + c))
 
 
 @compilable(
-    "void",
-    *[GIVEN] * 7,
-    "Array(int64, 1, 'C', readonly=True)",
-    "float64",
-    *["int64"] * 4,
-    *[VECTOR] * 4,
-    "Array(int8, 1, 'C')",
+    *("void", *[GIVEN] * 7, "Array(int64, 1, 'C', readonly=True)", "float64", *["int64"] * 4, *[VECTOR] * 5),
 )
 def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start, stop, t, d, info, residual, status):
-    """Solve the rows start to stop of a batch; the arguments are those of `wide.solve_rows`."""
+    """Solve the rows start to stop of a batch.
+
+    Parameters
+    ----------
+    A, w, lower, upper, ref, weights, length :
+        As in `single.solve_packed`, all rows one after another. An empty `weights` stands for equal ones.
+    per :
+        Shape (7,): numbers per row of each of these, 0 where one row serves all.
+    soft :
+        1 / rho, the price of a squared wrench error beside squared tensions; 0 if the wrench must be met.
+    n, m :
+        Wrench rows and cables.
+    t, d, info, residual, status :
+        Get tensions (rows * m) and wrench errors (rows) where there are any; directions (rows * n), support and
+        shortfall (rows * 2) where the status is not OPTIMAL, nan in the shortfall without proof; and codes (rows).
+        `status` comes with UNSURE in each row to solve. Elsewhere they get numbers that mean nothing.
+    """
+    given, answers = (A, w, lower, upper, ref, weights, length), (t, d, info, residual, status)
+    W, V = vectors(lane_size(n, m)), vectors(max(newton_size(n, m), slabs_size(n, m)))
+    shared = per[0] == 0 and per[5] == 0 and per[6] == 0
+    slabs = soft == 0.0 and 0 <= m - n <= 2
+    # How often the problems that are left are put together, before they are solved alone.
+    turns = 1 if slabs else TURNS if m > n or soft > 0.0 else 0
+    left = np.arange(start, stop)
+    y = np.zeros(0 if slabs else (stop - start) * n)
+    for turn in range(turns):
+        filled = left[np.minimum(np.arange(left.size + -left.size % WIDTH), left.size - 1)]  # by repeating the last row
+        for first in range(0, left.size, TOGETHER):
+            members = filled[first : first + TOGETHER]
+            keep = shared and first > 0
+            _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, answers)
+        left = left[status[left] == UNSURE]
+    if turns == 0:
+        left = left[status[left] == UNSURE]
+    given = (view(A), view(w), view(lower), view(upper), view(ref), view(weights), view(length))
+    answers = (view(t), view(d), view(info), view(residual), view(status))
     equal = floats(m)
     for c in range(m):
         equal[c] = 1.0
     work, numbers = floats(work_size(n, m if soft == 0.0 else m + n)), floats(3)
-    W, V = floats(lane_size(n, m)), floats(max(newton_size(n, m), slabs_size(n, m)))
-    given = (A, w, lower, upper, ref, weights, length)
-    members = integers(WIDTH)
-    shared = per[0] == 0 and per[5] == 0 and per[6] == 0
-    slabs = uses_slabs(soft, n, m)
-    left = np.arange(start, stop)
-    y = floats(0 if slabs else (stop - start) * n)
-    for turn in range(turns_in_lanes(soft, n, m)):
-        for first in range(0, left.size, WIDTH):
-            for e in range(WIDTH):  # a last few are completed by repeating the last one
-                members[e] = left[min(first + e, left.size - 1)]
-            keep = shared and first > 0
-            prepare(given, per, n, m, members, keep, W)
-            if slabs:
-                if not keep:
-                    reduce_lanes(n, m, W)
-                slabs_in_lanes(n, m, W, V)
-            else:
-                if turn > 0:
-                    _exchange(y, start, n, members, V, False)
-                newton_in_lanes(soft, STEPS, turn > 0, n, m, W, V)
-                _exchange(y, start, n, members, V, True)
-            judge(soft > 0.0, n, m, W)
-            _hand_out(soft > 0.0, n, m, members, W, t, d, info, residual, status)
-        left = left[status[left] == UNSURE]
-    for row in range(start, stop):
-        if status[row] == UNSURE:
-            solve_row(given, per, soft, n, m, row, equal, work, numbers, t, d, info, residual, status)
+    for row in left:
+        solve_row(given, view(per), soft, n, m, int(row), equal, work, numbers, answers)

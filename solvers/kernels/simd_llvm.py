@@ -18,11 +18,14 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
+from numba import njit
 from numba.core import cgutils, types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 __all__ = [
+    "TOGETHER",
     "WIDTH",
     "any_of",
     "gather",
@@ -31,13 +34,15 @@ __all__ = [
     "maximum",
     "minimum",
     "places",
+    "scatter",
     "splat",
     "sqrt",
     "store",
+    "vectors",
     "where",
 ]
 
-WIDTH = 16  # two registers of the widest processors, so that one need not wait for the other
+WIDTH = TOGETHER = 16  # two registers of the widest processors, so that one need not wait for the other
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
@@ -70,6 +75,12 @@ class _LanesModel(models.PrimitiveModel):
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _BITS)
+
+
+@njit
+def vectors(size: int) -> Any:
+    """Return a work array of so many numbers."""
+    return np.zeros(size)
 
 
 def _splat(builder: Any, number: Any) -> Any:
@@ -161,6 +172,21 @@ def gather(typingctx: Any, array: Any, starts: Any, offset: Any) -> Any:
         return vector
 
     return lanes(array, types.UniTuple(types.intp, WIDTH), types.intp), generate
+
+
+@_instruction
+def scatter(typingctx: Any, array: Any, starts: Any, offset: Any, values: Any) -> Any:
+    """Write numbers to starts[e] + offset of an array of float64; `starts` is from `places`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        given, starts, offset, values = arguments
+        data = context.make_array(signature.args[0])(context, builder, given).data
+        for e in range(WIDTH):
+            at = builder.gep(data, [builder.add(builder.extract_value(starts, e), offset)])
+            builder.store(builder.extract_element(values, ir.Constant(ir.IntType(32), e)), at)
+        return context.get_dummy_value()
+
+    return types.void(array, types.UniTuple(types.intp, WIDTH), types.intp, lanes), generate
 
 
 @_instruction
