@@ -1,24 +1,5 @@
 """What the kernels answer, and the numbers by which they judge beside those of `tolerances`."""
 
-__all__ = [
-    "CLEAR",
-    "DECISIVE",
-    "DEPENDENT",
-    "INACCURATE",
-    "INFEASIBLE",
-    "INVALID",
-    "OPTIMAL",
-    "PARALLEL",
-    "SINGULAR",
-    "SLACK",
-    "STATIONARY",
-    "STEPS",
-    "SURE_PIVOT",
-    "SURE_ZERO",
-    "TURNS",
-    "UNSURE",
-]
-
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID, FAILED, UNSURE = range(7)
 
 # Pivots above the first part of the largest are sure to count, below the second they are rounding. RANK lies between.

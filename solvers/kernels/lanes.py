@@ -15,41 +15,6 @@ from .codes import INACCURATE, OPTIMAL, SLACK, UNSURE
 from .jit import compilable
 from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
 
-__all__ = [
-    "B_",
-    "DIAG",
-    "GOOD",
-    "GOOD_MATRIX",
-    "HIGH",
-    "LOW",
-    "N0",
-    "N1",
-    "NORM",
-    "PER_LENGTH",
-    "PROVEN",
-    "REF",
-    "REQUIRED",
-    "ROUNDED",
-    "SA",
-    "SHORTFALL",
-    "SIZE",
-    "SLACKS",
-    "SUPPORT",
-    "SW",
-    "S_",
-    "TAU",
-    "T_HIGH",
-    "T_LOW",
-    "D",
-    "Y",
-    "cable",
-    "judge",
-    "lane_size",
-    "matrix",
-    "prepare",
-    "wrench",
-]
-
 # Single rows.
 PER_LENGTH, REQUIRED, ROUNDED, SIZE, SLACKS, GOOD_MATRIX, GOOD, PROVEN, SUPPORT, SHORTFALL = range(10)
 _SINGLE = 10
