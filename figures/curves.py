@@ -69,8 +69,7 @@ def curves(
             index = looks.setdefault(name, len(looks))
             ax.plot(x, values, "o", markersize=4, color=style.colour(index), label=name)
         for text, bound in panel.bounds.items():
-            ax.axhline(bound, **style.LIMIT)
-            ax.annotate(text, (0.01, bound), xycoords=("axes fraction", "data"), ha="left", va="bottom", fontsize=8)
+            style.limit_line(ax, bound, text, place=0.01)
         for (text, place), dashes in zip((marks or {}).items(), cycle((":", "-.")), strict=False):
             ax.axvline(place, color="#666666", linestyle=dashes, linewidth=1.2, label=text)
         ax.margins(x=0.01)

@@ -97,17 +97,11 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
 def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> list[str]:
     """Draw the limits; return a note on upper limits too far away to draw without flattening the curves."""
     for low in np.unique(trajectory["t_min"].values):
-        _draw_limit(ax, low, f"t_min = {low:g} N", above=True)
+        style.limit_line(ax, low, f"t_min = {low:g} N")
     far = []
     for high in np.unique(trajectory["t_max"].values):
         if high < 2 * np.abs(shown).max():
-            _draw_limit(ax, high, f"t_max = {high:g} N", above=False)
+            style.limit_line(ax, high, f"t_max = {high:g} N", above=False)
         else:
             far.append(f"{high:g}")
     return [f"t_max = {', '.join(far)} N (outside the plot)"] if far else []
-
-
-def _draw_limit(ax: Axes, value: float, text: str, above: bool) -> None:
-    ax.axhline(value, **style.LIMIT)
-    place, side = ("axes fraction", "data"), "bottom" if above else "top"
-    ax.annotate(text, (1, value), xycoords=place, ha="right", va=side, fontsize=8)

@@ -86,6 +86,13 @@ def few_ticks() -> MaxNLocator:
     return MaxNLocator(4, prune="both")
 
 
+def limit_line(ax: Axes, value: float, text: str, place: float = 1.0, above: bool = True) -> None:
+    """Draw a limit as a dashed line with its name above or below it: 0 is at the left end, 1 at the right."""
+    ax.axhline(value, **LIMIT)
+    side, edge = "left" if place < 0.5 else "right", "bottom" if above else "top"
+    ax.annotate(text, (place, value), xycoords=("axes fraction", "data"), ha=side, va=edge, fontsize=8)
+
+
 def legend_below(canvas: Figure, *panels: Axes) -> None:
     """Draw one legend for all panels at the bottom, in rows of equal length that fit the width of the figure."""
     shown = {}

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..inputs import required, shown
 from ..models import Robot
 from ..models.part import Part
+from .feasibility import too_few_cables
 from .places import Places, check_places
 
 __all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
@@ -28,9 +29,12 @@ class Condition(Part, ABC):
     ----------
     kinds
         The registry: every condition by its kind, from when its class is defined.
+    takes_every_row
+        Whether it takes a cable for each degree of freedom: with fewer it holds nowhere.
     """
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
+    takes_every_row: ClassVar[bool] = False
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -74,7 +78,7 @@ class Condition(Part, ABC):
 
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return why the condition holds nowhere, or at isolated poses only, whatever the region; None if it may."""
-        return None
+        return too_few_cables(robot) if self.takes_every_row else None
 
     def __and__(self, other: Condition) -> AllOf:
         """Return the condition that both hold."""

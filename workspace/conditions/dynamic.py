@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +11,7 @@ from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import Finite
 from ..condition import Condition
-from ..feasibility import feasible, too_few_cables
+from ..feasibility import feasible
 from ..places import Places
 
 __all__ = ["Dynamic"]
@@ -24,6 +24,8 @@ class Dynamic(Condition):
     convex hull too.
     """
 
+    takes_every_row: ClassVar[bool] = True
+
     kind: Literal["dynamic"] = "dynamic"
     accelerations: tuple[tuple[Finite, Finite, Finite, Finite, Finite, Finite], ...] = Field(
         min_length=1, description="second derivatives of (x, y, z, roll, pitch, yaw) [m/s^2, rad/s^2]"
@@ -33,7 +35,3 @@ class Dynamic(Condition):
         accelerations = np.array(self.accelerations) * robot.dof_mask
         wrenches = dynamics_of(robot).required_wrench(places.pose, np.zeros(6), accelerations[:, None])
         return feasible(robot, places, wrenches)
-
-    def why_nowhere(self, robot: Robot) -> str | None:
-        """Return a sentence if the robot has fewer cables than degrees of freedom."""
-        return too_few_cables(robot)

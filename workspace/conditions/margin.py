@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +11,7 @@ from ...models import Robot
 from ...models.part import Finite
 from ...solvers.available_wrench import facets
 from ..condition import Condition
-from ..feasibility import rest_wrench, scaled, too_few_cables, wrench_matrices, wrench_rows
+from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
 from ..places import Places, check_places
 
 __all__ = ["Margin"]
@@ -19,6 +19,8 @@ __all__ = ["Margin"]
 
 class Margin(Condition):
     """The capacity margin at rest is at least a value [N], moments divided by `Robot.length`."""
+
+    takes_every_row: ClassVar[bool] = True
 
     kind: Literal["margin"] = "margin"
     above: Finite = Field(default=0.0, description="minimum of the margin [N]")
@@ -29,10 +31,6 @@ class Margin(Condition):
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return how much the margin is below the value, (n,) [N]."""
         return np.maximum(self.above - self.margins(robot, places), 0.0)
-
-    def why_nowhere(self, robot: Robot) -> str | None:
-        """Return a sentence if the robot has fewer cables than degrees of freedom."""
-        return too_few_cables(robot)
 
     def margins(self, robot: Robot, places: Places) -> np.ndarray:
         """Return signed distances of the wrench at rest from the boundary of the available wrench set, (n,) [N].

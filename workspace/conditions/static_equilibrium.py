@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ...models import Robot
 from ..condition import Condition
-from ..feasibility import feasible, rest_wrench, shortfall, too_few_cables
+from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
 
 __all__ = ["StaticEquilibrium"]
@@ -16,6 +16,8 @@ __all__ = ["StaticEquilibrium"]
 
 class StaticEquilibrium(Condition):
     """Tensions inside the limits balance the platform's weight."""
+
+    takes_every_row: ClassVar[bool] = True
 
     kind: Literal["static-equilibrium"] = "static-equilibrium"
 
@@ -25,7 +27,3 @@ class StaticEquilibrium(Condition):
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the distance from the required wrench to the available ones, moments over length, (n,) [N]."""
         return shortfall(robot, places, rest_wrench(robot)[None])
-
-    def why_nowhere(self, robot: Robot) -> str | None:
-        """Return a sentence if the robot has fewer cables than degrees of freedom."""
-        return too_few_cables(robot)

@@ -7,7 +7,7 @@ they can balance each of its vertices.
 from __future__ import annotations
 
 from itertools import product
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from ...models import Robot
 from ...models.part import Finite
 from ..condition import Condition
-from ..feasibility import feasible, rest_wrench, shortfall, too_few_cables
+from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
 
 __all__ = ["WrenchFeasible"]
@@ -25,6 +25,8 @@ Wrench = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 class WrenchFeasible(Condition):
     """Tensions inside the limits balance the weight and every wrench of a box or of a polytope."""
+
+    takes_every_row: ClassVar[bool] = True
 
     kind: Literal["wrench-feasible"] = "wrench-feasible"
     box: tuple[Wrench, Wrench] | None = Field(
@@ -61,10 +63,6 @@ class WrenchFeasible(Condition):
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the largest distance of a required wrench from the available ones, moments over length, (n,) [N]."""
         return shortfall(robot, places, self._wrenches(robot))
-
-    def why_nowhere(self, robot: Robot) -> str | None:
-        """Return a sentence if the robot has fewer cables than degrees of freedom."""
-        return too_few_cables(robot)
 
     def _wrenches(self, robot: Robot) -> np.ndarray:
         weight = rest_wrench(robot)
