@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .options import PLAIN, Command, JsonOption, print_json
+from .watching import progress_bar
 
 app = typer.Typer(**PLAIN)
 
@@ -27,9 +28,6 @@ def tension(
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed, accuracy and failures of every installed solver."""
-    from rich.console import Console
-    from rich.progress import Progress
-
     from ..benchmarks import tension as benchmark
     from ..errors import InputError
     from ..writing import check_writable
@@ -40,15 +38,9 @@ def tension(
         raise InputError(f"--m must be numbers of cables from 1 to 16, separated by commas, got {m!r}") from None
     if out is not None:
         check_writable(out / "tension.md")
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        shown = bar.add_task("tension distribution", total=None)
-
-        def progress(task: str, done: int, total: int) -> None:
-            bar.update(shown, description=task, completed=done, total=total)
-
+    with progress_bar("tension distribution", quiet=as_json) as progress:
         report = benchmark.run(count, repeats, cables, limit, progress)
-    written = [str(path) for path in benchmark.write(report, out)] if out is not None else []
+    written = benchmark.write(report, out) if out is not None else []
     if as_json:
         print_json({**report.to_dict(), "files": written})
     else:

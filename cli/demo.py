@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_json
+from .options import JsonOption, print_json, print_written
 from .watching import watching
 
 
@@ -20,7 +20,7 @@ def demo(
 
     with watching("planning the circle with a quadrotor that may move", quiet=as_json) as progress:
         result = flying_circle.run(folder, progress)
-    written = [str(path) for path in (*result.pictures, *result.files)]
+    written = [*result.pictures, *result.files]
     if as_json:
         halves = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict()}
         print_json({"as_expected": result.as_expected, **halves, "files": written})
@@ -29,8 +29,6 @@ def demo(
         typer.echo(result.hovering.report())
         typer.echo("\nThe same circle with a quadrotor that may move, with acceleration up to 3 m/s^2:\n")
         typer.echo(result.free.report())
-        typer.echo("\nWritten:")
-        for name in written:
-            typer.echo(f"  {name}")
+        print_written(written)
     if not result.as_expected:
         raise typer.Exit(1)

@@ -47,6 +47,6 @@ def export(
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     if as_json:
-        print_json({"robot": loaded.name, "file": str(path)})
+        print_json({"robot": loaded.name, "file": path})
     else:
         typer.echo(str(path))

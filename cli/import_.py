@@ -47,7 +47,7 @@ def caspr(
                 "cable_set": result.cable_set,
                 "cable_sets": result.cable_sets,
                 "notes": result.notes,
-                "file": None if out is None else str(out),
+                "file": out,
                 "robot": result.robot.model_dump(mode="json", exclude_none=True),
             }
         )

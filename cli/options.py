@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -40,9 +40,10 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """Print as JSON; numbers that are not finite become null, since JSON has no name for them."""
+    """Print as JSON; numbers that are not finite become null, since JSON has no name for them, and paths text."""
     import json
     import math
+    import os
 
     def clean(item: Any) -> Any:
         if isinstance(item, dict):
@@ -51,7 +52,12 @@ def print_json(value: dict[str, Any]) -> None:
             return [clean(inner) for inner in item]
         return None if isinstance(item, float) and not math.isfinite(item) else item
 
-    typer.echo(json.dumps(clean(value), indent=2))
+    typer.echo(json.dumps(clean(value), indent=2, default=os.fspath))
+
+
+def print_written(files: Iterable[object]) -> None:
+    """Print the files that a command has written."""
+    typer.echo("\n    ".join(["  Written", *map(str, files)]))
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], align: str) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .options import JsonOption, RobotArgument, print_json
+from .options import JsonOption, RobotArgument, print_json, print_written
 from .sweep import Sweeping, sweep
 from .watching import watching
 
@@ -129,12 +129,9 @@ def plan(
         if animate is not None:
             written["animation"] = planned.animate(animate, speed, fps)
     if as_json:
-        files = {name: str(path) for name, path in written.items()}
-        print_json({**planned.to_dict(), **files, "figures": [str(picture) for picture in pictures]})
+        print_json({**planned.to_dict(), **written, "figures": pictures})
     else:
         typer.echo(planned.report())
-        typer.echo("  Written")
-        for path in (*written.values(), *pictures):
-            typer.echo(f"    {path}")
+        print_written((*written.values(), *pictures))
     if not planned.feasible:
         raise typer.Exit(1)

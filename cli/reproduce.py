@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
-from .options import JsonOption, print_json
+from .options import JsonOption, print_json, print_written
+from .watching import progress_bar
 
 if TYPE_CHECKING:
-    from ..studies.accounts.account import Account, Progress
+    from ..studies.accounts.account import Account
 
 
 def reproduce(
@@ -34,16 +33,14 @@ def reproduce(
         raise InputError(f"PAPER must be one of {', '.join(PAPERS)}, got {paper!r}")
     folder = out if out is not None else Path(f"towline-{paper}")
     check_writable(folder / f"{paper}.md")
-    with _progress(quiet=as_json) as progress:
+    with progress_bar("", quiet=as_json) as progress:
         account = PAPERS[paper](progress)
-    files = [str(path) for path in write(account, folder)]
+    files = write(account, folder)
     if as_json:
         print_json({**account.to_dict(), "files": files})
     else:
         _show(account)
-        typer.echo("  Written")
-        for name in files:
-            typer.echo(f"    {name}")
+        print_written(files)
     if not account.complete:
         raise typer.Exit(1)
 
@@ -60,20 +57,3 @@ def _show(account: Account) -> None:
                 typer.echo(f"      {claim.place}: {claim.why}")
     for title, why in account.broken.items():
         typer.echo(f"  {title}: not computed: {why}")
-
-
-@contextmanager
-def _progress(quiet: bool) -> Iterator[Progress]:
-    """Show a progress bar over the chapters on standard error, if that is a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    to = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
-        line = shown.add_task("", total=None)
-
-        def update(title: str, done: int, total: int) -> None:
-            shown.update(line, description=title, completed=done, total=total)
-
-        yield update

@@ -48,7 +48,7 @@ def robots(
         result = _to_dict(robot, diagnose(robot), at_home)
         if figure is not None:
             _draw(robot, at_home, figure)
-            result["figure"] = str(figure)
+            result["figure"] = figure
         if as_json:
             print_json(result)
         else:

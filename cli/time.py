@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, RobotArgument, print_json
+from .options import JsonOption, RobotArgument, print_json, print_written
 
 
 def time(
@@ -43,10 +43,10 @@ def time(
     timing = time_along(loaded, read, grid=grid)
     file = timing.save_task(target, f"{read.name[:54]}-timed") if timing.feasible else None
     if as_json:
-        print_json({**timing.to_dict(), "file": None if file is None else str(file)})
+        print_json({**timing.to_dict(), "file": file})
     else:
         typer.echo(timing.report())
         if file is not None:
-            typer.echo(f"  Written\n    {file}")
+            print_written([file])
     if not timing.feasible:
         raise typer.Exit(1)

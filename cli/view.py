@@ -45,7 +45,7 @@ def view(
     if html is not None:
         written = save_page(subject, html)
         if as_json:
-            print_json({**summary, "file": str(written)})
+            print_json({**summary, "file": written})
         else:
             typer.echo(str(written))
         return

@@ -14,6 +14,26 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
+@contextmanager
+def progress_bar(what: str, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Show a bar while the block runs, unless `quiet`.
+
+    The block receives a function that moves the bar, of (what is being done, done, total).
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    to = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
+        line = shown.add_task(what, total=None)
+
+        def move(what: str, done: int, total: int) -> None:
+            shown.update(line, description=what, completed=done, total=total)
+
+        yield move
+
+
 class Watch:
     """A display of a solver's progress.
 

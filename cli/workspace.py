@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from .options import JsonOption, RobotArgument, numbers, print_json
+from .options import JsonOption, RobotArgument, numbers, print_json, print_written
 from .watching import counting
 
 if TYPE_CHECKING:
@@ -162,14 +162,12 @@ def workspace(
     summary = _summary(result)
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
-        print_json({**summary, "reason": reason, "file": str(target), "figure": _name(figure), "mesh": _name(mesh)})
+        print_json({**summary, "reason": reason, "file": target, "figure": figure, "mesh": mesh})
     else:
         _show(result, summary, size)
         if reason is not None:
             typer.echo(f"  {reason}")
-        typer.echo("  Written")
-        for path in written:
-            typer.echo(f"    {path}")
+        print_written(written)
     if not summary["accepted"]:
         raise typer.Exit(1)
 
@@ -180,10 +178,6 @@ def _boundary(robot: Robot, condition: Condition, data: dict[str, Any]) -> Mesh:
 
     domain = Domain.of(robot, Region.model_validate(data))
     return boundary(robot, condition, *domain.box, attitude=domain.low[3:6])
-
-
-def _name(file: Path | None) -> str | None:
-    return None if file is None else str(file)
 
 
 def _import(file: Path) -> None:
@@ -228,26 +222,20 @@ def _region(box: str | None, attitude: str | None, carriers: str, lengths: str |
     if box is not None:
         region["position"] = _ends("--box", box, "x y z")
     if attitude is not None:
+        ranged = ";" in attitude
         region["attitude"] = (
-            _ends("--attitude", attitude, "roll pitch yaw")
-            if ";" in attitude
-            else tuple(_three("--attitude", attitude))
+            _ends("--attitude", attitude, "roll pitch yaw") if ranged else numbers("--attitude", attitude, 3).tolist()
         )
     if lengths is not None:
-        low, high = numbers("--lengths", lengths, 2).tolist()
-        region["lengths"] = {"min": low, "max": high}
+        region["lengths"] = dict(zip(("min", "max"), numbers("--lengths", lengths, 2).tolist(), strict=True))
     return region
 
 
-def _ends(option: str, text: str, names: str) -> dict[str, tuple[float, ...]]:
+def _ends(option: str, text: str, names: str) -> dict[str, list[float]]:
     parts = text.split(";")
     if len(parts) != 2:
         raise InputError(f"{option} must be '{names}; {names}', got {text!r}")
-    return {"min": tuple(_three(option, parts[0])), "max": tuple(_three(option, parts[1]))}
-
-
-def _three(option: str, text: str) -> list[float]:
-    return numbers(option, text, 3).tolist()
+    return {end: numbers(option, part, 3).tolist() for end, part in zip(("min", "max"), parts, strict=True)}
 
 
 def _count(samples: float) -> int:
