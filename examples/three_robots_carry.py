@@ -15,7 +15,7 @@ result = plan(
     {
         "name": "three-robots-carry",
         "path": {
-            "kind": "waypoints",  # a smooth curve from rest to rest
+            "kind": "waypoints",  # straight legs, rounded at the points
             "points": [PICK, (*PICK[:2], HIGH), (*PLACE[:2], HIGH), PLACE],
         },
         "duration": 8,  # [s]

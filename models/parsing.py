@@ -47,7 +47,7 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
         text = read_bytes(path, "a YAML file").decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{where} must be a YAML file in UTF-8, got another text (byte {error.start})") from None
-    return parse_yaml(text, model, where)
+    return parse_yaml(text, model, where, path.parent)
 
 
 def read_bytes(path: Path, what: str) -> bytes:
@@ -74,8 +74,11 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise InputError(f"{where}: cannot be read ({reason})") from None
 
 
-def parse_yaml(text: str, model: type[Model], where: str) -> Model:
-    """Check YAML text as a `model`, or raise InputError in one line; `where` names the text in it."""
+def parse_yaml(text: str, model: type[Model], where: str, folder: Path | None = None) -> Model:
+    """Check YAML text as a `model`, or raise InputError in one line; `where` names the text in it.
+
+    Files that it names are relative to `folder`; default: the working directory.
+    """
     reader = YAML(typ="safe", pure=True)
     reader.Composer = _PlainComposer
     try:
@@ -86,13 +89,16 @@ def parse_yaml(text: str, model: type[Model], where: str) -> Model:
         raise InputError(f"{where}: is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
         raise InputError(f"{where}: must hold a mapping with {_keys(json_schema(model))}, got {shown(data)}")
-    return validate(data, model, where)
+    return validate(data, model, where, folder)
 
 
-def validate(data: dict[str, Any], model: type[Model], where: str) -> Model:
-    """Check a mapping as a `model`, or raise InputError in one line; `where` names the mapping in it."""
+def validate(data: dict[str, Any], model: type[Model], where: str, folder: Path | None = None) -> Model:
+    """Check a mapping as a `model`, or raise InputError in one line; `where` names the mapping in it.
+
+    Files that it names are relative to `folder`; default: the working directory.
+    """
     try:
-        return model.__pydantic_validator__.validate_python(data)
+        return model.__pydantic_validator__.validate_python(data, context={"folder": folder or Path()})
     except ValidationError as error:
         raise InputError(one_line(error, where, model)) from None
 
@@ -267,7 +273,8 @@ def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict
     if part in variants:
         return _resolve({"$ref": variants[part]}, schema)
     if isinstance(part, int):
-        return _resolve(node.get("items", {}), schema)
+        lists = [node, *node.get("anyOf", [])]
+        return _resolve(next((each["items"] for each in lists if "items" in each), {}), schema)
     any_key = next(iter(node.get("patternProperties", {}).values()), node.get("additionalProperties", {}))
     below = node.get("properties", {}).get(part, any_key)
     return _resolve(below if isinstance(below, dict) else {}, schema)

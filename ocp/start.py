@@ -66,7 +66,7 @@ def _of_timing(scenario: Scenario, start: Timing) -> Deviation | None:
     carriers: dict[int, AnyPath] = {
         index: start.timed(path) for index, path in start.parametrised.carriers.items() if _moves(path)
     }
-    return _along(scenario, start.path, carriers, start.path.times[-1])
+    return _along(scenario, start.path, carriers, start.duration or scenario.duration)
 
 
 def _moves(path: AnyPath) -> bool:

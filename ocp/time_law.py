@@ -7,11 +7,9 @@ it differs from the true one by the grid's interval, some tenths of a per cent, 
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..errors import InputError, SolverError
 from ..text import quantity
-from .tasks.paths import AnyPath, LinePath, RestPath, WaypointPath
+from .tasks.paths import LinePath, RestPath, WaypointPath
 from .tasks.scenario import Scenario
 from .tasks.task import Tube
 from .tasks.task_limits import TaskLimits
@@ -21,9 +19,6 @@ from .timing.timing import Timing
 __all__ = ["BOUND", "fastest"]
 
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
-PIECES = 400  # of a spline that is given to `time_along` as points: 1e-6 of its length off at most
-LOOKS = 20_001
-ON_PATH = 2e-6  # of a path's length: how far that spline may be off
 
 
 def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
@@ -36,11 +31,11 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
         return None, "not computed: carriers have time laws of their own"
     if scenario.wind_box is not None:
         return None, "not computed: in moving air the drag is not proportional to the square of the speed"
-    path = _curve(task.path)
-    if path is None:
+    path = task.path
+    if not (path.stretches and isinstance(path, LinePath | WaypointPath)) or getattr(path, "timing", "") == "uniform":
         return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
     hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
-    alone = {"path": path, "limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}
+    alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}
     try:
         timing = time_along(scenario.robot, task.model_copy(update=alone))
     except (InputError, SolverError) as error:
@@ -48,31 +43,3 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
     if timing.feasible:
         return timing, f"the fastest law takes {quantity(timing.duration, 's', 6)}"
     return timing, f"{timing.status.value} at {quantity(100 * (timing.at or 0.0), '%', 3)} of the path"
-
-
-def _curve(path: AnyPath) -> AnyPath | None:
-    """Return the same curve without rest on it; None if the path does not go from rest to rest in any duration."""
-    if not path.stretches or getattr(path, "timing", None) != "smooth":
-        return None
-    if isinstance(path, LinePath):
-        return path.model_copy(update={"timing": "uniform"})
-    return _through(path) if isinstance(path, WaypointPath) else None
-
-
-def _through(path: WaypointPath) -> WaypointPath | None:
-    """Return a natural spline through many points of a smooth path, densest at its ends; None if it deviates."""
-    shares = np.linspace(0.0, 1.0, LOOKS)
-    looks = path.by_fraction(shares).pose
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(looks, axis=0), axis=1))])
-    targets = length[-1] * (1 - np.cos(np.pi * np.arange(PIECES + 1) / PIECES)) / 2
-    at = np.interp(targets, length, shares)
-    at[[0, -1]] = 0.0, 1.0
-    points = tuple((x, y, z, roll, pitch, yaw) for x, y, z, roll, pitch, yaw in path.by_fraction(at).pose.tolist())
-    spline = WaypointPath(kind="waypoints", frame=path.frame, points=points, timing="uniform")
-    # Between the points only the deviation across the path matters: the time law decides where along it.
-    between = (targets[1:] + targets[:-1]) / 2
-    target, along, _ = path.by_fraction(np.interp(between, length, shares))
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    off = spline.by_fraction(between / length[-1]).pose - target
-    across = off - np.sum(off * along, axis=1, keepdims=True) * along
-    return spline if np.linalg.norm(across, axis=1).max() <= ON_PATH * length[-1] else None

@@ -22,7 +22,7 @@ from towline.ocp.tasks.task_limits import TaskLimits
 LASTS = 2.0  # [s]
 NODES = np.linspace(0, LASTS, 21)
 RIGHT = {"kind": "line", "start": [0, 0, 1], "end": [0.2, 0.1, 1.1]}
-POINTS = {"kind": "waypoints", "points": [[0, 0, 1], [0.1, 0.1, 1], [0.2, 0, 1.1]]}
+POINTS = {"kind": "waypoints", "blend": 0, "points": [[0, 0, 1], [0.1, 0.1, 1], [0.2, 0, 1.1]]}
 IN_CARRIER = {"kind": "line", "start": [0, 0, -1], "end": [0.05, 0, -1.1], "frame": "quad"}
 ROUND = {"quad": {"kind": "circle", "centre": [0, 0, 0], "radius": 0.05, "rate": 2 * np.pi / LASTS}}
 
@@ -85,7 +85,7 @@ def test_ends_of_the_tube(frame, coordinate):
 
 
 def test_exact_waypoints():
-    tube = {"position": 0.05, "attitude": 0.1, "waypoints": "exact"}
+    tube = {"position": 0.05, "attitude": 0.1, "ends": "free", "waypoints": "exact"}
     scenario, none = on_the_path({"path": POINTS, "tube": tube})
     assert audit(scenario, none).passed
     knot = scenario.task.path.knots(LASTS)[1]

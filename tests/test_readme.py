@@ -71,8 +71,8 @@ def run(block, namespace):
         for line in block.lines:
             shell(line)
     else:
-        assert block.language == "c", f"a block of {block.language or 'no language'}"
-        assert block.title, "a block of C without a title"
+        assert block.language in ("c", "csv"), f"a block of {block.language or 'no language'}"
+        assert block.title, f"a block of {block.language} without a title"
 
 
 def shell(line):

@@ -144,7 +144,7 @@ def test_minimum_time_on_a_curve_agrees_with_an_optimal_control_program():
     robot = load("cogiro")
     timing = time_along(robot, along(ROUND_TRIP))
     assert timing.feasible
-    best = optimal_duration(robot, ROUND_TRIP.model_copy(update={"timing": "uniform"}), 200)
+    best = optimal_duration(robot, ROUND_TRIP, 400)
     assert timing.duration == pytest.approx(best, rel=0.01)
 
 
@@ -301,14 +301,36 @@ def test_a_timed_path_is_a_path_as_others_are():
     assert parse_yaml(to_yaml(task), Task, "task") == task
 
 
-def test_uniform_waypoints_rest_nowhere():
-    path = WaypointPath(kind="waypoints", points=((0, 0, 1), (1, 0, 2, 0, 0, 0.5), (1, 1, 1)), timing="uniform")
+def test_legs_rest_nowhere_along_s():
+    path = WaypointPath(kind="waypoints", points=((0, 0, 1), (1, 0, 2, 0, 0, 0.5), (1, 1, 1)), blend=0.1)
     s, step = np.linspace(0.01, 0.99, 40), 1e-5
     before, at, after = (path.by_fraction(s + shift) for shift in (-step, 0, step))
-    np.testing.assert_allclose(at.velocity, (after.pose - before.pose) / (2 * step), atol=1e-7)
-    np.testing.assert_allclose(at.acceleration, (after.velocity - before.velocity) / (2 * step), atol=1e-3)
-    assert np.linalg.norm(path.by_fraction(np.array([0.0, 1.0])).velocity, axis=1).min() > 1
+    np.testing.assert_allclose(at.velocity, (after.pose - before.pose) / (2 * step), atol=1e-5)
+    np.testing.assert_allclose(at.acceleration, (after.velocity - before.velocity) / (2 * step), atol=1e-2)
+    assert np.linalg.norm(path.by_fraction(np.linspace(0, 1, 999)).velocity, axis=1).min() > 1
     np.testing.assert_allclose(path.by_fraction(np.array([0.0, 1.0])).pose[:, :3], [[0, 0, 1], [1, 1, 1]], atol=1e-12)
+
+
+def test_corners_and_dwells_are_rests_of_the_fastest_law():
+    """A mass below one cable goes up, dwells, comes down again, and each way has a closed form."""
+    mass, up, down = 2.0, 40 / 2.0 - GRAVITY, GRAVITY - 1 / 2.0
+    robot = point_mass([[0, 0, 4]], ["z"], mass=mass, t_min=1.0, t_max=40.0)
+    points, dwell = ((0, 0, 0), (0, 0, 1.5), (0, 0, 0.5), (0, 0, 0.8)), (0.2, 0.0, 0.7, 0.1)
+    path = WaypointPath(kind="waypoints", points=points, dwell=dwell, blend=0)
+    timing = time_along(robot, along(path))
+    best = sum(np.sqrt(2 * h * (1 / up + 1 / down)) for h in (1.5, 1.0, 0.3))
+    assert timing.feasible
+    assert timing.duration == pytest.approx(best + sum(dwell), rel=1e-3)
+    found = plan(robot, timing.task())
+    assert found.feasible, found.report()
+    times, heights = found.audit.times, found.audit.motion.pose[:, 2]
+    for k, (point, seconds) in enumerate(zip(points, dwell, strict=True)):
+        still = np.flatnonzero((np.abs(heights - point[2]) < 1e-9) & (np.abs(found.audit.motion.velocity[:, 2]) < 1e-9))
+        near = times[still] if k else times[still][times[still] < 0.5]
+        assert len(near) * times[1] == pytest.approx(seconds, abs=3e-3)
+    again = Task.model_validate(timing.task().model_dump(mode="json"))
+    assert again == timing.task()
+    assert "dwell" in timing.report()
 
 
 @pytest.mark.parametrize(
@@ -317,6 +339,11 @@ def test_uniform_waypoints_rest_nowhere():
         ({"s": (0, 1), "speeds": (0, 0)}, "must not be 0 twice in a row"),
         ({"s": (0, 0.5), "speeds": (0, 1)}, "from 0 to 1"),
         ({"s": (0, 0.6, 0.5, 1), "speeds": (0, 1, 1, 0)}, "must increase"),
+        (
+            {"s": (0, 0.5, 1), "speeds": (0, 1, 0), "dwell": (0, 1, 0)},
+            r"dwell\[1\] must be 0 s where the speed is not 0",
+        ),
+        ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "dwell": (0,)}, "dwell must have one number for each of the 3 s"),
         ({"s": (0, 0.5, 1), "speeds": (0, 1)}, "one number for each of the 3 s"),
         ({"s": (0, 0.5, 1), "speeds": (0, 1, 0), "frame": "quad"}, "must be that of along"),
     ],

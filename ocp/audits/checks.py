@@ -156,9 +156,12 @@ def _waypoints(audited: AuditedMotion) -> list[Excess]:
     scenario, path = audited.scenario, audited.scenario.task.path
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath):
         return []
+    if audited.deviation is None:
+        return []  # on its path, whatever the time law; `lay_out` accepts no path that misses its points then
     knots = np.clip(path.knots(scenario.duration), 0.0, scenario.duration)[1:-1]
-    off = np.linalg.norm(_off_path(audited, knots)[:, :3], axis=1)
-    turned = np.linalg.norm(_off_path(audited, knots)[:, 3:], axis=1)
+    missed = _off_path(audited, knots) - path.missed(scenario.duration)[1:-1]
+    missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
+    off, turned = np.linalg.norm(missed[:, :3], axis=1), np.linalg.norm(missed[:, 3:], axis=1)
     exceeded = []
     for k, time in enumerate(knots):
         about = f"platform at point {k + 2}"

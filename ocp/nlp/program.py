@@ -221,16 +221,18 @@ def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, ste
 
 
 def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
-    """Return rows that exclude a deviation at the waypoints, by the polynomial of the interval of each."""
+    """Return rows that lead the platform through the waypoints, by the polynomial of the interval of each."""
     path = scenario.task.path
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
         return []
     blocks = []
-    for share in path.knots(scenario.duration)[1:-1] / scenario.duration:
+    coordinates = [coordinate for owner, coordinate in scenario.owners() if owner is None]
+    shares, missed = path.knots(scenario.duration) / scenario.duration, path.missed(scenario.duration)[:, coordinates]
+    for share, off in zip(shares[1:-1], missed[1:-1], strict=True):
         k = min(int(share * steps), steps - 1)
         position = _polynomials(scenario, layout, X, X_end, steps, k).position
-        rows: list[Row] = [("waypoint", 0.0, 0.0)] * len(platform)
+        rows: list[Row] = [("waypoint", float(value), float(value)) for value in off]
         blocks.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
     return blocks
 

@@ -10,10 +10,12 @@ from ...models.part import Vector3
 from ...solvers import Certificate
 from ...text import quantity, quantity_row
 from ..result import Plan
+from ..tasks.paths import WaypointPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
+WORTH_A_WARNING = 1e-6  # [m], of a path outside the box of its points
 
 Fact = tuple[str, str]  # its name, and the fact with its unit
 
@@ -218,10 +220,24 @@ def _motion(plan: Plan) -> list[Fact]:
     return [
         ("duration", quantity(plan.scenario.duration, "s", digits=6)),
         ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
+        *_outside(task),
         ("tracking error", error),
         ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
         *([("wind", _task_wind(task))] if task.wind is not None else []),
     ]
+
+
+def _outside(task: Task) -> list[Fact]:
+    """Return a warning if the path leaves the box of its points."""
+    path = task.path
+    if not isinstance(path, WaypointPath):
+        return []
+    far = path.outside()
+    worst = int(far.argmax())
+    if far[worst] < WORTH_A_WARNING:
+        return []
+    text = f"the path leaves the box of its points by up to {quantity(far[worst], 'm')} along {'xyz'[worst]}"
+    return [("warning", f"{text}; the shape legs stays inside")]
 
 
 def _millimetres(metres: float) -> str:

@@ -14,6 +14,8 @@ from .task import FreeBase, GivenBase, Task
 
 __all__ = ["FixedValue", "at_rest_without_acceleration", "carrier_ends", "fixed_values", "platform_ends"]
 
+AT_REST = 1e-9  # [m/s, rad/s] and per second: rounding at the end of a path
+
 Word: TypeAlias = Literal["free", "rest", "periodic", "exact"]
 
 
@@ -87,4 +89,4 @@ def _goes_to_rest(path: AnyPath, seconds: float) -> bool:
     if isinstance(path, RestPath):
         return False
     _, velocity, acceleration = path.at(np.array([0.0, seconds]), seconds)
-    return not velocity.any() and not acceleration.any()
+    return bool(max(np.abs(velocity).max(), np.abs(acceleration).max()) <= AT_REST)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import casadi as ca
+import numpy as np
 
 from ...errors import InputError
 from ...models import Dynamics, Robot
@@ -13,6 +14,7 @@ from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
 from .ends import carrier_ends
 from .limit_list import limit_list
+from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
 from .scheme import SCHEMES
 from .task import FreeBase, GivenBase, HoldBase, Task
@@ -20,6 +22,8 @@ from .task_limits import OF_CARRIERS
 from .wind_set import WindBox
 
 __all__ = ["check_margin", "lay_out"]
+
+TOLERANCE = 1e-9  # [m, rad], of exact waypoints on their path
 
 
 def lay_out(robot: Robot, task: Task) -> Scenario:
@@ -54,6 +58,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         duration=task.seconds,
     )
     _check_times(task, where)
+    _check_waypoints(task, where)
     _check_transcription(task, limits, where)
     return scenario
 
@@ -152,12 +157,18 @@ def _check_times(task: Task, where: str) -> None:
             f"{longest:g} s, got {task.output_rate:g} 1/s"
         )
     paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
+    for name, path in paths.items():
+        if task.seconds <= path.resting:
+            raise InputError(
+                f"{where}: duration must be more than the {path.resting:g} s for which {name} dwells, got "
+                f"{task.seconds:g} s"
+            )
     if isinstance(task.duration, PositiveRange):
         for name, path in paths.items():
             if not path.stretches:
                 raise InputError(
                     f"{where}: duration must be a number [s], got a range, while {name} of kind {path.kind} has "
-                    "times of its own; paths of kind rest, line, and waypoints without times take a range"
+                    "times of its own; paths of kind rest, line, and waypoints without times and dwell take a range"
                 )
     for name, path in paths.items():
         end = path.natural_duration if path.kind in ("waypoints", "samples") else None
@@ -170,6 +181,23 @@ def _check_times(task: Task, where: str) -> None:
         raise InputError(
             f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"
         )
+
+
+def _check_waypoints(task: Task, where: str) -> None:
+    """Refuse exact waypoints that are farther from the path than the tube reaches."""
+    path, tube = task.path, task.tube
+    if tube.waypoints != "exact" or not isinstance(path, WaypointPath):
+        return
+    missed = np.abs(path.missed(task.seconds))
+    for index, (off, turned) in enumerate(
+        zip(np.linalg.norm(missed[:, :3], axis=1), missed[:, 3:].max(axis=1), strict=True)
+    ):
+        for name, value, most, unit in (("position", off, tube.radius, "m"), ("attitude", turned, tube.turn, "rad")):
+            if value > most + TOLERANCE:
+                raise InputError(
+                    f"{where}: tube.{name} must be at least {value:.3g} {unit}, by which legs pass points[{index}], "
+                    f"since tube.waypoints is exact, got {most:g} {unit}; legs with path.blend 0 rest at their points"
+                )
 
 
 def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:

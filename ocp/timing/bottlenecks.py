@@ -52,7 +52,7 @@ class Bottleneck(NamedTuple):
 
 def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: float, path: TimedPath) -> list[Bottleneck]:
     """Return the stretches of a time law along a path, with tensions `margin` [N] inside their limits."""
-    edges = np.linspace(0.0, path.times[-1], LOOKS + 1)
+    edges = np.linspace(0.0, path.natural_duration or 0.0, LOOKS + 1)
     s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
     platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
     names, shares = [], []
@@ -65,7 +65,9 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     low, high = parametrised.robot.t_min + margin, parametrised.robot.t_max - margin
     reached_limits = []
     for k in range(LOOKS):
-        if reached[k].max(initial=0.0) >= REACHED:
+        if sd[k] == sdd[k] == 0:
+            reached_limits.append("dwell")
+        elif reached[k].max(initial=0.0) >= REACHED:
             reached_limits.append(names[int(reached[k].argmax())])
         else:
             reached_limits.append(_tensions(wrench_problem(parametrised.robot, A[k], w[k], low, high)))

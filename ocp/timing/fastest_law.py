@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,12 +26,13 @@ from ..status import MotionStatus
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.lay_out import check_margin
 from ..tasks.limit_list import limit_list
-from ..tasks.paths import AnyPath, CirclePath, Curve, LinePath, SamplePath, TimedPath, WaypointPath
+from ..tasks.paths import CirclePath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from ..tasks.task import FreeBase, Task, read_task
 from ..tasks.wind_set import WindBox
+from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits, relative
-from .phase_plane import phase_plane, proofs
+from .phase_plane import PhasePlane, phase_plane, proofs
 from .timing import Timing
 
 __all__ = ["KNOWN_LIMITS", "time_along"]
@@ -54,9 +55,10 @@ def time_along(
 ) -> Timing:
     """Find the fastest motion along a task's path, from rest to lasting rest, with every tension inside its limits.
 
-    Only the geometry of the path matters: lines and waypoints are taken as uniform, so that they rest nowhere; samples
-    are waypoints unless carriers move with them. Circles end after the task's duration by their own rate, or after one
-    turn; any other duration is ignored. Carriers rest or follow given paths, walked with the same s as the platform's.
+    Only the geometry of the path matters, not its own time law. Legs rest at their points where the path has a corner
+    there (`blend: 0`), turns back or dwells; the time that it dwells is part of the duration. Circles end after the
+    task's duration by their own rate, or after one turn; any other duration is ignored. Carriers rest or follow given
+    paths, walked with the same s as the platform's.
 
     Of the task's limits those named in `KNOWN_LIMITS` hold, and the robot file's of mobile carriers that move. The
     tension limits, less the task's margin, are the facets of the available wrench set. The time law is that of TOPP-RA
@@ -90,10 +92,10 @@ def time_along(
     grid = whole_number("grid", grid, 10, MOST_INTERVALS)
     _check(robot, task)
     paths = carrier_paths(robot, task)
-    moving = {index: _curve(its, alone=False) for index, its in paths.items()}
+    moving = {index: geometry(its, alone=False) for index, its in paths.items()}
     until = task.duration if isinstance(task.path, CirclePath) and isinstance(task.duration, float) else None
     still_air = None if task.wind is None else np.zeros(3)
-    parametrised = ParametrisedPath(robot, _curve(task.path, alone=not moving), moving, until, still_air)
+    parametrised = ParametrisedPath(robot, geometry(task.path, alone=not moving), moving, until, still_air)
     return replace(_search(parametrised, _limits(robot, task, parametrised.moving), task.margin, grid), name=task.name)
 
 
@@ -124,17 +126,6 @@ def _check(robot: Robot, task: Task) -> None:
     check_margin(robot, task)
 
 
-def _curve(path: AnyPath, *, alone: bool) -> Curve:
-    """Return the geometry of a path, which rests nowhere unless the path itself does."""
-    if isinstance(path, TimedPath):
-        return path.along
-    if isinstance(path, LinePath | WaypointPath):
-        return path.model_copy(update={"timing": "uniform"})
-    if isinstance(path, SamplePath) and alone:
-        return WaypointPath(kind="waypoints", frame=path.frame, points=path.poses, timing="uniform")
-    return path
-
-
 def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
     """Return the limits of the task, and those of the carriers that move."""
     names = {robot.carriers[index].name for index in moving}
@@ -149,35 +140,43 @@ def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
 
 def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, intervals: int) -> Timing:
     """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
-    fastest, Rows = _toppra()
     weight = parametrised.robot.force_scale
     reserve, shrink, failures = RESERVE * weight, 0.0, 0
-    grid = np.linspace(0, 1, intervals + 1)
-    timing = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, grid, at=0.0)
+    timing = _without_law(
+        MotionStatus.NOT_FOUND, parametrised, limits, margin, np.linspace(0, 1, intervals + 1), at=0.0
+    )
     for _ in range(ATTEMPTS):
-        s = np.linspace(0, 1, intervals + 1)
-        plane = phase_plane(parametrised, limits, s, margin + reserve, shrink)
-        law = fastest(s, Rows(*plane.rows(weight), plane.x_max))
-        if failures == 0 and (law.x is None or not plane.rests_at_ends(weight)):
-            proven = proofs(parametrised, limits, s, margin)
+        pieces = [_piece(parametrised, limits, s, margin + reserve, shrink) for s in parametrised.pieces(intervals)]
+        s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
+        if failures == 0:
+            proven = [
+                proof
+                for piece in pieces
+                if piece.law.x is None or not piece.plane.rests_at_ends(weight)
+                for proof in proofs(parametrised, limits, piece.inside, margin)
+            ]
             if proven:
                 worst = max(proven, key=lambda each: each.certificate.shortfall)
                 proof = {"at": worst.s, "certificate": worst.certificate, "problem": worst.problem}
                 blocked = np.array([each.s for each in proven])
                 return _without_law(MotionStatus.INFEASIBLE, parametrised, limits, margin, s, blocked=blocked, **proof)
-        if law.unlimited:
+        if any(piece.law.unlimited for piece in pieces):
             raise InputError(
                 f"limits must bound the speed along this path, by one of {', '.join(KNOWN_LIMITS)}, since its tensions "
                 "do not, got none that does"
             )
-        if law.x is None:
-            timing = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, s, at=float(s[law.stuck or 0]))
+        x = [piece.law.x for piece in pieces if piece.law.x is not None]
+        if len(x) < len(pieces):
+            stuck = next(piece for piece in pieces if piece.law.x is None)
+            at = float(stuck.s[stuck.law.stuck or 0])
+            timing = _without_law(MotionStatus.NOT_FOUND, parametrised, limits, margin, s, at=at)
             failures += 1
             if failures > FINER_TRIES:
                 return timing
             intervals = min(2 * intervals, MOST_INTERVALS)
             continue
-        sd, sdd = np.sqrt(law.x), np.diff(law.x) / (2 * np.diff(s))
+        square = np.concatenate([x[0][:1], *(each[1:] for each in x)])
+        sd, sdd = np.sqrt(square), np.diff(square) / (2 * np.diff(s))
         timing = Timing(MotionStatus.FEASIBLE, parametrised, limits, margin, s, sd, sdd)
         missing, excess, at = _audit(timing, limits)
         if missing <= TOLERANCE and excess <= LIMIT_TOLERANCE:
@@ -188,6 +187,23 @@ def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, i
         reserve += 2 * missing if missing > TOLERANCE else 0.0
         shrink += 2 * excess if excess > LIMIT_TOLERANCE else 0.0
     return timing
+
+
+class _Piece(NamedTuple):
+    """A piece of the path from one rest to the next."""
+
+    s: np.ndarray
+    inside: np.ndarray  # the same places, the last one taken as the end of this piece, not as the start of the next
+    plane: PhasePlane
+    law: Any
+
+
+def _piece(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, shrink: float) -> _Piece:
+    """Solve one piece."""
+    fastest, Rows = _toppra()
+    inside = s if s[-1] == 1 else np.append(s[:-1], np.nextafter(s[-1], 0.0))
+    plane = phase_plane(parametrised, limits, inside, margin, shrink)
+    return _Piece(s, inside, plane, fastest(s - s[0], Rows(*plane.rows(parametrised.robot.force_scale), plane.x_max)))
 
 
 def _without_law(
@@ -206,7 +222,7 @@ def _without_law(
 def _audit(timing: Timing, limits: PathLimits) -> tuple[float, float, float]:
     """Return the largest missing wrench [N], the largest relative excess of another limit, and s of the worse one."""
     parametrised, robot, path = timing.parametrised, timing.parametrised.robot, timing.path
-    duration = float(path.times[-1])
+    duration = path.natural_duration or 0.0
     if duration * AUDIT_RATE > MOST_SAMPLES:
         raise InputError(
             f"limits must allow a motion of at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the audit evaluates "

@@ -11,6 +11,7 @@ only through the wrench matrix, so their motion along s enters A(s) and, if the 
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,10 @@ STILL = 1e-6  # of the largest speed along s: slower than this the path rests
 SAME = 1e-7  # [m, rad]
 LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 SIDES = 64  # of the polygon inside the circle of accelerations: it gives away 0.12 %
+LEAST = 40  # intervals between two rests, or between a rest and a bend
+SHARE_OF_BEND = 0.5  # of all intervals, that each bend has: there the limits of speed change at once
+MOST_IN_BEND = 400
+CLOSE = 1e-9  # of s
 LOOKS = 2001  # points at which the geometry is checked
 
 
@@ -89,6 +94,34 @@ class ParametrisedPath:
     def moving(self) -> list[int]:
         """Return the indices of the carriers that move along s."""
         return [index for index, path in self.carriers.items() if not isinstance(path, RestPath)]
+
+    @property
+    def dwell(self) -> dict[float, float]:
+        """Return s of the places at which platform or carriers must rest, and how long they dwell there [s]."""
+        longest: dict[float, float] = {}
+        for path in (self.path, *self.carriers.values()):
+            for s, seconds in path.rests():
+                longest[s] = max(seconds, longest.get(s, 0.0))
+        return longest
+
+    def pieces(self, intervals: int) -> list[np.ndarray]:
+        """Return the grids of s between the places of rest: about so many intervals together, more in sharp bends."""
+        bends = np.vstack([path.bends() for path in (self.path, *self.carriers.values())])
+        rests = np.array(sorted(self.dwell))
+        edges = np.concatenate([[0.0], rests[(rests > 0) & (rests < 1)], [1.0]])
+        in_bend = max(LEAST, min(round(SHARE_OF_BEND * intervals), MOST_IN_BEND))
+        grids = []
+        for start, end in pairwise(edges):
+            inner = np.unique(bends[(bends > start + CLOSE) & (bends < end - CLOSE)])
+            inner = inner[np.diff(inner, prepend=start) > CLOSE]  # one bend may begin where another ends
+            parts = np.concatenate([[start], inner, [end]])
+            middle = (parts[1:] + parts[:-1]) / 2
+            bent = ((bends[:, :1] < middle) & (middle < bends[:, 1:])).any(axis=0)
+            least = np.where(bent, in_bend, LEAST if len(edges) > 2 or inner.size else 1)
+            counts = np.maximum(np.ceil(intervals * np.diff(parts) - 1e-9).astype(int), least)
+            points = [np.linspace(*ends, n + 1)[:-1] for ends, n in zip(pairwise(parts), counts, strict=True)]
+            grids.append(np.append(np.concatenate(points), end))
+        return grids
 
     def until(self, path: Curve) -> float | None:
         """Return when a circle ends by its own time [s]; None for other paths, whose end is their own."""

@@ -198,4 +198,7 @@ class Timing:
             raise InputError(f"timing must be feasible to have a motion, got status {self.status.value!r}")
         required("path", path, PathBase)
         law = {"s": tuple(self.s.tolist()), "speeds": tuple(self.sd.tolist())}
+        dwell = self.parametrised.dwell
+        if any(dwell.values()):
+            law["dwell"] = tuple(dwell.get(s, 0.0) for s in law["s"])
         return TimedPath(kind="timed", frame=path.frame, along=path, until=self.parametrised.until(path), **law)

@@ -39,6 +39,19 @@ class PathBase(Part):
         """Return whether another duration means the same places, later or sooner."""
         return False
 
+    @property
+    def resting(self) -> float:
+        """Return for how long of the duration the path dwells at places [s]."""
+        return 0.0
+
+    def rests(self) -> list[tuple[float, float]]:
+        """Return s of each place inside at which every motion along the path must rest, and how long it dwells [s]."""
+        return []
+
+    def bends(self) -> np.ndarray:
+        """Return s where sharp bends begin and end, (n, 2): a grid needs many places there."""
+        return np.zeros((0, 2))
+
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Return pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""
         raise TypeError(f"{type(self).__name__} is not a path")

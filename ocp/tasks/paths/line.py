@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from .base import PathBase, PoseOrPosition
 from .motion import Motion
+from .rest_to_rest import rest_to_rest
 
 __all__ = ["LinePath"]
 
@@ -36,9 +37,5 @@ class LinePath(PathBase):
         s = (times / duration)[:, None]
         if self.timing == "uniform":
             return Motion(start + s * change, np.ones_like(s) * change / duration, np.zeros_like(s) * change)
-        # Acceleration and jerk are zero at both ends: carriers take places that follow the platform's acceleration, so
-        # only then can they start and end at rest too.
-        done = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
-        rate = 140 * s**3 * (1 - s) ** 3 / duration
-        rate_rate = 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s) / duration**2
-        return Motion(start + done * change, rate * change, rate_rate * change)
+        done, rate, rate_rate = (part * change for part in rest_to_rest(s))
+        return Motion(start + done, rate / duration, rate_rate / duration**2)

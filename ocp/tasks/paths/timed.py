@@ -21,16 +21,21 @@ __all__ = ["TimedPath"]
 class TimedPath(PathBase):
     """A path with a time law of its own: d2s/dt2 is constant between the given points of it, then it rests at its end.
 
+    Where ds/dt is zero it can dwell.
+
     `time_along` makes such.
     """
 
     kind: Literal["timed"]
-    along: Curve = Field(description="the path; s is the fraction of its own time")
+    along: Curve = Field(description="the path; s is the fraction of its own time, of legs of their length")
     until: Positive | None = Field(
         default=None, description="end of the path by its own time [s]; default: its natural duration"
     )
     s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, increasing")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
+    dwell: tuple[NonNegative, ...] | None = Field(
+        default=None, description="how long the path rests at each s [s]; zero where its speed is not; default: nowhere"
+    )
 
     @model_validator(mode="after")
     def _law_fits(self) -> Self:
@@ -44,31 +49,43 @@ class TimedPath(PathBase):
         for index, (before, after) in enumerate(pairwise(self.speeds)):
             if before == after == 0:
                 raise ValueError(f"speeds must not be 0 twice in a row, got 0 at {index} and {index + 1}")
+        if self.dwell is not None:
+            if len(self.dwell) != len(self.s):
+                raise ValueError(f"dwell must have one number for each of the {len(self.s)} s, got {len(self.dwell)}")
+            for index, (seconds, speed) in enumerate(zip(self.dwell, self.speeds, strict=True)):
+                if seconds > 0 and speed > 0:
+                    raise ValueError(f"dwell[{index}] must be 0 s where the speed is not 0, got {seconds:g} s")
         if self.frame != self.along.frame:
             raise ValueError(f"frame must be that of along, {self.along.frame!r}, got {self.frame!r}")
         return self
 
     @cached_property
     def times(self) -> np.ndarray:
-        """Return the time at which the path is at each s, (n,) [s]."""
+        """Return the time at which the path arrives at each s, (n,) [s]."""
         speeds = np.array(self.speeds)
-        return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (speeds[1:] + speeds[:-1]))])
+        return np.append(0.0, np.cumsum(2 * np.diff(self.s) / (speeds[1:] + speeds[:-1]) + self._dwell[:-1]))
+
+    @cached_property
+    def _dwell(self) -> np.ndarray:
+        return np.zeros(len(self.s)) if self.dwell is None else np.array(self.dwell)
 
     @property
     @override
     def natural_duration(self) -> float | None:
-        return float(self.times[-1])
+        return float(self.times[-1] + self._dwell[-1])
 
     def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
         knots, s, speeds = self.times, np.array(self.s), np.array(self.speeds)
         k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
         rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (2 * (s[k + 1] - s[k]))
-        since = np.minimum(times, knots[-1]) - knots[k]
+        since = np.minimum(times, knots[-1]) - knots[k] - self._dwell[k]
         # The last instant belongs to the motion, as the first does: d2s/dt2 counts there too.
-        over = times > knots[-1] * (1 + 1e-12)
-        at = s[k] + since * (speeds[k] + since * rate / 2)
-        return np.minimum(at, 1.0), np.where(over, 0.0, speeds[k] + since * rate), np.where(over, 0.0, rate)
+        still = (times > knots[-1] * (1 + 1e-12)) | (since < 0)
+        at = s[k] + np.maximum(since, 0.0) * (speeds[k] + since * rate / 2)
+        # Where the path turns at once, the acceleration before the place must not be taken along what comes after it.
+        end = np.where(times < knots[k + 1], np.nextafter(s[k + 1], 0.0), s[k + 1])
+        return np.minimum(at, end), np.where(still, 0.0, speeds[k] + since * rate), np.where(still, 0.0, rate)
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:

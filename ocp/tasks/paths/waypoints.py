@@ -1,73 +1,213 @@
-"""`WaypointPath`: a path through given poses."""
+"""`WaypointPath`: a path through given poses, of straight legs or as a spline."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
-from typing import Literal, Self
+from pathlib import Path
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
-from ....models.part import Finite
+from ....models.part import Finite, NonNegative
 from .base import PathBase, PoseOrPosition, check_times
+from .legs import Legs
 from .motion import Motion
+from .point_file import read_points
+from .waypoint_spline import WaypointSpline
 
 __all__ = ["WaypointPath"]
 
+BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
+LOOKS = 2001  # at the box of the points
+GIMBAL = 0.05  # [rad] from a pitch of 90 degrees
+GONE = {
+    "smooth": "write 'shape: spline' for a smooth curve through the points, or nothing for straight legs",
+    "uniform": "write nothing, for straight legs, which `towline time` takes at any speed",
+}
+
+
+def _or_file(schema: dict[str, Any]) -> None:
+    """Add the name of a file to what a schema accepts."""
+    points = {key: schema.pop(key) for key in ("type", "items", "minItems") if key in schema}
+    schema["anyOf"] = [points, {"type": "string"}]
+
 
 class WaypointPath(PathBase):
-    """A spline through given poses.
+    """Straight legs through given poses, each from rest to rest, where each leg starts before the last one has ended.
 
-    Angles are taken as they are: from 3.1 to -3.1 rad is a turn of 6.2 rad, not of 0.08.
+    The path stays inside the box of its points and passes them at a distance of at most `blend`; where it turns back,
+    where it dwells, and everywhere if `blend` is 0, it rests at them. Attitudes turn on the shortest way: from 3.1 to
+    -3.1 rad is a turn of 0.08 rad. In lengths a radian counts as a metre.
+
+    As a `spline` it is a curve of degree 5 from rest to rest that goes exactly through the points, and leaves their
+    box.
     """
 
     kind: Literal["waypoints"]
-    points: tuple[PoseOrPosition, ...] = Field(min_length=2, description="two poses or positions or more [m, rad]")
+    points: tuple[PoseOrPosition, ...] = Field(
+        min_length=2,
+        json_schema_extra=_or_file,
+        description="two poses or positions or more [m, rad]; in a task also the name of a file of them, .csv with "
+        "units in its header or .gcode, relative to the task file",
+    )
+    shape: Literal["legs", "spline"] = Field(
+        default="legs", description="legs: straight, rounded at the points; spline: a smooth curve of degree 5"
+    )
+    blend: NonNegative | None = Field(
+        default=None,
+        description="of legs: largest distance from the points [m]; 0: rest at each; default: 1 % of the span of the "
+        "points",
+    )
     times: tuple[Finite, ...] | None = Field(
         default=None,
-        description="time of each point, from 0 on, increasing [s]; default: by distance over the duration",
+        description="when the path passes each point, from 0 on, increasing [s]; default: by distance over the "
+        "duration",
     )
-    timing: Literal["smooth", "uniform"] = Field(
-        default="smooth",
-        description="smooth: of degree 7, from rest to rest, acceleration and jerk zero there; uniform: the natural "
-        "cubic, which rests nowhere",
+    dwell: tuple[NonNegative, ...] | None = Field(
+        default=None,
+        description="of legs: how long the path rests at each point [s]; part of the duration, after the times; "
+        "default: nowhere",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, dict):
+            return data
+        if "timing" in data:
+            known = GONE.get(str(data["timing"]), GONE["smooth"])
+            raise ValueError(f"'timing' must be left out of waypoints: {known}")
+        if not isinstance(data.get("points"), str):
+            return data
+        read = read_points(data["points"], (info.context or {}).get("folder", Path()))
+        for name in read:
+            if name != "points" and data.get(name) is not None:
+                raise ValueError(f"{name} must be left out, since {data['points']!r} has them")
+        return data | read
+
     @model_validator(mode="after")
-    def _times_fit(self) -> Self:
+    def _fits(self) -> Self:
         if self.times is not None:
             check_times(self.times, len(self.points))
+        if self.shape == "spline":
+            for name in ("blend", "dwell"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name} must be left out with the shape spline, which rests only at its ends")
+            self._spline.check()
+            return self
         for index, (before, after) in enumerate(pairwise(self.points)):
             if before == after and self.times is None:
-                raise ValueError(f"points[{index + 1}] must differ from points[{index}] unless there are times")
+                raise ValueError(
+                    f"points[{index + 1}] must differ from points[{index}] unless there are times; to rest at a "
+                    "point, write dwell"
+                )
+        if self.dwell is not None:
+            self._check_dwell(self.dwell)
+        self._check_pitch()
         return self
+
+    def _check_dwell(self, dwell: tuple[float, ...]) -> None:
+        if len(dwell) != len(self.points):
+            raise ValueError(f"dwell must have one number for each of the {len(self.points)} points, got {len(dwell)}")
+        for index, (before, after) in enumerate(pairwise(self.times or ())):
+            if dwell[index] >= after - before:
+                raise ValueError(
+                    f"dwell[{index}] must be less than the {after - before:g} s from point to point by times, got "
+                    f"{dwell[index]:g} s"
+                )
+
+    def _check_pitch(self) -> None:
+        legs = self._legs
+        if legs.attitudes.constant:
+            return
+        s, angles = legs.angles
+        worst = int(np.abs(angles[:, 1]).argmax())
+        if np.abs(angles[worst, 1]) > np.pi / 2 - GIMBAL or np.isnan(angles).any():
+            leg = int(np.searchsorted(legs.places[1:-1], s[worst], side="right"))
+            raise ValueError(
+                f"points[{leg}] to points[{leg + 1}] must keep the pitch {GIMBAL:g} rad away from 90 degrees, where "
+                f"roll and yaw mean the same, got {np.degrees(angles[worst, 1]):.4g} degrees"
+            )
+
+    @property
+    def _legs(self) -> Legs:
+        return _legs(self.points, self.blend, self.times, self.dwell)
+
+    @property
+    def _spline(self) -> WaypointSpline:
+        return _spline(self.points, self.times)
 
     @property
     @override
     def natural_duration(self) -> float | None:
-        return None if self.times is None else self.times[-1]
+        return None if self.times is None else self.times[-1] + (self.dwell or (0.0,))[-1]
 
     @property
     @override
     def stretches(self) -> bool:
-        return self.times is None
+        return self.times is None and not self.resting
+
+    @property
+    @override
+    def resting(self) -> float:
+        return sum(self.dwell or ())
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        from scipy.interpolate import CubicSpline, make_interp_spline
-
-        points, knots = np.array(self.points), self.knots(duration)
-        if self.timing == "uniform":
-            natural = CubicSpline(knots, points, bc_type="natural")
-            return Motion(natural(times), natural(times, 1), natural(times, 2))
-        at_rest = [(derivative, np.zeros(6)) for derivative in (1, 2, 3)]
-        spline = make_interp_spline(knots, points, k=7, bc_type=(at_rest, at_rest))
-        return Motion(spline(times), spline(times, 1), spline(times, 2))
+        shape = self._spline if self.shape == "spline" else self._legs
+        return shape.at(np.asarray(times, dtype=float), duration)
 
     def knots(self, duration: float) -> np.ndarray:
-        """Return the times at which the path is at its points [s]."""
-        if self.times is not None:
-            return np.array(self.times)
-        steps = np.linalg.norm(np.diff(np.array(self.points), axis=0), axis=1)  # a radian counts as a metre
-        return np.concatenate([[0], np.cumsum(steps)]) / steps.sum() * duration
+        """Return the times at which the path passes its points [s]; where it dwells, at which it arrives."""
+        return self._spline.knots(duration) if self.shape == "spline" else self._legs.knots(duration)
+
+    def missed(self, duration: float) -> np.ndarray:
+        """Return how far the points are from the path at its knots, (n, 6) [m, rad]."""
+        missed = np.array(self.points) - self.at(self.knots(duration), duration).pose
+        missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
+        return missed
+
+    def outside(self) -> np.ndarray:
+        """Return how far the path leaves the box of its points along x, y and z, (3,) [m]."""
+        duration = self.natural_duration or self.resting + 1.0
+        place = self.at(np.linspace(0.0, duration, LOOKS), duration).pose[:, :3]
+        points = np.array(self.points)[:, :3]
+        return np.maximum(points.min(axis=0) - place, place - points.max(axis=0)).max(axis=0)
+
+    @override
+    def by_fraction(self, s: np.ndarray, until: float | None = None) -> Motion:
+        """Return pose and derivatives by s; of legs it is in proportion to their length, with `times` to the time."""
+        return super().by_fraction(s, until) if self.shape == "spline" else self._legs.by_fraction(s)
+
+    @override
+    def rests(self) -> list[tuple[float, float]]:
+        return [] if self.shape == "spline" else self._legs.rests()
+
+    @override
+    def bends(self) -> np.ndarray:
+        return super().bends() if self.shape == "spline" else self._legs.bends()
+
+
+@lru_cache(maxsize=64)
+def _legs(
+    points: tuple[tuple[float, ...], ...],
+    blend: float | None,
+    times: tuple[float, ...] | None,
+    dwell: tuple[float, ...] | None,
+) -> Legs:
+    poses = np.array(points)
+    legs = Legs(
+        points=poses,
+        blend=0.0 if blend is None else blend,
+        times=None if times is None else np.array(times),
+        dwell=np.zeros(len(points)) if dwell is None else np.array(dwell),
+    )
+    return legs if blend is not None else legs.blended(BLEND)
+
+
+@lru_cache(maxsize=64)
+def _spline(points: tuple[tuple[float, ...], ...], times: tuple[float, ...] | None) -> WaypointSpline:
+    return WaypointSpline(np.array(points), None if times is None else np.array(times))

@@ -1,0 +1,39 @@
+"""`rest_to_rest`: the law of a motion from rest to rest, and its inverse.
+
+Acceleration and jerk are zero at both ends: carriers take places that follow the platform's acceleration, so only then
+can they start and end at rest too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["inverse", "rest_to_rest"]
+
+STEPS = 10  # of Newton's method: more than double precision needs
+
+
+def rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the share of the way and its first two derivatives, at the shares s of the time; before and after: rest.
+
+    With s from 0 to 1, phi(s) = s^4 (35 - 84 s + 70 s^2 - 20 s^3), and phi(1 - s) = 1 - phi(s).
+    """
+    s = np.clip(s, 0.0, 1.0)
+    left = 1 - s
+    done = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
+    return done, 140 * (s * left) ** 3, 420 * (s * left) ** 2 * (1 - 2 * s)
+
+
+def inverse(done: np.ndarray) -> np.ndarray:
+    """Return the shares of the time at which these shares of the way are done, from 0 to 1/2.
+
+    Newton's method on the fourth root of phi, which is concave there: from the left it never goes too far.
+    """
+    target = np.asarray(done, dtype=float) ** 0.25
+    s = target / 35**0.25
+    for _ in range(STEPS):
+        inner = 35 - 84 * s + 70 * s**2 - 20 * s**3
+        root = inner**0.25
+        slope = root + s * (-84 + 140 * s - 60 * s**2) / (4 * inner / root)
+        s = s + (target - s * root) / slope
+    return s
