@@ -311,6 +311,13 @@ def test_legs_rest_nowhere_along_s():
     np.testing.assert_allclose(path.by_fraction(np.array([0.0, 1.0])).pose[:, :3], [[0, 0, 1], [1, 1, 1]], atol=1e-12)
 
 
+def test_a_leg_of_a_millimetre_is_timed_too():
+    points = [[0, 0, 2], [1, 1, 2.3], [1.0005, 0.9992, 2.3003], [-0.5, 0.3, 1.8]]
+    timings = [time_along("cogiro", along({"kind": "waypoints", "points": points, "blend": b})) for b in (None, 0)]
+    assert all(timing.feasible for timing in timings)
+    assert timings[0].duration < timings[1].duration  # which rests at both
+
+
 def test_corners_and_dwells_are_rests_of_the_fastest_law():
     """A mass below one cable goes up, dwells, comes down again, and each way has a closed form."""
     mass, up, down = 2.0, 40 / 2.0 - GRAVITY, GRAVITY - 1 / 2.0

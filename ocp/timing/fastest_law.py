@@ -44,6 +44,8 @@ ATTEMPTS = 8
 MOST_INTERVALS = 6400
 FINER_TRIES = 2  # after a grid on which the search ended without a law
 RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
+LARGEST_RESERVE = 0.01  # of the weight
+LARGEST_SHRINK = 0.01
 COARSE = 1e-4  # of the weight or of a limit: a larger violation needs a finer grid, a smaller one some distance
 
 
@@ -184,8 +186,9 @@ def _search(parametrised: ParametrisedPath, limits: PathLimits, margin: float, i
         timing = replace(timing, status=MotionStatus.NOT_FOUND, violation=missing, at=at)
         if missing > COARSE * weight or excess > COARSE:
             intervals = min(2 * intervals, MOST_INTERVALS)
-        reserve += 2 * missing if missing > TOLERANCE else 0.0
-        shrink += 2 * excess if excess > LIMIT_TOLERANCE else 0.0
+        # A grid too coarse for a bend misses it by so much that as large a distance would leave no tension at all.
+        reserve = min(reserve + 2 * missing * (missing > TOLERANCE), LARGEST_RESERVE * weight)
+        shrink = min(shrink + 2 * excess * (excess > LIMIT_TOLERANCE), LARGEST_SHRINK)
     return timing
 
 
