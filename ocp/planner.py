@@ -27,7 +27,7 @@ from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
-from .nlp.solver import Outcome, Progress, Solver
+from .nlp.solver import MANY, Outcome, Progress, Solver
 from .rest_margin import rest_margin
 from .result import Plan, Relaxed
 from .search import ENDS, Search
@@ -45,6 +45,7 @@ from .violation import relative_violation
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
 COARSE = 50  # steps: from four times as many on, the program of so few is solved first
+COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 100 steps then takes a third of the time
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
@@ -260,10 +261,10 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
 
 def _coarse(search: Search) -> Deviation | None:
     """Return the optimum on a coarse mesh, to start a fine one from; None if that would save no time."""
-    steps = search.scenario.task.steps
-    if steps < 4 * COARSE or search.knows(Mesh(steps)):
+    steps, coarse = search.scenario.task.steps, COARSE_OF_MANY if search.scenario.count > MANY else COARSE
+    if steps < 4 * coarse or search.knows(Mesh(steps)):
         return None
-    outcome = search.solve("coarse program", Mesh(COARSE), None)
+    outcome = search.solve("coarse program", Mesh(coarse), None)
     return outcome.deviation if outcome.success else None
 
 
