@@ -28,8 +28,9 @@ from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
+from .relaxations import other_duration, other_limits
 from .rest_margin import rest_margin
-from .result import Plan, Relaxed
+from .result import Plan
 from .search import ENDS, Search
 from .start import deviation_from
 from .status import MotionStatus
@@ -50,8 +51,6 @@ RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
 NO_SLACK = 1e-6  # of the weight: a motion with less missing at its nodes is a start for another try
-LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
-LONGEST = 100.0  # times the requested duration: a longer one does not help
 
 
 def plan(
@@ -87,7 +86,7 @@ def plan(
         With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves
         only its duration free; or `not-found`, with the certificate at the worst time of the closest motion known,
         or with the limits that this exceeds. `Plan.stages` record the steps, `Plan.infeasible_spans` when tensions do
-        not exist, `Plan.relaxed` a feasible duration.
+        not exist, `Plan.relaxations` what would do: a duration, or looser limits.
 
     Raises
     ------
@@ -168,8 +167,12 @@ def _fixed_motion(search: Search) -> Plan:
         if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, audit):
             return chosen
         status = MotionStatus.NOT_FOUND
-    relaxed = None if audit.passed else _longer(search, search.scenario, _durations(search, search.scenario))
-    return Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, relaxed=relaxed)
+    plan = Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent)
+    if audit.passed:
+        return plan
+    left = _durations(search, search.scenario)
+    relaxed = other_duration(search, search.scenario, left, audit) + other_limits(search, search.scenario, None, audit)
+    return replace(plan, relaxations=tuple(relaxed))
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
@@ -178,21 +181,6 @@ def _durations(search: Search, scenario: Scenario) -> Durations | None:
         left = durations(scenario)
         stage.message = _message(left)
     return left
-
-
-def _longer(search: Search, scenario: Scenario, left: Durations | None) -> Relaxed | None:
-    """Return the nearest duration at which a scenario's motion is possible; None if there is none."""
-    requested = scenario.duration
-    if left is None or not left.exist:
-        return None
-    near = min(max(requested, LONGER * left.shortest), left.longest / LONGER)
-    if near < left.shortest or near > LONGEST * requested:
-        return None
-    longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
-    audit = search.audit_motion(longer, None, f"audit, duration {quantity(near, 's')}")
-    if not audit.passed:
-        return None
-    return Relaxed("duration", "s", requested, near, Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0))
 
 
 def _message(left: Durations | None) -> str:
@@ -255,8 +243,8 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
-    relaxed = _longer(search, slowest, left)
-    return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, relaxed=relaxed), own
+    relaxed = other_duration(search, slowest, left, audit) + other_limits(search, slowest, None, audit)
+    return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, relaxations=tuple(relaxed)), own
 
 
 def _coarse(search: Search) -> Deviation | None:
@@ -279,9 +267,16 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
             short = quantity(closest.slack, "N")
-            return search.best(f"the solver's motion with the least missing wrench is short by {short} at its nodes")
+            return _closest(search, f"the motion with the least missing wrench is short by {short} at its nodes")
         outcome = search.solve("nonlinear program", Mesh(steps), closest.deviation)
-    return search.best(_refine(search, outcome))
+    return _closest(search, _refine(search, outcome))
+
+
+def _closest(search: Search, reason: str) -> Plan:
+    """Return the best plan; if it is not feasible, with the limits that its motion keeps if they are looser."""
+    plan = search.best(reason)
+    relaxed = [] if plan.feasible else other_limits(search, plan.scenario, plan.deviation, plan.audit)
+    return replace(plan, relaxations=tuple(relaxed))
 
 
 def _refine(search: Search, outcome: Outcome) -> str:

@@ -55,8 +55,9 @@ class Plan:
         The steps of the planner, in order, with their messages and times.
     objective
         Value of the objective that the solver reached, where it solved a program; a plan without one has None.
-    relaxed
-        If not feasible: a task near this one that is feasible, if the planner knows one.
+    relaxations
+        If not feasible: fields of tasks near this one that are feasible, as far as the planner knows some. Those with
+        the same plan have to change together.
     """
 
     scenario: Scenario
@@ -71,7 +72,7 @@ class Plan:
     iterates: tuple[tuple[int, float, float], ...] = ()
     stages: tuple[Stage, ...] = ()
     objective: float | None = None
-    relaxed: Relaxed | None = None
+    relaxations: tuple[Relaxed, ...] = ()
 
     @property
     def feasible(self) -> bool:
@@ -109,6 +110,11 @@ class Plan:
         """
         return None if self.feasible else self.audit.certificate
 
+    @property
+    def relaxed(self) -> Relaxed | None:
+        """Return the first of the relaxations; None if there is none."""
+        return next(iter(self.relaxations), None)
+
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:
         """Return a certificate for each span of time without tensions inside their limits; see `infeasible_spans`."""
@@ -131,7 +137,7 @@ class Plan:
             "audit": self.audit.to_dict(),
             "certificate": None if self.certificate is None else self.certificate.to_dict(),
             "infeasible_spans": [certificate.to_dict() for certificate in self.infeasible_spans],
-            "relaxed": None if self.relaxed is None else self.relaxed.to_dict(),
+            "relaxations": [relaxed.to_dict() for relaxed in self.relaxations],
             "stages": [stage._asdict() for stage in self.stages],
         }
 
@@ -236,7 +242,7 @@ class Relaxed:
     Attributes
     ----------
     name, unit
-        The field of the task that differs, and its unit.
+        The field of the task that differs, in words if it has no name, and its unit.
     requested, possible
         Its value in the task, and the nearest value for which a feasible plan is known.
     plan

@@ -9,7 +9,7 @@ import numpy as np
 from ...models.part import Vector3
 from ...solvers import Certificate
 from ...text import quantity, quantity_row
-from ..result import Plan
+from ..result import Plan, Relaxed
 from ..tasks.paths import WaypointPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
@@ -153,13 +153,17 @@ def _reasons(plan: Plan) -> list[Fact]:
             ("limits", _bounds(plan, certificate) or text.limits),
         ]
     facts += [("limit exceeded", str(excess)) for excess in plan.audit.excess]
-    if (relaxed := plan.relaxed) is not None:
-        possible = quantity(relaxed.possible, relaxed.unit)
+    return facts + [_relaxation(plan, relaxed) for relaxed in plan.relaxations]
+
+
+def _relaxation(plan: Plan, relaxed: Relaxed) -> Fact:
+    fact = f"{quantity(relaxed.possible, relaxed.unit)} (audited)"
+    if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
         side, other = ("shortest", "; `towline time` computes the fastest time law") if longer else ("longest", "")
-        fact = f"{possible} (audited), about the {side} with the task's time law{other}"
-        facts.append((f"feasible {relaxed.name}", fact))
-    return facts
+        return "feasible duration", f"{fact}, about the {side} with the task's time law{other}"
+    others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
+    return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")
 
 
 def _bounds(plan: Plan, certificate: Certificate) -> str:

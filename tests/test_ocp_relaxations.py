@@ -1,0 +1,97 @@
+"""What a report offers in place of an infeasible task is feasible when it is planned, and little less is not."""
+
+import numpy as np
+import pytest
+
+from towline.models import load
+from towline.ocp import MotionStatus, plan
+
+ROBOT = load("ipanema-1")
+LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
+TASK = {"path": LINE, "duration": 2}
+BALL = {"kind": "sphere", "name": "post", "centre": [0.25, 0.15, 2.0], "radius": 0.2}
+
+
+def with_change(task, relaxed):
+    """The task with what is offered, by the words of the offer."""
+    name, value = relaxed.name, relaxed.possible
+    if name in ("duration", "margin"):
+        return task | {name: value}
+    limits = dict(task["limits"])
+    if name.startswith("clearance of "):
+        about = name.split()[2]
+        return task | {"limits": limits | {"keep_out": [limits["keep_out"][0] | {about: value}]}}
+    field, _, side = name.removeprefix("limits.").partition(".")
+    if not side:
+        return task | {"limits": limits | {field: value}}
+    side, _, axis = side.partition(", ")
+    bound = dict(limits[field])
+    bound[side] = [value if "xyz"[i] == axis else old for i, old in enumerate(bound[side])] if axis else value
+    return task | {"limits": limits | {field: bound}}
+
+
+@pytest.mark.parametrize(
+    ("limits", "offered"),
+    [
+        ({"platform_speed": 0.3}, {"duration", "limits.platform_speed"}),
+        ({"platform_acceleration": 0.5}, {"duration", "limits.platform_acceleration"}),
+        ({"cable_speed": 0.2}, {"duration", "limits.cable_speed"}),
+        ({"cable_length": {"min": 3.2, "max": 9.0}}, {"limits.cable_length.min"}),
+        ({"platform_box": {"min": [-1, -1, 0], "max": [1, 1, 1.1]}}, {"limits.platform_box.max, z"}),
+        ({"cable_clearance": 0.5}, {"limits.cable_clearance"}),
+        ({"keep_out": [{**BALL, "platform": 1.0, "cables": None}]}, {"clearance of platform from post"}),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_what_is_offered_is_feasible_and_little_less_is_not(limits, offered):
+    task = TASK | {"limits": limits}
+    planned = plan(ROBOT, task)
+    assert planned.status is MotionStatus.INFEASIBLE
+    assert {relaxed.name for relaxed in planned.relaxations} == offered
+    for relaxed in planned.relaxations:
+        assert plan(ROBOT, with_change(task, relaxed)).feasible
+        assert relaxed.plan.audit.passed
+        assert f"feasible {relaxed.name}" in planned.report()
+        nearly = relaxed.possible + 0.01 * (relaxed.requested - relaxed.possible)
+        less = type(relaxed)(relaxed.name, relaxed.unit, relaxed.requested, nearly, relaxed.plan)
+        assert not plan(ROBOT, with_change(task, less)).feasible
+
+
+def test_the_margin_that_is_offered_is_the_largest():
+    task = {"path": {**LINE, "start": [0, 0, 2], "end": [1, 1, 2.5]}, "duration": 3, "margin": 400}
+    planned = plan("cogiro", task)
+    (relaxed,) = planned.relaxations
+    assert relaxed.name == "margin"
+    assert plan("cogiro", task | {"margin": relaxed.possible}).feasible
+    assert not plan("cogiro", task | {"margin": relaxed.possible + 1.0}).feasible
+
+
+def test_limits_that_are_exceeded_together_are_offered_together():
+    task = TASK | {"limits": {"platform_speed": 0.3, "cable_speed": 0.2}}
+    planned = plan(ROBOT, task)
+    both = [relaxed for relaxed in planned.relaxations if relaxed.name != "duration"]
+    assert len({id(relaxed.plan) for relaxed in both}) == 1
+    for relaxed in both:
+        task = with_change(task, relaxed)
+    assert plan(ROBOT, task).feasible
+    assert "together with limits." in planned.report()
+
+
+def test_nothing_is_offered_inside_an_obstacle_or_without_tensions():
+    inside = {"keep_out": [{**BALL, "centre": [0.25, 0.15, 1.1], "cables": None}]}
+    assert not plan(ROBOT, TASK | {"limits": inside}).relaxations
+    outside = {**LINE, "end": [9.0, 0.3, 1.2]}
+    assert not plan(ROBOT, {"path": outside, "duration": 2}).relaxations
+
+
+def test_the_closest_motion_of_a_tube_offers_what_it_keeps():
+    """In a tube of 1 cm about the line the clearance of 1 m cannot be kept; what is offered can, with the same tube."""
+    task = TASK | {"tube": {"position": 0.01}, "steps": 20}
+    task |= {"limits": {"keep_out": [{**BALL, "platform": 0.7, "cables": None}]}}
+    planned = plan(ROBOT, task)
+    assert not planned.feasible
+    for relaxed in planned.relaxations:
+        assert relaxed.possible < 0.7
+        assert plan(ROBOT, with_change(task, relaxed)).feasible
+    away = np.linalg.norm(np.array(BALL["centre"]) - [0.25, 0.15, 1.1])
+    assert all(relaxed.possible < away - 0.2 + 0.01 for relaxed in planned.relaxations)
