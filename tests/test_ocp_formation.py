@@ -25,7 +25,7 @@ def walls():
 
 def there_and_back(**changes):
     task = {
-        "path": {"kind": "waypoints", "points": [[-3, 0, 0], [3, 0, 0], [-3, 0, 0]]},
+        "path": {"kind": "waypoints", "shape": "spline", "points": [[-3, 0, 0], [3, 0, 0], [-3, 0, 0]]},
         "duration": 16,
         "steps": 64,
         "tube": {"position": "free", "attitude": "free", "ends": "exact", "waypoints": "exact"},
