@@ -102,6 +102,8 @@ def slabs_in_lanes(n, m, W, V):
     _least_norm(n, m, W)
     good = (load(W, GOOD) > 0.0) & (load(W, GOOD_MATRIX) > 0.0)
     slack = load(W, SLACKS)
+    doubt = slack * _NEAR
+    point = m - n == 1  # the null space is a line and the edge of a slab is a point
     excluded = good & ~good
     z0, z1 = splat(0.0), splat(0.0)
     pull, length, pull_other = splat(0.0), splat(0.0), splat(0.0)  # multipliers of the limits that z rests on
@@ -126,18 +128,25 @@ def slabs_in_lanes(n, m, W, V):
         edge = (where(below, low, high) - s) * inverse
         along0, along1 = -b * root, a * root
         base0, base1 = a * edge, b * edge
-        start, stop = splat(-np.inf), splat(np.inf)
+        start, stop = splat(0.0 if point else -np.inf), splat(0.0 if point else np.inf)
         at_start, at_stop = splat(-1.0), splat(-1.0)
         den_start, den_stop, dot_start, dot_stop = splat(1.0), splat(1.0), splat(0.0), splat(0.0)
         for j in range(i):
             a_j, b_j = load(W, cable(N0, m) + j), load(W, cable(N1, m) + j)
             here = load(W, cable(S_, m) + j) + a_j * base0 + b_j * base1
+            low_j, high_j = load(W, cable(LOW, m) + j) - here, load(W, cable(HIGH, m) + j) - here
+            near = (low_j > -doubt) | (high_j < doubt)
+            if point:
+                # Slab j contains the point, or excludes it beyond doubt, or rounding decides.
+                under, over = low_j > doubt, high_j < -doubt
+                good = good & ~(moves & near & ~(under | over))
+                at_start, at_stop = where(under, splat(1.0 * j), at_start), where(over, splat(1.0 * j), at_stop)
+                start, stop = where(under, low_j, start), where(over, high_j, stop)
+                continue
             den = a_j * along0 + b_j * along1
             parallel = magnitude(den) < PARALLEL
-            low_j, high_j = load(W, cable(LOW, m) + j) - here, load(W, cable(HIGH, m) + j) - here
             # Where a slab whose limit is near is nearly parallel, rounding decides where it is met.
-            near = (magnitude(den) < _STEEP) & ((low_j > -slack * _NEAR) | (high_j < slack * _NEAR))
-            good = good & ~(moves & near)
+            good = good & ~(moves & near & (magnitude(den) < _STEEP))
             inverse = 1.0 / den
             low_j, high_j = low_j * inverse, high_j * inverse
             turned = den < 0.0

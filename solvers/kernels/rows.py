@@ -22,7 +22,7 @@ __all__ = ["solve_rows"]
 
 
 @compilable()
-def _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, answers):
+def _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, t, d, info, residual, status):
     """Solve the rows `members`, and leave those that need more care unsure; `keep` if W has their matrix already.
 
     y, n numbers for each row from `start`, keeps multipliers from one turn to the next.
@@ -41,14 +41,15 @@ def _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y
         for i in range(n):
             scatter(y, by_wrench, i - start * n, load(V, i))
     judge(soft > 0.0, n, m, W)
-    t, d, info, residual, status = answers
     code, proven = load(W, GOOD), load(W, PROVEN) > 0.0
     by_row, by_two, by_cable = places(members, 1), places(members, 2), places(members, m)
     if soft == 0.0:
         code = where(proven, splat(1.0 * INFEASIBLE), code)
     scatter(status, by_row, 0, code)
-    scatter(info, by_two, 1, where(proven, load(W, SHORTFALL), splat(np.nan)))
-    if any_of(proven):
+    any_proven = any_of(proven)
+    if any_proven or soft > 0.0:
+        scatter(info, by_two, 1, where(proven, load(W, SHORTFALL), splat(np.nan)))
+    if any_proven:
         scatter(info, by_two, 0, load(W, SUPPORT))
         for i in range(n):
             scatter(d, by_wrench, i, load(W, wrench(D, n, m) + i))
@@ -78,7 +79,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
         shortfall (rows * 2) where the status is not OPTIMAL, nan in the shortfall without proof; and codes (rows).
         `status` comes with UNSURE in each row to solve. Elsewhere they get numbers that mean nothing.
     """
-    given, answers = (A, w, lower, upper, ref, weights, length), (t, d, info, residual, status)
+    given = (A, w, lower, upper, ref, weights, length)
     W, V = vectors(lane_size(n, m)), vectors(max(newton_size(n, m), slabs_size(n, m)))
     shared = per[0] == 0 and per[5] == 0 and per[6] == 0
     slabs = soft == 0.0 and 0 <= m - n <= 2
@@ -87,11 +88,13 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
     left = np.arange(start, stop)
     y = np.zeros(0 if slabs else (stop - start) * n)
     for turn in range(turns):
-        filled = left[np.minimum(np.arange(left.size + -left.size % WIDTH), left.size - 1)]  # by repeating the last row
+        filled = np.concatenate((left, np.repeat(left[-1:], -left.size % WIDTH)))
         for first in range(0, left.size, TOGETHER):
             members = filled[first : first + TOGETHER]
             keep = shared and first > 0
-            _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, answers)
+            _solve_together(
+                given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, t, d, info, residual, status
+            )
         left = left[status[left] == UNSURE]
     if turns == 0:
         left = left[status[left] == UNSURE]
