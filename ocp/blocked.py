@@ -80,7 +80,7 @@ def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
     owners = scenario.owners()
     for fixed in fixed_values(scenario):
         owner, coordinate = owners[fixed.column]
-        if fixed.end == end and not (owner is None and fixed.value):
+        if fixed.end == end:
             freedom[0 if owner is None else 1 + owner, fixed.order, coordinate] = GIVEN
     if scenario.relative:  # in {G} each value of the platform depends on all of the carrier's, and on its own
         for order in range(3):
@@ -94,8 +94,9 @@ def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray])
     owners = scenario.owners()
     for fixed in fixed_values(scenario):
         owner, coordinate = owners[fixed.column]
-        if owner is not None:
-            carriers[fixed.order][abs(fixed.end), owner, coordinate] += fixed.value
+        where = (coordinate,) if owner is None else (owner, coordinate)
+        # On a path in the frame of a carrier what is fixed of the platform is as its reference.
+        (platform if owner is None else carriers)[fixed.order][(abs(fixed.end), *where)] += fixed.value
     return platform, carriers
 
 
@@ -113,7 +114,7 @@ def _exceeded(
 ) -> list[Excess]:
     """Return the limits that are exceeded whatever the planner chooses, each where it is exceeded by most."""
     limits, exceeded = scenario.limits, []
-    values = limits.along(platform, carriers)
+    values = limits.along(platform, carriers, None, scenario.off_path(times, platform, carriers))
     worst: dict[int, tuple[float, Excess]] = {}
     for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
         chosen, near = _dependent(scenario, freedom[which])

@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..inputs import shown
 from ..models import Robot
 from ..models.files import as_robot
+from ..models.parsing import validate
 from ..text import quantity
 from .audits.audit import audit, other_tensions_may_pass
 from .blocked import blocked
@@ -35,6 +36,7 @@ from .search import ENDS, Search
 from .start import deviation_from
 from .status import MotionStatus
 from .tasks.deviation import Deviation
+from .tasks.initial import Initial
 from .tasks.lay_out import lay_out
 from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
@@ -58,6 +60,7 @@ def plan(
     task: Task | dict[str, Any] | str | os.PathLike[str],
     progress: Progress | None = None,
     start: Plan | Timing | AnyPath | dict[str, Any] | None = None,
+    initial: Initial | dict[str, Any] | None = None,
 ) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
@@ -79,6 +82,8 @@ def plan(
     start
         Where to start: a plan of the same robot for a similar task, a timing, or a path for the platform (or a mapping
         with its keys) in the frame of the task's path. Default: a guess of the planner's own.
+    initial
+        The measured state from which the motion starts, or a mapping with its keys, instead of the task's `initial`.
 
     Returns
     -------
@@ -93,7 +98,11 @@ def plan(
     InputError
         If the task or the start is not valid or does not fit the robot; one line naming the field and the value.
     """
-    return Planner(robot, task).plan(progress, start)
+    read = read_task(task)
+    if initial is not None:
+        state = initial if isinstance(initial, Initial) else validate(initial, Initial, "initial")
+        read = read.model_copy(update={"initial": state})
+    return Planner(robot, read).plan(progress, start)
 
 
 class Planner:

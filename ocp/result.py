@@ -242,7 +242,7 @@ class Relaxed:
     Attributes
     ----------
     name, unit
-        The field of the task that differs, in words if it has no name, and its unit.
+        The field of the task that differs, described if it has no name of its own, and its unit.
     requested, possible
         Its value in the task, and the nearest value for which a feasible plan is known.
     plan

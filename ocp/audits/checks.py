@@ -57,7 +57,7 @@ class AuditedMotion:
 
 def excesses(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
     """Return all limits that are exceeded, hard and soft; `limited` is that of the motion."""
-    checks = (_still, _lengths, _tube_ends, _waypoints, _base_ends, _locked, _duration, _jumps)
+    checks = (_still, _lengths, _initial, _tube_ends, _waypoints, _base_ends, _locked, _duration, _jumps)
     exceeded = _limits(audited, limited)
     return exceeded + [excess for check in checks for excess in check(audited)]
 
@@ -127,13 +127,34 @@ def _lengths(audited: AuditedMotion) -> list[Excess]:
     return exceeded
 
 
+def _initial(audited: AuditedMotion) -> list[Excess]:
+    """Check that the motion starts as measured."""
+    initial, exceeded = audited.scenario.task.initial, list[Excess]()
+    if initial is None:
+        return exceeded
+    bodies: list[tuple[int | None, str, Motion]] = [(None, "platform", audited.motion)]
+    for i, carrier in enumerate(audited.scenario.robot.carriers):
+        bodies.append((i, carrier.name, Motion(*(part[:, i] for part in audited.carriers))))
+    for owner, about, motion in bodies:
+        for order, value in initial.of(owner):
+            off = motion[order][0] - np.array(value)
+            if order == 0:
+                off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
+            if not (worst := float(np.abs(off).max())) <= END_TOLERANCE:
+                unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
+                why = "away from the measured start"
+                exceeded.append(Excess("initial", about, 0.0, worst, 0.0, unit, "exactly", why))
+    return exceeded
+
+
 def _tube_ends(audited: AuditedMotion) -> list[Excess]:
     """Check that the platform starts and ends on its path and moves as it does there, by differences of position."""
     scenario, exceeded = audited.scenario, []
     word = platform_ends(scenario.task)
     if word not in ("rest", "exact"):
         return []
-    for end, inwards in ((0.0, 1.0), (scenario.duration, -1.0)):
+    starts = [(0.0, 1.0)] if scenario.task.initial is None else []
+    for end, inwards in (*starts, (scenario.duration, -1.0)):
         steps = inwards * np.array([0.0, STEP, 2 * STEP, *(CURVED_STEP * np.arange(1, 4))])
         at, near, far, *further = _off_path(audited, end + steps)
         speed = (-3 * at + 4 * near - far) / (2 * inwards * STEP)
@@ -184,7 +205,8 @@ def _base_ends(audited: AuditedMotion) -> list[Excess]:
         return []
     exceeded = []
     moving = sorted({index for index, _ in scenario.carrier_free})
-    ends = [0, -1]
+    initial = scenario.task.initial
+    ends = [0, -1] if initial is None or initial.carrier_pose is None else [-1]
     if word == "rest":
         _, speeds, accelerations = audited.carriers
         off = [np.abs(speeds[end, moving]).max() for end in ends]

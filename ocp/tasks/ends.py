@@ -64,7 +64,10 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
         orders = [0] * (word == "exact" or (word == "rest" and owner is None and coordinate in POSITION))
         orders += [1] * (word in ("exact", "rest"))
         orders += [2] * (word == "rest" and at_rest_without_acceleration(scenario.robot, owner, coordinate))
-        for end in (0, -1):
+        measured = [] if task.initial is None else list(task.initial.of(owner))
+        for order, value in measured:
+            yield FixedValue(0, column, order, value[coordinate] - float(reference[order][0, coordinate]))
+        for end in (-1,) if measured else (0, -1):
             for order in orders:
                 # The deviation of what rests undoes the motion of its reference.
                 undone = word == "rest" and order > 0

@@ -7,12 +7,14 @@ import numpy as np
 
 from ...errors import InputError
 from ...models import Dynamics, Robot
+from ...models.part import COORDINATES
 from ...models.ranges import PositiveRange
 from ..limits.clearance import point_outside
 from ..limits.limit import Rate
 from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
 from .ends import carrier_ends
+from .initial import check_initial
 from .limit_list import limit_list
 from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
@@ -23,7 +25,8 @@ from .wind_set import WindBox
 
 __all__ = ["check_margin", "lay_out"]
 
-TOLERANCE = 1e-9  # [m, rad], of exact waypoints on their path
+
+TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on their path
 
 
 def lay_out(robot: Robot, task: Task) -> Scenario:
@@ -41,6 +44,8 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
     if isinstance(task.wind, WindBox):
         _feels_no_tensions(robot, where)
+    if task.initial is not None:
+        check_initial(robot, task.initial, task.path.frame, where)
     limits = limit_list(robot, task)
     _fit_limits(robot, task, limits, where)
     opened = [*POSITION] * (task.tube.radius > 0) + [*ATTITUDE] * (task.tube.turn > 0)
@@ -57,6 +62,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         carrier_paths=carrier_paths(robot, task),
         duration=task.seconds,
     )
+    _check_start(scenario, where)
     _check_times(task, where)
     _check_waypoints(task, where)
     _check_transcription(task, limits, where)
@@ -141,6 +147,24 @@ def _check_transcription(task: Task, limits: Limits, where: str) -> None:
             f"{where}: {name} must be left out with the scheme {task.scheme!r}, whose tensions jump at the nodes, got "
             f"{rate:g} {unit}; schemes without jumps: {accepted}"
         )
+
+
+def _check_start(scenario: Scenario, where: str) -> None:
+    """Refuse an initial state that differs from what the task fixes where the planner has no freedom."""
+    if scenario.task.initial is None:
+        return
+    platform, carriers = scenario.references(np.zeros(1))
+    bodies = [(None, "platform", platform), *((i, c.name, carriers[i]) for i, c in enumerate(scenario.robot.carriers))]
+    for owner, name, reference in bodies:
+        for order, value in scenario.task.initial.of(owner):
+            for i, coordinate in enumerate(COORDINATES):
+                off = value[i] - float(reference[order][0, i])
+                if (owner, i) not in scenario.owners() and abs(off) > TOLERANCE:
+                    what = ("", "speed of ", "acceleration of ")[order]
+                    raise InputError(
+                        f"{where}: initial must have the {what}{coordinate} of the {name} that the task fixes at its "
+                        f"start, {value[i] - off:g}, got {value[i]:g}; a tube or a free base may leave it"
+                    )
 
 
 def _check_times(task: Task, where: str) -> None:

@@ -14,6 +14,7 @@ from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
 from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
 from ...models.ranges import PositiveRange
+from .initial import Initial
 from .paths import AnyPath
 from .scheme import SchemeName
 from .task_limits import TaskLimits
@@ -138,6 +139,9 @@ class Task(Part):
         description="what the carriers do: hold (stay), given (follow paths) or free (move as the planner chooses)",
     )
     tube: Tube = Tube()
+    initial: Initial | None = Field(
+        default=None, description="measured state from which a robot that moves starts; default: as `ends` require"
+    )
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
     wind: Vector3 | WindBox | None = Field(
         default=None,
