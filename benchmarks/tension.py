@@ -107,7 +107,7 @@ def run(
         Seconds that one contender may spend on one task. It is checked between calls: a contender that passes it is
         out, with the times that it has.
     progress :
-        Called with the task's name and how many of how many tasks are done.
+        Called with the task's name and how many of how many turns at all tasks are done.
 
     Raises
     ------
@@ -123,12 +123,15 @@ def run(
         raise InputError(f"limit must be a number > 0 [s], got {limit:g}")
     names = [(kind, cables) for cables in m for kind in KINDS]
     rows: list[Row] = []
+    turns = repeats + 1
     for done, (kind, cables) in enumerate(names):
-        if progress is not None:
-            progress(f"{kind}, m = {cables}", done, len(names))
-        rows += measure(make_task(kind, cables, count), contenders(), repeats, limit)
-    if progress is not None:
-        progress("done", len(names), len(names))
+
+        def show(turn: int, done: int = done, task: str = f"{kind}, m = {cables}") -> None:
+            if progress is not None:
+                progress(task, done * turns + turn, len(names) * turns)
+
+        show(0)
+        rows += measure(make_task(kind, cables, count), contenders(), repeats, limit, show)
     return Report(rows, machine((*SOLVERS, "qpsolvers", "numpy")), count, repeats)
 
 
@@ -194,8 +197,13 @@ class _Runner:
         return {turn: times for turn, times in self.blocks.items() if turn > 0} or self.blocks
 
 
-def measure(task: Task, who: Sequence[Contender], repeats: int, limit: float) -> list[Row]:
-    """Measure contenders at one task, in blocks that take turns; the reference is to be among them."""
+def measure(
+    task: Task, who: Sequence[Contender], repeats: int, limit: float, show: Callable[[int], None] = lambda turns: None
+) -> list[Row]:
+    """Measure contenders at one task, in blocks that take turns; the reference is to be among them.
+
+    `show` is called after each turn with how many are done.
+    """
     runners = [_Runner(contender, task, limit) for contender in who if task.kind in contender.kinds]
     collecting = gc.isenabled()
     gc.disable()
@@ -207,6 +215,7 @@ def measure(task: Task, who: Sequence[Contender], repeats: int, limit: float) ->
                 if runner.running:
                     runner.turn(turn)
             gc.collect()
+            show(turn + 1)
     finally:
         if collecting:
             gc.enable()
