@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["casadi_function"]
 
 Array = NDArray[np.float64]
+_Matrix = tuple[str, tuple[int, int]]  # name and shape
+_Options = Mapping[str, Any]
 
 _MOST = 1000  # cables or wrench rows
 
@@ -80,6 +82,8 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
     import casadi as ca
 
     shapes = [(n, m), (n, 1), (m, 1), (m, 1)]
+    blocks = [(m, rows * columns) for rows, columns in shapes]
+    jacobians: list[ca.Callback] = []  # CasADi does not keep them
 
     def problem_of(arguments: Sequence[Any]) -> TensionProblem | None:
         A, w, low, high = (argument.full() for argument in arguments[:4])
@@ -92,67 +96,46 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
         tensions = None if problem is None else solve(problem, "soft-wrench").tensions
         return np.full(m, np.nan) if tensions is None else tensions
 
-    class Jacobian(ca.Callback):
-        """Return the blocks dt / d(A, w, t_min, t_max), each (m, entries)."""
+    class Dense(ca.Callback):
+        """A callback of dense matrices, each with its name and shape."""
 
-        def __init__(self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]):
+        def __init__(self, name: str, inputs: Sequence[_Matrix], outputs: Sequence[_Matrix], options: _Options):
             ca.Callback.__init__(self)
             self._inputs, self._outputs = inputs, outputs
             self.construct(name, dict(options))
 
         def get_n_in(self) -> int:
-            return 5
+            return len(self._inputs)
 
         def get_n_out(self) -> int:
-            return 4
+            return len(self._outputs)
 
         def get_name_in(self, i: int) -> str:
-            return self._inputs[i]
+            return self._inputs[i][0]
 
         def get_name_out(self, i: int) -> str:
-            return self._outputs[i]
+            return self._outputs[i][0]
 
         def get_sparsity_in(self, i: int) -> ca.Sparsity:
-            # The fifth is the nominal output, which is computed again: it may be a stand-in without entries.
-            return ca.Sparsity.dense(*shapes[i]) if i < 4 else ca.Sparsity.dense(m, 1)
+            return ca.Sparsity.dense(*self._inputs[i][1])
 
         def get_sparsity_out(self, i: int) -> ca.Sparsity:
-            return ca.Sparsity.dense(m, shapes[i][0] * shapes[i][1])
+            return ca.Sparsity.dense(*self._outputs[i][1])
+
+    class Jacobian(Dense):
+        """Return the blocks dt / d(A, w, t_min, t_max), each (m, entries)."""
 
         def eval(self, arguments: Sequence[Any]) -> list[Array]:
             problem = problem_of(arguments)
             tensions = tensions_of(problem)
             if problem is None or np.isnan(tensions).any():
-                return [np.full((m, rows * columns), np.nan) for rows, columns in shapes]
+                return [np.full(block, np.nan) for block in blocks]
             by = derivatives(problem, tensions)
             # CasADi counts the entries of A down its columns.
             return [by.A.transpose(0, 2, 1).reshape(m, n * m), by.w, by.t_min, by.t_max]
 
-    class Tensions(ca.Callback):
+    class Tensions(Dense):
         """Return the distribution."""
-
-        def __init__(self) -> None:
-            ca.Callback.__init__(self)
-            self._jacobians: list[Jacobian] = []
-            self.construct(name, {})
-
-        def get_n_in(self) -> int:
-            return 4
-
-        def get_n_out(self) -> int:
-            return 1
-
-        def get_name_in(self, i: int) -> str:
-            return _INPUTS[i]
-
-        def get_name_out(self, i: int) -> str:
-            return "t"
-
-        def get_sparsity_in(self, i: int) -> ca.Sparsity:
-            return ca.Sparsity.dense(*shapes[i])
-
-        def get_sparsity_out(self, i: int) -> ca.Sparsity:
-            return ca.Sparsity.dense(m, 1)
 
         def eval(self, arguments: Sequence[Any]) -> list[Array]:
             return [tensions_of(problem_of(arguments))]
@@ -160,11 +143,11 @@ def _callback(name: str, m: int, n: int, constants: dict[str, Any]) -> "casadi.F
         def has_jacobian(self, *_: Any) -> bool:
             return True
 
-        def get_jacobian(
-            self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
-        ) -> ca.Function:
-            jacobian = Jacobian(name, inames, onames, opts)
-            self._jacobians.append(jacobian)
+        def get_jacobian(self, name: str, inames: Sequence[str], onames: Sequence[str], opts: _Options) -> ca.Function:
+            # The fifth input is the nominal output, which is computed again: it may be a stand-in without entries.
+            inputs = zip(inames, [*shapes, (m, 1)], strict=True)
+            jacobian = Jacobian(name, list(inputs), list(zip(onames, blocks, strict=True)), opts)
+            jacobians.append(jacobian)
             return jacobian
 
-    return Tensions()
+    return Tensions(name, list(zip(_INPUTS, shapes, strict=True)), [("t", (m, 1))], {})
