@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .codes import INFEASIBLE, STEPS, TURNS, UNSURE
+from .codes import INFEASIBLE, OPTIMAL, STEPS, TURNS, UNSURE
 from .jit import GIVEN, VECTOR, compilable
 from .lanes import GOOD, PROVEN, ROUNDED, S_, SHORTFALL, SUPPORT, D, cable, judge, lane_size, prepare, wrench
 from .lanes_newton import newton_in_lanes, newton_size
@@ -53,9 +53,10 @@ def _solve_together(given, per, soft, slabs, n, m, members, turn, keep, start, y
         scatter(info, by_two, 0, load(W, SUPPORT))
         for i in range(n):
             scatter(d, by_wrench, i, load(W, wrench(D, n, m) + i))
-    scatter(residual, by_row, 0, load(W, ROUNDED))
-    for c in range(m):
-        scatter(t, by_cable, c, load(W, cable(S_, m) + c))
+    if soft > 0.0 or any_of(code <= 1.0 * OPTIMAL):
+        scatter(residual, by_row, 0, load(W, ROUNDED))
+        for c in range(m):
+            scatter(t, by_cable, c, load(W, cable(S_, m) + c))
 
 
 @compilable(
@@ -88,9 +89,10 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
     left = np.arange(start, stop)
     y = np.zeros(0 if slabs else (stop - start) * n)
     for turn in range(turns):
-        filled = np.concatenate((left, np.repeat(left[-1:], -left.size % WIDTH)))
         for first in range(0, left.size, TOGETHER):
-            members = filled[first : first + TOGETHER]
+            members = left[first : first + TOGETHER]
+            if members.size % WIDTH:  # the last lanes repeat the last row
+                members = np.concatenate((members, np.repeat(members[-1:], WIDTH - members.size % WIDTH)))
             keep = shared and first > 0
             _solve_together(
                 given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, t, d, info, residual, status
