@@ -14,6 +14,7 @@ import numpy as np
 
 from ..solvers import Certificate
 from .audits.audit import Audit
+from .audits.checks import LENGTH_TOLERANCE
 from .audits.excess import Excess
 from .audits.tensions import Distribution
 from .limits import Limit, Rate
@@ -60,6 +61,7 @@ def blocked(scenario: Scenario) -> Blocked | None:
     freedom = [_freedom(scenario, 0), _freedom(scenario, -1), _freedom(scenario, None)]
     platform, carriers = _at_places(scenario, times, freedom)
     proven = _exceeded(scenario, times, freedom, platform, carriers)
+    proven += _stretched(scenario, times, freedom, platform, carriers)
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
     return Blocked(proven, certificate) if proven or certificate is not None else None
 
@@ -129,6 +131,26 @@ def _exceeded(
         if not any(excess.limit == other.limit and excess.about == other.about for other in exceeded):
             exceeded.append(excess)
     return exceeded
+
+
+def _stretched(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> list[Excess]:
+    """Return the worst cable that cannot keep the length that its drive fixes, if its carrier's place is given."""
+    robot = scenario.robot
+    if robot.fixed_lengths is None:
+        return []
+    off = np.abs(scenario.dynamics.cable_lengths(platform.pose, carriers.pose) - robot.fixed_lengths)
+    for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
+        free = freedom[which][:, 0].max(axis=1)
+        tied = (free[0] < FREE) & (free[1:] == GIVEN)[robot.carrier_of_cable]
+        off[rows] -= np.where(tied, _reach(scenario, freedom[which]), np.inf)
+    row, cable = np.unravel_index(off.argmax(), off.shape)
+    if off[row, cable] <= LENGTH_TOLERANCE:
+        return []
+    length = float(scenario.dynamics.cable_lengths(platform.pose[row], carriers.pose[row])[cable])
+    kept, why = float(robot.fixed_lengths[cable]), "with the drive fixed-length it stays"
+    return [Excess("cable_length", f"cable {cable + 1}", float(times[row]), length, kept, "m", "exactly", why)]
 
 
 def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -124,6 +124,18 @@ class Planner:
     def __init__(self, robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str]):
         self.scenario = lay_out(as_robot(robot), read_task(task))
         self._solvers: dict[Mesh, Solver] = {}
+        self._search: Search | None = None  # that has not ended
+
+    @property
+    def interrupted(self) -> Plan | None:
+        """Return the best attempt of a call of `plan` that was interrupted, audited; None if there is none.
+
+        The attempt is the best motion of the solver that met all constraints at its nodes, or one that was audited
+        before: `feasible` states whether its audit passed. It costs an audit, which the interrupt did not wait for.
+        """
+        search = self._search
+        plan = None if search is None else search.best_of_interrupted()
+        return plan if search is None or plan is None else replace(plan, stages=tuple(search.stages))
 
     def plan(
         self, progress: Progress | None = None, start: Plan | Timing | AnyPath | dict[str, Any] | None = None
@@ -138,9 +150,11 @@ class Planner:
         if progress is not None and not callable(progress):
             accepted = "a function of (iteration, objective, infeasibility)"
             raise InputError(f"progress must be {accepted}, got {shown(progress)}")
-        search = Search(self.scenario, self._solvers, progress)
+        self._search = search = Search(self.scenario, self._solvers, progress)
         guess = None if start is None else deviation_from(self.scenario, start)
-        return replace(_climb(search, guess), stages=tuple(search.stages))
+        plan = replace(_climb(search, guess), stages=tuple(search.stages))
+        self._search = None
+        return plan
 
 
 def _climb(search: Search, start: Deviation | None) -> Plan:

@@ -48,6 +48,7 @@ class Search:
         self.stages: list[Stage] = []
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
+        self._interrupted: Outcome | None = None
 
     @contextmanager
     def stage(self, name: str) -> Iterator[RunningStage]:
@@ -84,7 +85,11 @@ class Search:
             solver.prepare(guess, coarser)
             built = time.perf_counter()
             at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-            outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
+            try:
+                outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
+            except BaseException:
+                self._interrupted = None if mesh.elastic else solver.interrupted
+                raise
             self.build_s += built - start
             self.solve_s += time.perf_counter() - built
             ended = ENDS.get(outcome.message, f"stopped ({outcome.message})")
@@ -99,6 +104,13 @@ class Search:
         audited = self.audit_motion(scenario, outcome.deviation)
         self._audited.append((relative_violation(scenario, audited), outcome, audited))
         return audited
+
+    def best_of_interrupted(self) -> Plan | None:
+        """Return the best plan of a search that was interrupted, audited now if it has to be; None if there is none."""
+        if self._interrupted is not None:
+            outcome, self._interrupted = self._interrupted, None
+            self.audit(outcome)
+        return self.best("the search was interrupted") if self._audited else None
 
     def best(self, reason: str = "") -> Plan:
         """Return the plan of the audited solution that violates its limits by least; the latest of equal ones.

@@ -15,8 +15,8 @@ TASK = """\
 name: fast
 path: {kind: line, start: [0, 0, 0], end: [2, 0, 0]}
 duration: {min: 1.5, max: 8}
-base: {kind: free, ends: exact}
-tube: {position: free, attitude: free, ends: exact}
+base: {kind: free}
+tube: {position: free, attitude: free}
 objective: {time: 1}
 """
 SCRIPT = """\
@@ -124,3 +124,40 @@ def test_an_interrupt_after_the_end_of_a_command_is_ignored(tmp_path):
     process = start([sys.executable, "-c", code], tmp_path)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (0, "False\n", "")
+
+
+KEPT = """\
+from towline.models import load
+from towline.ocp import Planner
+
+planner = Planner(load("multi-quadrotor-3"), "fast.yaml")
+met = 0
+
+def follow(iteration, objective, infeasibility):
+    global met
+    met += infeasibility < 1e-9
+    if met == 3:
+        print("met", flush=True)
+
+try:
+    planner.plan(follow)
+except KeyboardInterrupt:
+    best = planner.interrupted
+    print(best.reason or best.status.value, best.audit.times[-1], flush=True)
+    print(planner.plan().status.value, flush=True)
+"""
+
+
+def test_the_best_motion_so_far_is_kept_and_the_planner_can_be_used_again(folder):
+    """Once iterates meet all constraints, an interrupt leaves an audited motion of a duration that the task allows."""
+    (folder / "kept.py").write_text(KEPT)
+    process = start([sys.executable, "kept.py"], folder)
+    assert any(line.strip() == "met" for line in iter(process.stdout.readline, ""))
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    reason, again = [line for line in out.splitlines() if line != "met"]
+    status, _, duration = reason.rpartition(" ")
+    assert status in ("feasible", "the search was interrupted")
+    assert 1.5 <= float(duration) <= 8
+    assert again == "feasible"

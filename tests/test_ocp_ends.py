@@ -118,6 +118,23 @@ def test_an_end_without_tensions_is_proven_by_a_linear_program():
     assert planned.iterations == 0
 
 
+def test_carriers_that_return_home_cannot_carry_a_load_away_on_cables_that_keep_their_lengths():
+    """Two metres from home the cables would have to be longer by as much as geometry says."""
+    line = {"kind": "line", "start": [0, 0, 0], "end": [2, 0, 0]}
+    tube = {"position": "free", "attitude": "free", "ends": "exact"}
+    task = {"path": line, "duration": {"min": 1.5, "max": 8}, "tube": tube, "base": {"kind": "free", "ends": "exact"}}
+    planned = plan("multi-quadrotor-3", task)
+    assert planned.status is MotionStatus.INFEASIBLE
+    robot = load("multi-quadrotor-3")
+    anchors = robot.carrier_home[robot.carrier_of_cable, :3] + robot.anchors
+    lengths = np.linalg.norm(anchors - robot.attachments - line["end"], axis=1)
+    worst = int(np.abs(lengths - robot.fixed_lengths).argmax())
+    (excess,) = planned.audit.excess
+    assert excess.about == f"cable {worst + 1}"
+    assert excess.value == pytest.approx(lengths[worst])
+    assert planned.iterations == 0
+
+
 def test_a_wall_across_a_path_that_must_be_followed_is_a_proof_and_in_a_wide_tube_is_none():
     wall = {"limits": {"keep_out": [{"kind": "box", "min": [0.2, -1, 0], "max": [0.3, 1, 3], "cables": None}]}}
     task = {"path": LINE, "duration": {"min": 1, "max": 5}, "time_limit": 1e-3, "steps": 20} | wall

@@ -86,6 +86,7 @@ class Solver:
         self._max_iterations = max_iterations
         self._solvers: dict[str, ca.Function] = {}
         self._last: dict[str, ca.DM] | None = None
+        self.interrupted: Outcome | None = None  # the best of a run that was interrupted
 
     def prepare(self, guess: Deviation | None, coarser: bool = False) -> ca.Function:
         """Return the solver for a run from `guess`, made at the first call."""
@@ -160,9 +161,12 @@ class Solver:
         else:
             start |= {"x0": self._last["x"], "lam_x0": self._last["lam_x"], "lam_g0": self._last["lam_g"]}
         watch.begin(progress, seconds)
+        self.interrupted = None
         try:
             result = wait_for(lambda: watch.follow(nlp, start), watch.errands)
         except BaseException:
+            if len(watch.best):
+                self.interrupted = self._outcome(watch.best, watch.objective, True, "interrupted", watch.iteration)
             self._abandon()
             raise
         statistics = nlp.stats()
@@ -179,11 +183,16 @@ class Solver:
             message = TIME_LIMIT if watch.late else SETTLED
             if len(watch.best):
                 x, objective, met = watch.best, watch.objective, True
+        return self._outcome(x, objective, bool(statistics["success"]) or met, str(message), iterations)
+
+    def _outcome(self, x: np.ndarray, objective: float, success: bool, message: str, iterations: int) -> Outcome:
+        """Return a run that ended at the unknowns x."""
+        program = self.program
         return Outcome(
             deviation=program.read(x),
             duration=program.duration(x),
-            success=(bool(statistics["success"]) or met) and bool(np.isfinite(x).all()),
-            message=str(message),
+            success=success and bool(np.isfinite(x).all()),
+            message=message,
             iterations=iterations,
             slack=program.missing(x),
             objective=np.nan if program.mesh.elastic else objective,
@@ -225,7 +234,7 @@ class _Watch(ca.Callback):
         self.errands: Errands = SimpleQueue()  # calls of `progress`, for the thread that waits
         self._deadline = time.perf_counter() + seconds
         self.late = False  # whether the time is up
-        self._iteration = 0
+        self.iteration = 0
         self.best = np.zeros(0)  # iterate of those that meet all constraints
         self.objective = np.inf  # its
         self._mark = np.inf  # the objective that a later one has to be better than
@@ -239,7 +248,7 @@ class _Watch(ca.Callback):
     @property
     def settled(self) -> bool:
         """Return whether `best` no longer improves."""
-        return len(self.best) > 0 and self._iteration - self._since > PATIENCE
+        return len(self.best) > 0 and self.iteration - self._since > PATIENCE
 
     def infeasibility(self, g: np.ndarray) -> float:
         """Return the largest violation of the constraints' bounds by their values g."""
@@ -272,10 +281,10 @@ class _Watch(ca.Callback):
         # What making up for what g misses would change, to first order.
         missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
         if objective + lam_g @ missed < self._better():
-            self._since = self._iteration
+            self._since = self.iteration
         if self._progress is not None:
-            self.errands.put(partial(self._progress, self._iteration, objective, self.infeasibility(g)))
-        self._iteration += 1
+            self.errands.put(partial(self._progress, self.iteration, objective, self.infeasibility(g)))
+        self.iteration += 1
         self.late = time.perf_counter() > self._deadline
         np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.late
         return 0
