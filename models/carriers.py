@@ -28,8 +28,8 @@ from .part import (
     Pose,
     Positive,
     inertia_matrix,
-    json_schema,
 )
+from .schema import json_schema
 
 if TYPE_CHECKING:
     from .rotation import Matrix

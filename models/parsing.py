@@ -18,7 +18,7 @@ from ruamel.yaml.events import AliasEvent
 
 from ..errors import InputError
 from ..inputs import LONGEST_TEXT, printable, shown
-from .part import json_schema
+from .schema import json_schema
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 Model = TypeVar("Model", bound=BaseModel)

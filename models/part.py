@@ -6,7 +6,6 @@ R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -101,9 +100,3 @@ def _check_positive_definite(inertia: Inertia) -> Inertia:
 
 
 BodyInertia = Annotated[Inertia, AfterValidator(_check_positive_definite)]
-
-
-@cache
-def json_schema(model: type[BaseModel]) -> dict[str, Any]:
-    """Return the JSON Schema of a model, computed once; another kind of carrier empties the cache."""
-    return model.model_json_schema()

@@ -1,0 +1,16 @@
+"""`json_schema`: the JSON Schema of what a file describes."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel
+
+__all__ = ["json_schema"]
+
+
+@cache
+def json_schema(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON Schema of a model, computed once; another kind of carrier empties the cache."""
+    return model.model_json_schema()
