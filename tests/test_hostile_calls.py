@@ -174,6 +174,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "task": lambda: TASK,
     "time_along.task": lambda: {"path": LINE},
     "start": lambda: None,
+    "initial": lambda: None,
     "progress": lambda: None,
     "grid": lambda: 10,
     "times": lambda: np.zeros(2),

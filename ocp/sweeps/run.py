@@ -105,7 +105,10 @@ def sweep(
     cases = Cases(as_robot(robot), read_task(task), read_axes(vary))
     cases.check()
     if folder is not None:
-        check_writable(plan_file(folder, cases, 0))
+        try:
+            check_writable(plan_file(folder, cases, 0))
+        except InputError as error:
+            raise InputError(f"keep: {error}") from None
     opened = nullcontext() if file is None else open_checkpoint(file, KIND, _header(cases, folder), resume)
     rows: dict[int, Row] = {}
     with start_workers(workers, scheduler) as started, opened as stored:
