@@ -2,8 +2,7 @@
 
 The planner works in stages, and ends with the first that decides:
 
-1. ends and path (`blocked`): what is impossible whatever the planner chooses, proven at once; and the capacity margin
-   of rest along the path (`rest_margin`);
+1. ends and path (`blocked`): what is impossible whatever the planner chooses, proven at once;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
 3. the nonlinear program (`program`), audited, and refined where the audit reports violations;
 4. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
@@ -30,7 +29,6 @@ from .durations import Durations, durations
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
 from .relaxations import other_duration, other_limits
-from .rest_margin import rest_margin
 from .result import Plan
 from .search import ENDS, Search
 from .start import deviation_from
@@ -165,7 +163,6 @@ def _climb(search: Search, start: Deviation | None) -> Plan:
     proven = _blocked(search)
     if proven is not None:
         return proven
-    _rest_along_the_path(search)
     timed, own = _time_law(search) if scenario.count == 0 else (None, True)
     if timed is not None and not (own and timed.feasible):
         return timed
@@ -228,14 +225,6 @@ def _blocked(search: Search) -> Plan | None:
     start = time.perf_counter()
     proven = proof.of(audit(slowest, None, per_output=1))
     return Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, time.perf_counter() - start)
-
-
-def _rest_along_the_path(search: Search) -> None:
-    """Compute the margin of rest along the motion that the planner starts from, for the report."""
-    with search.stage("static check") as stage:
-        margin = rest_margin(search.scenario)
-        required = margin.margin.min() >= 0
-        stage.message = margin.describe() if required else f"{margin.describe()}; not required here"
 
 
 def _time_law(search: Search) -> tuple[Plan | None, bool]:

@@ -13,7 +13,7 @@ class Stage(NamedTuple):
     Attributes
     ----------
     name
-        What was computed: "static check", "timing", "nonlinear program, 100 steps".
+        What was computed: "ends and path", "timing", "nonlinear program, 100 steps".
     message
         Its result, as text with units; empty if it has no result worth a line.
     seconds

@@ -12,7 +12,6 @@ from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan, time_along
 from towline.ocp.cost import cost
 from towline.ocp.durations import durations
-from towline.ocp.rest_margin import rest_margin
 from towline.ocp.start import deviation_from
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
@@ -82,16 +81,6 @@ def test_durations_are_not_asked_where_they_cannot_be():
     assert durations(scenario("cogiro", path={"kind": "circle", "centre": [0, 0, 2], "radius": 1, "rate": 1})) is None
     assert durations(scenario("wang-flying", path={**LIFT, "start": [0, 0, -1]}, duration=1, wind=[0, 0, 0])) is None
     assert durations(scenario("wang-ctmrts", path=LINE, duration=1)) is None  # three cables
-
-
-def test_rest_margin_is_that_of_each_pose():
-    robot = load("cogiro")
-    seen = rest_margin(scenario(robot, path=LINE, duration=3))
-    poses = np.array([[*LINE["start"], 0, 0, 0], [*LINE["end"], 0, 0, 0]])
-    for row, pose in zip((0, -1), poses, strict=True):
-        assert seen.margin[row] == pytest.approx(capacity_margin(pose_problem(Dynamics(robot), pose)).value, rel=1e-9)
-    assert seen.margin[seen.worst] == seen.margin.min()
-    assert "possible everywhere" in seen.describe()
 
 
 def test_what_cannot_rest_at_its_end_is_infeasible_at_once():
@@ -266,7 +255,7 @@ def test_wrong_starts_are_refused():
 
 def test_every_rung_is_told_with_its_time():
     found = plan(load("cogiro"), {"path": LINE, "duration": 3, "tube": TUBE, "steps": 10})
-    assert names(found)[:4] == ["ends and path", "static check", "nonlinear program, 10 steps", "audit"]
+    assert names(found)[:3] == ["ends and path", "nonlinear program, 10 steps", "audit"]
     for stage in found.stages:
         assert stage.seconds >= 0
         assert stage.message in found.report()
