@@ -1,17 +1,17 @@
 """Judge what a method proposes: by multipliers, else by a certificate, else on the boundary of what cables can give."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from ..tolerances import AT_LIMIT, RANK
 from .box_least_squares import project
 from .certificate import Certificate, sharpest
 from .exact_arithmetic import exact_optimum
-from .face import face
 from .methods.method import Method, Proposal
+from .methods.numerics.linear_program import optimise
 from .problem import Array, TensionProblem, accepted_error
-from .standard_form import StandardForm, standard_forms
+from .standard_form import StandardForm
 from .status import Status
 
 _EXACT = "at the edge of what the cables can give, or of rounding: solved in exact arithmetic"
@@ -21,62 +21,97 @@ _NEAREST = "gives the wrench as near to t_ref as can be, which is not what the m
 
 
 class Judgement(NamedTuple):
-    """Hold what is known of a problem after a proposal, in the fields of a `TensionSolution`."""
+    """Hold what is known of a problem after a proposal, in the fields of a `TensionSolution`.
+
+    `left` is the problem of what is left to choose on the boundary of the available wrench set, for another proposal;
+    `tensions` are then the least squares there. None if the judgement is final.
+    """
 
     status: Status
     tensions: Array | None = None  # (m,)
-    iterations: int | None = None
     detail: str = ""
     certificate: Certificate | None = None
+    left: TensionProblem | None = None
 
 
-def judge(problem: TensionProblem, method: Method, propose: Callable[[StandardForm], Proposal]) -> Judgement:
-    """Take the proposals of a method, for one form of the problem after the other, and judge them.
+def judge(
+    problem: TensionProblem,
+    form: StandardForm,
+    method: Method,
+    proposal: Proposal,
+    tensions: Array | None,
+    exact: Array | None,
+    last: bool,
+) -> Judgement | None:
+    """Judge a proposal of a method.
 
     "optimal" are tensions that give w and, of a method of least squares, that multipliers prove optimal. Else the
     status follows from a certificate. If there is none, a method that is `exact` has lost its answer by rounding, on
     the boundary of the available wrench set or near it: the least squares are then computed in exact arithmetic, and a
     method with another aim proposes once more, for the cables that have a choice there.
+
+    Parameters
+    ----------
+    problem, form :
+        The problem, and the form of it that the method got.
+    method, proposal, tensions :
+        The method, its proposal, and that in tensions [N], (m,).
+    exact :
+        The least squares [N], (m,), if the form is that of what is left to choose on the boundary; else None.
+    last :
+        False if another form is left to try: then only what is accepted is judged, and None is returned otherwise.
     """
-    proposal, tensions, useful = Proposal(None), None, False
-    for form in standard_forms(problem):
-        proposal = propose(form)
-        tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-        useful = tensions is not None and _gives_wrench(problem, tensions)
-        if tensions is not None and useful and (not method.least_squares or form.is_optimal(tensions)):
-            return Judgement(Status.OPTIMAL, tensions, proposal.iterations)
-    iterations, detail = proposal.iterations, proposal.detail
+    useful = tensions is not None and _gives_wrench(problem, tensions)
+    if tensions is not None and useful and (not method.least_squares or form.is_optimal(tensions)):
+        return Judgement(Status.OPTIMAL, tensions, "" if exact is None else _ON_FACE)
+    if not last:
+        return None
+    if exact is not None:
+        if proposal.final:
+            return Judgement(Status.FAILED, None, proposal.detail)
+        return Judgement(Status.INACCURATE, exact, f"{_NEAREST}: {proposal.detail}".removesuffix(": "))
     projection = project(problem)
     certificate = None if useful else sharpest(problem, projection)
     if certificate is not None:
         if method.always_answers and tensions is not None:
-            return Judgement(Status.INACCURATE, tensions, iterations, detail, certificate)
-        status = Status.SINGULAR if certificate.singular else Status.INFEASIBLE
-        return Judgement(status, None, iterations, certificate=certificate)
+            return Judgement(Status.INACCURATE, tensions, proposal.detail, certificate)
+        return Judgement(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     if method.exact and not proposal.final:
-        exact = exact_optimum(problem, projection)
+        exact = exact_optimum(problem, projection.closest)
         if _gives_wrench(problem, exact):
-            if method.least_squares:
-                return Judgement(Status.OPTIMAL, exact, iterations, _EXACT)
-            return _on_face(problem, propose, exact)
+            left = None if method.least_squares else _face(problem, form, exact)
+            return Judgement(Status.OPTIMAL, exact, _EXACT, left=left)
     if useful:
-        return Judgement(Status.INACCURATE, tensions, iterations, _UNPROVEN)
-    return Judgement(Status.FAILED if tensions is None else Status.INACCURATE, tensions, iterations, detail)
+        return Judgement(Status.INACCURATE, tensions, _UNPROVEN)
+    return Judgement(Status.FAILED if tensions is None else Status.INACCURATE, tensions, proposal.detail)
 
 
-def _on_face(problem: TensionProblem, propose: Callable[[StandardForm], Proposal], exact: Array) -> Judgement:
-    """Take the proposals for the cables that have a choice on the boundary; `exact` (m,) [N] are the least squares."""
-    proposal = Proposal(None)
-    for form in standard_forms(face(problem, exact)):
-        if not form.N.size:
-            return Judgement(Status.OPTIMAL, exact, detail=_EXACT)  # no others give w
-        proposal = propose(form)
-        tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-        if tensions is not None and _gives_wrench(problem, tensions):
-            return Judgement(Status.OPTIMAL, tensions, proposal.iterations, _ON_FACE)
-    if proposal.final:
-        return Judgement(Status.FAILED, None, proposal.iterations, proposal.detail)
-    return Judgement(Status.INACCURATE, exact, proposal.iterations, f"{_NEAREST}: {proposal.detail}".removesuffix(": "))
+def _face(problem: TensionProblem, form: StandardForm, exact: Array) -> TensionProblem | None:
+    """Fix the cables that have the same tension, that of a limit, in all tensions that give w; None if all have.
+
+    With w on a face of the available wrench set those are the cables that pull along its normal. The others can all be
+    off their limits at once, so a method that needs such tensions has them. `exact` are some tensions that give w [N],
+    (m,).
+    """
+    s = (exact - form.origin)[form.moving] / form.unit  # (k,)
+    near = AT_LIMIT * max(1.0, np.abs(s).max(initial=0.0))
+    low, high = s - form.lower <= near, form.upper - s <= near
+    held = np.flatnonzero(low | high)
+    stays = held
+    if held.size:
+        # Of all changes that leave the wrench as it is and cross no limit, one that moves as many of these as can move.
+        changes = form._replace(b=0.0 * form.b, lower=np.where(low, 0.0, -np.inf), upper=np.where(high, 0.0, np.inf))
+        moved = np.eye(s.size)[held] * np.where(low, -1.0, 1.0)
+        rows = np.hstack([moved, np.eye(held.size)])
+        cost = np.r_[np.zeros(s.size), -np.ones(held.size)]
+        change = optimise(changes, cost, rows, np.zeros(held.size), nonnegative=True, most=1.0).s
+        stays = held if change is None else held[np.abs(change[held]) < 0.5]
+    if len(form.N) == (np.linalg.matrix_rank(form.N[:, stays], RANK) if stays.size else 0):
+        return None
+    t_min, t_max = problem.t_min.copy(), problem.t_max.copy()
+    fixed = form.moving[stays]
+    t_min[fixed] = t_max[fixed] = exact[fixed]
+    return TensionProblem(problem.A, problem.w, t_min, t_max, problem.t_ref, problem.weights, problem.length)
 
 
 def _gives_wrench(problem: TensionProblem, tensions: Array) -> bool:

@@ -19,7 +19,7 @@ from .methods.active_set import ActiveSet
 from .methods.method import Method, Proposal
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
-from .standard_form import StandardForm
+from .standard_form import StandardForm, standard_forms
 from .status import STATUSES
 
 __all__ = ["methods", "solve"]
@@ -70,14 +70,26 @@ def solve(
     chosen, backend = _look_up(method, backend, options)
     used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the kernel was not sure
 
-    def propose(form: StandardForm) -> Proposal:
+    left, exact, forms = problem, None, list[StandardForm]()
+    while True:
+        forms = forms or standard_forms(left)
+        form = forms.pop(0)
         if chosen.seeks_reference and form.holds_reference:
-            return Proposal(np.zeros(form.moving.size))
-        return chosen.propose(form, backend, **options)
-
-    status, tensions, iterations, detail, certificate = judge(problem, chosen, propose)
+            proposal = Proposal(np.zeros(form.moving.size))
+        else:
+            proposal = chosen.propose(form, backend, **options)
+        tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
+        judgement = judge(problem, form, chosen, proposal, tensions, exact, last=not forms)
+        if judgement is None:
+            continue
+        status, tensions, detail, certificate, left = judgement
+        if left is None:
+            break
+        exact = tensions  # the method chooses from what is left
     spent = time.perf_counter() - start
-    return TensionSolution(problem, tensions, status, chosen.name, used, spent, iterations, detail, certificate)
+    return TensionSolution(
+        problem, tensions, status, chosen.name, used, spent, proposal.iterations, detail, certificate
+    )
 
 
 def _prove(problem: TensionProblem) -> Certificate | None:
