@@ -6,8 +6,9 @@ The file has a first line that identifies it, a header, and records:
     length of the header (uint32), header (JSON: everything that the records depend on), its CRC-32
     for each record in turn: length of its content (uint32), content, CRC-32 of both
 
-Integers are little-endian. A record that was cut short by the end of the process is dropped; any other damage
-is an error, and such a file is never written to.
+Integers are little-endian. If the last `longest_record` bytes or fewer cannot be read, they count as a record
+that was cut short by the end of the process, and are dropped. Damage farther from the end is an error, and the file is
+left unchanged.
 """
 
 from __future__ import annotations

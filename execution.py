@@ -39,7 +39,7 @@ class Workers:
     limit
         Returns how many jobs may be under way now; a cluster may grow and shrink.
     failures
-        What ends the work because of the workers, and the message for it; {0} in it is the error.
+        Exceptions that mean that workers have failed, each with its message; {0} stands for the exception.
     """
 
     executor: Executor

@@ -99,7 +99,7 @@ def _resumable(show: Callable[[int, int, int], None], checkpoint: Path | None) -
         if checkpoint is not None:
             more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
         else:
-            more = "they are lost, since only --checkpoint and --resume store plans"
+            more = "the table is lost: only --checkpoint and --resume store it"
         add_to_message(f" after {done} of {total} plans; {more}")
 
     return progress

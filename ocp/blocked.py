@@ -1,8 +1,9 @@
-"""Prove at once that a task is impossible by what no choice of the planner changes: `blocked`.
+"""Prove a task infeasible from values that the planner cannot change, before any program is solved: `blocked`.
 
-Where the platform starts and ends, and along a path that it must follow, some coordinates have no freedom. A limit that
-depends on these alone is kept or not, whatever else is chosen; and so are the tensions where the whole robot is given.
-Of a distance from a place the platform can change no more than its points can move: inside the tube, and by turning.
+Where the platform starts and ends, and along a path that it must follow, some coordinates have no freedom. Whether a
+limit that depends on these alone is kept does not depend on the planner. Nor does whether tensions exist, where the
+task fixes all of platform and carriers. A distance from an obstacle changes by at most the distance that points of the
+platform can move inside the tube.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Blocked(NamedTuple):
     excess
         Each limit that is exceeded whatever the planner chooses, where it is exceeded by most.
     certificate
-        Of an end at which no tensions exist; None if they do.
+        That of an end at which no tensions exist; None if both ends have tensions or are not fixed.
     """
 
     excess: list[Excess]

@@ -1,4 +1,4 @@
-"""Offer tasks near one that is infeasible which are feasible, each audited: another duration, or looser limits."""
+"""Search for feasible tasks near an infeasible one, by another duration or looser limits, and audit each."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _slower(excess: Excess) -> float:
 
 
 def other_limits(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
-    """Return the limits of the task that a motion keeps if they are as loose as it needs, all of them together.
+    """Return looser bounds for all limits that a motion exceeds; with all of these changes together its audit passes.
 
     The list is empty if the motion exceeds what a task cannot loosen: tension limits, limits of the robot's file, the
     ends of the motion, the inside of an obstacle.

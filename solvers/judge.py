@@ -45,10 +45,10 @@ def judge(
 ) -> Judgement | None:
     """Judge a proposal of a method.
 
-    "optimal" are tensions that give w and, of a method of least squares, that multipliers prove optimal. Else the
-    status follows from a certificate. If there is none, a method that is `exact` has lost its answer by rounding, on
-    the boundary of the available wrench set or near it: the least squares are then computed in exact arithmetic, and a
-    method with another aim proposes once more, for the cables that have a choice there.
+    The status is "optimal" if the tensions give w and, for a method of least squares, if multipliers prove them
+    optimal. Otherwise a certificate decides it. If none exists, rounding has cost an `exact` method its answer: w is on
+    the boundary of the available wrench set, or near it. The least squares are then computed in exact arithmetic and
+    are "optimal" too; a method with another aim proposes once more, for the cables that can still vary.
 
     Parameters
     ----------
@@ -87,11 +87,11 @@ def judge(
 
 
 def _face(problem: TensionProblem, form: StandardForm, exact: Array) -> TensionProblem | None:
-    """Fix the cables that have the same tension, that of a limit, in all tensions that give w; None if all have.
+    """Fix each cable that is at the same limit in every solution of A t = w; return None if none is left to choose.
 
-    With w on a face of the available wrench set those are the cables that pull along its normal. The others can all be
-    off their limits at once, so a method that needs such tensions has them. `exact` are some tensions that give w [N],
-    (m,).
+    If w is on a face of the available wrench set, these are the cables whose wrench has a component along its normal.
+    The others can all be strictly inside their limits at once, as some methods require. `exact` are some tensions that
+    give w [N], (m,).
     """
     s = (exact - form.origin)[form.moving] / form.unit  # (k,)
     near = AT_LIMIT * max(1.0, np.abs(s).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Decide how a motion starts and ends: `Ends`, and which of its values that fixes, `fixed_values`."""
+"""Decide how platform and carriers start and end, and which values this fixes: `fixed_values`."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
 def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: int) -> bool:
     """Return whether rest excludes an acceleration of a coordinate of the platform (None) or of a carrier.
 
-    Angular accelerations of carriers are left to them: only their own drives feel these. Where cables keep their
-    lengths, or are fewer than the platform's degrees of freedom, lengths and balance determine other coordinates at the
-    nodes, and a polynomial between the nodes then has no freedom left for another condition at its end: there only the
-    platform's position has it.
+    Angular accelerations of carriers stay free, since they affect only the carriers' own actuators. With fixed cable
+    lengths, or with fewer cables than degrees of freedom, lengths and balance determine the other coordinates at the
+    nodes, and the polynomial between nodes cannot meet another condition at its end; rest then sets only the
+    acceleration of the platform's position to zero.
     """
     if robot.fixed_lengths is not None or robot.m < len(robot.platform.dof):
         return owner is None and coordinate in POSITION

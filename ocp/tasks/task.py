@@ -36,12 +36,15 @@ class Tube(Part):
     )
     ends: Literal["free", "rest", "exact"] | None = Field(
         default=None,
-        description="free: anywhere in the tube; rest: on the path at start and end, without speed and acceleration; "
-        "exact: no deviation of position and speed there, whatever the acceleration; default: rest if the path goes "
+        description="free: anywhere in the tube; rest: position on the path at start and end, without speed and "
+        "acceleration (with few cables or fixed lengths angular acceleration is left open); exact: no deviation of "
+        "position and speed there, whatever the acceleration; default: rest if a path of another kind than rest goes "
         "from rest to rest and no carrier moves as given, else free",
     )
     waypoints: Literal["free", "exact"] = Field(
-        default="free", description="exact: no deviation at the points of a path of kind waypoints"
+        default="free",
+        description="exact: the platform passes through the points of a path of kind waypoints, "
+        "even where that path rounds them",
     )
 
     @property
@@ -88,8 +91,9 @@ class FreeBase(Part):
     turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
     ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
         default=None,
-        description="free: any start and end; rest: zero speed and acceleration at both; periodic: the end equals the "
-        "start; exact: start and end as in `around`; default: rest if the platform starts and ends at rest, else free",
+        description="free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
+        "cables or fixed lengths it is left open); periodic: the end equals the start; exact: start and end as in "
+        "`around`; default: rest if `tube.ends` is rest, given or by default, else free",
     )
 
 
@@ -97,7 +101,7 @@ AnyBase = Annotated[HoldBase | GivenBase | FreeBase, Field(discriminator="kind")
 
 
 class Objective(Part):
-    """The terms of the cost: each number is the amount of its quantity that adds one to the cost (Bryson's rule).
+    """Weigh the terms of the cost: each number is the amount of its quantity that adds one (Bryson's rule).
 
     The cost is the mean over time of sum |quantity / number|^2, so a larger number makes a term less important. A term
     applies only where its quantity is free to choose.

@@ -1,7 +1,7 @@
-"""`Attitudes`: turn from one attitude to the next on the shortest way, in Euler angles with exact derivatives.
+"""`Attitudes`: turn from one attitude to the next by the smallest angle, in Euler angles with exact derivatives.
 
-Between attitudes R_k and R_k+1 the rotation vector is w_k = log(R_k^T R_k+1). Where one turn ends and the next begins
-before, R = R_k exp(a w_k) exp(b w_k+1), with the body rate and its derivative
+Between attitudes R_k and R_k+1 the rotation vector is w_k = log(R_k^T R_k+1). Where two successive turns overlap, with
+shares a and b done, R = R_k exp(a w_k) exp(b w_k+1), with the body rate and its derivative
 
     Omega  = E^T w_k a' + w_k+1 b',    E = exp(b w_k+1),
     Omega' = E^T w_k a'' - b' w_k+1 x (E^T w_k a') + w_k+1 b'',

@@ -1,4 +1,4 @@
-"""`Curve`: a path of any kind without a time law of its own."""
+"""`Curve`: a path of any kind but `timed`."""
 
 from __future__ import annotations
 

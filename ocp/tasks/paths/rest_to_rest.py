@@ -1,7 +1,7 @@
 """`rest_to_rest`: the law of a motion from rest to rest, and its inverse.
 
-Acceleration and jerk are zero at both ends: carriers take places that follow the platform's acceleration, so only then
-can they start and end at rest too.
+Acceleration and jerk are zero at both ends: where carriers must be depends on the platform's acceleration, so they can
+start and end at rest only if its acceleration and jerk are zero there.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ __all__ = ["SamplePath"]
 
 
 class SamplePath(PathBase):
-    """A quintic spline through samples; speeds at its ends are those of the samples."""
+    """Interpolate samples by a quintic spline; its speeds at the ends follow from the samples near them."""
 
     kind: Literal["samples"]
     times: tuple[Finite, ...] = Field(min_length=6, description="from 0 on, increasing [s]")

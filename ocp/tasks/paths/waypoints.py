@@ -63,13 +63,12 @@ class WaypointPath(PathBase):
     )
     times: tuple[Finite, ...] | None = Field(
         default=None,
-        description="when the path passes each point, from 0 on, increasing [s]; default: by distance over the "
-        "duration",
+        description="when the path passes each point, from 0 on, increasing [s]; default: spread over "
+        "the duration, each leg for the square root of its length",
     )
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
-        description="of legs: how long the path rests at each point [s]; part of the duration, after the times; "
-        "default: nowhere",
+        description="of legs: how long the path rests at each point [s]; included in the duration; default: no rest",
     )
 
     @model_validator(mode="before")
