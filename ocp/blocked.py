@@ -85,6 +85,9 @@ def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
         owner, coordinate = owners[fixed.column]
         if fixed.end == end:
             freedom[0 if owner is None else 1 + owner, fixed.order, coordinate] = GIVEN
+    undone = any(owners[fixed.column][0] is None and fixed.value for fixed in fixed_values(scenario))
+    if scenario.relative and undone:  # rest in the frame of the carrier, on a path that moves there
+        freedom[0, 1:] = FREE
     if scenario.relative:  # in {G} each value of the platform depends on all of the carrier's, and on its own
         for order in range(3):
             freedom[0, order] = FREE if freedom[1:, : order + 1].any() else freedom[0, : order + 1].max()
@@ -98,8 +101,8 @@ def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray])
     for fixed in fixed_values(scenario):
         owner, coordinate = owners[fixed.column]
         where = (coordinate,) if owner is None else (owner, coordinate)
-        # On a path in the frame of a carrier what is fixed of the platform is as its reference.
-        (platform if owner is None else carriers)[fixed.order][(abs(fixed.end), *where)] += fixed.value
+        if owner is not None or not scenario.relative:
+            (platform if owner is None else carriers)[fixed.order][(abs(fixed.end), *where)] += fixed.value
     return platform, carriers
 
 

@@ -34,6 +34,7 @@ from .search import ENDS, Search
 from .start import deviation_from
 from .status import MotionStatus
 from .tasks.deviation import Deviation
+from .tasks.ends import between_fixed_values
 from .tasks.initial import Initial
 from .tasks.lay_out import lay_out
 from .tasks.paths import AnyPath
@@ -223,8 +224,9 @@ def _blocked(search: Search) -> Plan | None:
     if proof is None:
         return None
     start = time.perf_counter()
-    proven = proof.of(audit(slowest, None, per_output=1))
-    return Plan(slowest, MotionStatus.INFEASIBLE, None, proven, 0.0, time.perf_counter() - start)
+    motion = between_fixed_values(slowest)
+    proven = proof.of(audit(slowest, motion, per_output=1))
+    return Plan(slowest, MotionStatus.INFEASIBLE, motion, proven, 0.0, time.perf_counter() - start)
 
 
 def _time_law(search: Search) -> tuple[Plan | None, bool]:

@@ -116,17 +116,20 @@ def _rounded(value: float, up: bool) -> float:
     """Return a number of as many digits as reports print, on the side that keeps what it is for."""
     if not value:
         return value
-    unit = 10.0 ** (np.floor(np.log10(abs(value))) - DIGITS + 1)
-    return float((np.ceil if up else np.floor)(value / unit - (1e-9 if up else -1e-9)) * unit)
+    exponent = int(np.floor(np.log10(abs(value)))) - DIGITS + 1
+    digits = (np.ceil if up else np.floor)(value / 10.0**exponent - (1e-9 if up else -1e-9))
+    return float(f"{int(digits)}e{exponent}")
 
 
 def _audited(
     search: Search, scenario: Scenario, given: dict[str, Any], deviation: Deviation | None
 ) -> tuple[Scenario, Audit]:
     """Return the scenario of a task with other numbers, and the audit of the same motion for it."""
-    task = validate(given, Task, "task")
-    own = scenario.task.limits.own  # only Python holds these
-    task = task.model_copy(update={"limits": task.limits.model_copy(update={"own": own})})
+    kept = scenario.task.limits  # limits of one's own, and what makes them soft, only Python holds
+    others = {**given["limits"], "soft": kept.without_own().soft}
+    task = validate({**given, "limits": others}, Task, "task")
+    held = {"own": kept.own, "soft": kept.soft}
+    task = task.model_copy(update={"limits": task.limits.model_copy(update=held)})
     looser = replace(lay_out(scenario.robot, task), path=scenario.path, duration=scenario.duration)
     return looser, search.audit_motion(looser, deviation, "audit, looser limits")
 

@@ -37,6 +37,23 @@ def test_a_line_in_a_tube_starts_and_ends_at_rest_on_its_points(scheme):
         assert acceleration < 1e-2
 
 
+@pytest.mark.parametrize("frame", ["world", "quad"])
+def test_rest_can_be_required_on_a_path_that_moves(frame):
+    """The platform leaves a circle's speed for rest at both ends, also in the frame of a carrier that is turned."""
+    centre = [0, 0, 1] if frame == "world" else [0, 0, -1]
+    circle = {"kind": "circle", "frame": frame, "centre": centre, "radius": 0.1, "rate": 0.5}
+    task = {"path": circle, "duration": 4, "steps": 30, "tube": {"position": 0.1, "ends": "rest"}}
+    robot = "ipanema-1"
+    if frame == "quad":
+        robot, hold = "wang-flying", {"kind": "hold", "poses": {"quad": [0, 0, 0, 0, 0, 3.1]}}
+        task |= {"base": hold, "limits": {"platform_speed": 0.09}}
+    planned = plan(robot, task)
+    assert planned.feasible
+    for _, speed, acceleration in list(ends_of(planned))[:2]:
+        assert speed < 1e-4
+        assert acceleration < 1e-2
+
+
 def test_free_ends_may_move():
     """The default is what the tests above see: a line with free ends leaves its points where that saves tension."""
     planned = plan(ROBOT, {"path": LINE, "duration": 2, "tube": {**TUBE, "ends": "free"}, "steps": 40})

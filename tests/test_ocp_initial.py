@@ -67,6 +67,24 @@ def test_carriers_start_as_measured():
     assert np.abs(planned.audit.carriers.velocity[-1]).max() < 1e-6
 
 
+def test_whole_turns_of_the_measured_angles_do_not_count():
+    planned = plan(ROBOT, TASK, initial={"pose": [0, 0, 1, 0, 0, 2 * np.pi - 0.01]})
+    assert planned.feasible
+    assert np.abs(planned.audit.motion.pose[:, 5]).max() < 0.1
+
+
+def test_a_proof_shows_the_motion_that_starts_as_measured():
+    """A point mass that falls at 3 g: no cable pushes it down, and the audit shows the shortfall of that instant."""
+    line = {"kind": "line", "start": [0, 0, 1], "end": [0.3, 0.1, 1.1]}
+    state = {"pose": [0, 0, 1.05, 0, 0, 0], "acceleration": [0, 0, -30, 0, 0, 0]}
+    task = {"path": line, "duration": 2, "tube": {"position": 0.2}, "steps": 20}
+    planned = plan("point-mass-3", task, initial=state)
+    assert planned.status is MotionStatus.INFEASIBLE
+    assert not planned.audit.passed
+    assert planned.audit.violation[0] == pytest.approx(planned.certificate.shortfall, rel=1e-6)
+    assert planned.infeasible_spans
+
+
 def test_a_start_outside_the_tube_is_proven_impossible():
     planned = plan(ROBOT, TASK, initial={"pose": [0.4, 0, 1, 0, 0, 0]})
     assert planned.status is MotionStatus.INFEASIBLE

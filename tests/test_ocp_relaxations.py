@@ -5,6 +5,7 @@ import pytest
 
 from towline.models import load
 from towline.ocp import MotionStatus, plan
+from towline.ocp.limits import Limit
 
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
@@ -75,6 +76,25 @@ def test_limits_that_are_exceeded_together_are_offered_together():
         task = with_change(task, relaxed)
     assert plan(ROBOT, task).feasible
     assert "together with limits." in planned.report()
+
+
+class Low(Limit):
+    """Keep the platform below 1.5 m."""
+
+    name, unit, high = "low", "m", 1.5
+
+    def values(self, state):
+        return state.platform.position[2]
+
+
+def test_limits_of_ones_own_stay_and_stay_soft():
+    task = TASK | {"limits": {"own": (Low(),), "soft": {"low": 0.1}, "platform_speed": 0.3}}
+    planned = plan(ROBOT, task)
+    assert planned.status is MotionStatus.INFEASIBLE
+    assert {relaxed.name for relaxed in planned.relaxations} == {"duration", "limits.platform_speed"}
+    for relaxed in planned.relaxations:
+        assert float(f"{relaxed.possible:.4g}") == relaxed.possible
+        assert [limit.name for limit in relaxed.plan.scenario.task.limits.own] == ["low"]
 
 
 def test_nothing_is_offered_inside_an_obstacle_or_without_tensions():

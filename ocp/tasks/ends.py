@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import remainder
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...models import Robot
+from .deviation import Deviation
 from .paths import AnyPath, RestPath
 from .scenario import POSITION, Scenario
 from .task import FreeBase, GivenBase, Task
@@ -66,12 +68,33 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
         orders += [2] * (word == "rest" and at_rest_without_acceleration(scenario.robot, owner, coordinate))
         measured = [] if task.initial is None else list(task.initial.of(owner))
         for order, value in measured:
-            yield FixedValue(0, column, order, value[coordinate] - float(reference[order][0, coordinate]))
+            off = value[coordinate] - float(reference[order][0, coordinate])
+            turns = order == 0 and coordinate not in POSITION
+            yield FixedValue(0, column, order, remainder(off, 2 * np.pi) if turns else off)
         for end in (-1,) if measured else (0, -1):
             for order in orders:
                 # The deviation of what rests undoes the motion of its reference.
                 undone = word == "rest" and order > 0
                 yield FixedValue(end, column, order, -float(reference[order][end, coordinate]) if undone else 0.0)
+
+
+def between_fixed_values(scenario: Scenario) -> Deviation | None:
+    """Return a motion that starts and ends as the task fixes it; None if the references do.
+
+    Quintic polynomials join the ends: this is the motion that is shown where no motion is possible.
+    """
+    fixed = [value for value in fixed_values(scenario) if abs(value.value) > AT_REST]
+    if not fixed:
+        return None
+    from scipy.interpolate import BPoly  # loads for longer than most proofs take, which do not need it
+
+    ends = np.zeros((scenario.count, 2, 3))
+    for end, column, order, value in fixed:
+        ends[column, end, order] = value
+    nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
+    curves = [BPoly.from_derivatives([0.0, scenario.duration], list(column)) for column in ends]
+    q, v, a = (np.stack([curve(nodes, order) for curve in curves], axis=1) for order in range(3))
+    return Deviation(nodes, q, v, a, np.zeros((len(nodes), scenario.robot.m)))
 
 
 def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: int) -> bool:

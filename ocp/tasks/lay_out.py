@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import remainder
+
 import casadi as ca
 import numpy as np
 
@@ -159,11 +161,16 @@ def _check_start(scenario: Scenario, where: str) -> None:
         for order, value in scenario.task.initial.of(owner):
             for i, coordinate in enumerate(COORDINATES):
                 off = value[i] - float(reference[order][0, i])
+                if order == 0 and i in ATTITUDE:
+                    off = remainder(off, 2 * np.pi)
                 if (owner, i) not in scenario.owners() and abs(off) > TOLERANCE:
                     what = ("", "speed of ", "acceleration of ")[order]
+                    hint = "a tube or a free base may leave it"
+                    if owner is None and not scenario.robot.dof_mask[i]:
+                        hint = f"{coordinate} is not one of the platform's degrees of freedom"
                     raise InputError(
                         f"{where}: initial must have the {what}{coordinate} of the {name} that the task fixes at its "
-                        f"start, {value[i] - off:g}, got {value[i]:g}; a tube or a free base may leave it"
+                        f"start, {value[i] - off:g}, got {value[i]:g}; {hint}"
                     )
 
 

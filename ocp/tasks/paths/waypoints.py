@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import pairwise
+from math import remainder
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -22,6 +23,7 @@ __all__ = ["WaypointPath"]
 
 BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
 LOOKS = 2001  # at the box of the points
+SAME = 1e-12  # [rad], of an attitude after whole turns
 GIMBAL = 0.05  # [rad] from a pitch of 90 degrees
 GONE = {
     "smooth": "write 'shape: spline' for a smooth curve through the points, or nothing for straight legs",
@@ -98,10 +100,11 @@ class WaypointPath(PathBase):
             self._spline.check()
             return self
         for index, (before, after) in enumerate(pairwise(self.points)):
-            if before == after and self.times is None:
+            turned = [abs(remainder(b - a, 2 * np.pi)) for a, b in zip(before[3:], after[3:], strict=True)]
+            if before[:3] == after[:3] and max(turned) < SAME and self.times is None:
                 raise ValueError(
                     f"points[{index + 1}] must differ from points[{index}] unless there are times; to rest at a "
-                    "point, write dwell"
+                    "point, write dwell; whole turns are none"
                 )
         if self.dwell is not None:
             self._check_dwell(self.dwell)
