@@ -50,12 +50,13 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
     missing = audit.violation.max() > audit.tolerance
     if left is None and missing:
         return []
-    requested = near = scenario.duration
+    requested = near = lasts = scenario.duration
     if left is not None:
         near = min(max(near, LONGER * left.shortest), left.longest / LONGER)
     for _ in range(TRIES):
         factor = max((_slower(excess) for excess in audit.excess), default=1.0)
-        near = _rounded(near * (LONGER * factor if factor > 1 else 1.0), up=near >= requested)
+        near = max(near, LONGER * factor * lasts) if factor > 1 else near
+        lasts = near = _rounded(near, up=near >= requested)
         if (left is not None and not left.shortest <= near <= left.longest) or near > LONGEST * requested:
             return []
         longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)

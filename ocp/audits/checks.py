@@ -156,13 +156,15 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
     starts = [(0.0, 1.0)] if scenario.task.initial is None else []
     for end, inwards in (*starts, (scenario.duration, -1.0)):
         steps = inwards * np.array([0.0, STEP, 2 * STEP, *(CURVED_STEP * np.arange(1, 4))])
-        off_path = _off_path(audited, end + steps)
-        # At rest the motion itself stands still, in the frame of its path; otherwise it moves as the path does.
-        moved = off_path + (scenario.path.at(end + steps, scenario.duration).pose if word == "rest" else 0.0)
-        at, near, far, *further = moved
+        at, near, far, *further = _off_path(audited, end + steps)
         speed = (-3 * at + 4 * near - far) / (2 * inwards * STEP)
         acceleration = np.array([2.0, -5.0, 4.0, -1.0]) @ np.stack([at, *further]) / CURVED_STEP**2
-        values_of = [(off_path[0], "", PATH_TOLERANCE), (speed, "/s", END_TOLERANCE)]
+        if (
+            word == "rest" and scenario.platform_free
+        ):  # the motion itself stands still, in the frame of its path: otherwise it moves as the path
+            of_path = scenario.path.at(np.array([end]), scenario.duration)
+            speed, acceleration = speed + of_path.velocity[0], acceleration + of_path.acceleration[0]
+        values_of = [(at, "", PATH_TOLERANCE), (speed, "/s", END_TOLERANCE)]
         values_of += [(acceleration, "/s^2", END_ACCELERATION_TOLERANCE)] * (word == "rest")
         for values, per, tolerance in values_of:
             for place, unit in ((POSITION, "m"), (ATTITUDE, "rad")):
