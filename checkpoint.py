@@ -38,7 +38,7 @@ _SAFE_EVERY = 1.0  # [s] between writes that survive a power cut
 
 @dataclass(frozen=True)
 class Kind:
-    """What a checkpoint holds.
+    """The kind of records in a checkpoint.
 
     Attributes
     ----------

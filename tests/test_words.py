@@ -112,10 +112,10 @@ def literals(file):
     ]
 
 
-def openings(file):
-    """Return line and first word of each function's docstring."""
-    functions = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.FunctionDef)]
-    return [(node.lineno, ast.get_docstring(node).split()[0]) for node in functions if ast.get_docstring(node)]
+def openings(file, kind):
+    """Return line and first word of each docstring of a kind of node."""
+    nodes = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, kind)]
+    return [(node.lineno, ast.get_docstring(node).split()[0]) for node in nodes if ast.get_docstring(node)]
 
 
 def cells(file):
@@ -177,7 +177,16 @@ def test_docstrings_and_messages(module):
 
 @pytest.mark.parametrize("module", MODULES)
 def test_docstrings_of_functions_begin_with_a_verb(module):
-    hits = [f"{module}:{line}: {word} ..." for line, word in openings(ROOT / module) if NO_VERB.fullmatch(word)]
+    functions = openings(ROOT / module, ast.FunctionDef)
+    hits = [f"{module}:{line}: {word} ..." for line, word in functions if NO_VERB.fullmatch(word)]
+    assert not hits, "\n".join(hits)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_docstrings_of_classes_do_or_are_something(module):
+    """Check that a class that does something begins with a verb, and data with the noun for them."""
+    classes = openings(ROOT / module, ast.ClassDef)
+    hits = [f"{module}:{line}: {word} ..." for line, word in classes if re.fullmatch("What|How|Where|When|Which", word)]
     assert not hits, "\n".join(hits)
 
 

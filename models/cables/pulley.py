@@ -38,7 +38,7 @@ from . import checks
 
 
 class Exit(NamedTuple):
-    """How m cables leave their pulleys, in the frame that the pulleys and the attachments were given in.
+    """The places and directions in which m cables leave their pulleys, in the frame of pulleys and attachments.
 
     Attributes
     ----------

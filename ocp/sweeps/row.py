@@ -1,4 +1,4 @@
-"""`Row`: what a sweep keeps of one plan; `plan_case` plans it, in whatever process."""
+"""`Row`: the results of one plan in the table of a sweep; `plan_case` plans it, in whatever process."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONGEST = 65_536  # bytes of a row in a checkpoint
 
 
 class Row(NamedTuple):
-    """What a sweep keeps of one plan; numbers that do not exist are nan.
+    """The results of one plan in the table of a sweep; numbers that do not exist are nan.
 
     Attributes
     ----------

@@ -87,9 +87,9 @@ def sweep(
     Raises
     ------
     InputError
-        If an argument or a combination of values is wrong, the checkpoint cannot be written, is damaged or of another
-        sweep, or there is no such scheduler: checked before anything is
-        planned. Later, if the checkpoint or a plan of `keep` can no longer be written; the checkpoint can be resumed.
+        Before anything is planned, if an argument or a combination of values is wrong, the checkpoint cannot be
+        written, is damaged or of another sweep, or there is no such scheduler. Later, if the checkpoint or a plan of
+        `keep` can no longer be written; the checkpoint can be resumed.
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """

@@ -10,7 +10,7 @@ __all__ = ["Array", "Method", "Proposal", "StandardForm"]
 
 
 class Proposal(NamedTuple):
-    """What a method proposes; `towline.solvers.solve` judges it.
+    """The proposal of a method; `towline.solvers.solve` judges it.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ class PathBase(Part):
     @property
     def stretches(self) -> bool:
         """Return whether another duration means the same places, later or sooner."""
-        return False
+        return self.natural_duration is None and not self.resting
 
     @property
     def resting(self) -> float:

@@ -31,6 +31,11 @@ class CirclePath(PathBase):
     def natural_duration(self) -> float | None:
         return 2 * np.pi / abs(self.rate) if self.rate else None
 
+    @property
+    @override
+    def stretches(self) -> bool:
+        return False  # speed and drift are its own, even where it has no round
+
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
         angle = self.phase + self.rate * times

@@ -33,7 +33,7 @@ LOOKS = 48  # at the angles of each leg
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a motion along legs is: those before `leg` are done, `leg` and the one after it move.
+    """The progress of a motion along legs: those before `leg` are done, `leg` and the one after it move.
 
     `first` and `second` are the shares of these two that are done, with two derivatives, (n,) each.
     """

@@ -26,11 +26,6 @@ class LinePath(PathBase):
         description="smooth: from rest to rest, acceleration and jerk zero there; uniform: constant speed",
     )
 
-    @property
-    @override
-    def stretches(self) -> bool:
-        return True
-
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
         start, change = np.array(self.start), np.array(self.end) - np.array(self.start)

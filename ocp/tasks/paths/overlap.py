@@ -1,4 +1,4 @@
-"""How far two successive legs may overlap: `largest_left`, and in time: `shares_of_time`."""
+"""Let two successive legs overlap as far as the corner allows: `largest_left`, and in time: `shares_of_time`."""
 
 from __future__ import annotations
 

@@ -20,11 +20,6 @@ class RestPath(PathBase):
     kind: Literal["rest"]
     pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
 
-    @property
-    @override
-    def stretches(self) -> bool:
-        return True
-
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
         pose = np.tile(np.array(self.pose), (len(times), 1))

@@ -149,11 +149,6 @@ class WaypointPath(PathBase):
 
     @property
     @override
-    def stretches(self) -> bool:
-        return self.times is None and not self.resting
-
-    @property
-    @override
     def resting(self) -> float:
         return sum(self.dwell or ())
 
