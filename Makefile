@@ -1,6 +1,8 @@
 # Needs python3 >= 3.11 and make, nothing else. Each target installs what it needs into .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
+# Empty is off. Where it is set, each of the hundreds of processes that the tests start compiles all modules anew.
+export PYTHONDONTWRITEBYTECODE :=
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
@@ -20,8 +22,9 @@ lint: .venv/dev.stamp
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
+# Each worker starts with half of the tests in order, so that what a file's tests share is computed once.
 unit: .venv/dev.stamp
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # The documentation site, in site/; a warning is an error, as long as no --quiet keeps it from being counted.
 docs: .venv/dev.stamp
