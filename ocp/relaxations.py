@@ -56,6 +56,8 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
     for _ in range(TRIES):
         factor = max((_slower(excess) for excess in audit.excess), default=1.0)
         near = max(near, LONGER * factor * lasts) if factor > 1 else near
+        if near == lasts:  # no duration changes what is exceeded, and this one is audited
+            return []
         lasts = near = _rounded(near, up=near >= requested)
         if (left is not None and not left.shortest <= near <= left.longest) or near > LONGEST * requested:
             return []

@@ -439,7 +439,7 @@ def test_variable_length_robots_stay():
     start = list(robot.carrier_home[0, :3])
     moved = {robot.carriers[0].name: {"kind": "line", "start": start, "end": [start[0] + 0.02, *start[1:]]}}
     path = {"kind": "rest", "pose": list(robot.home)}
-    found = plan(robot, {"path": path, "duration": 2, "base": {"kind": "given", "paths": moved}})
+    found = plan(robot, {"path": path, "duration": 0.5, "base": {"kind": "given", "paths": moved}})
     assert "drive" in names(found.audit)
 
 
