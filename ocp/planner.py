@@ -22,7 +22,7 @@ from ..models import Robot
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..text import quantity
-from .audits.audit import audit, other_tensions_may_pass
+from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
@@ -177,7 +177,8 @@ def _fixed_motion(search: Search) -> Plan:
     """Plan a task that leaves only the tensions free: each instant is a tension-distribution problem of its own.
 
     Some tensions keep the limits on tension rates and on the forces at the carriers, and others do not. Where only
-    these limits are exceeded, the program searches for tensions that keep them.
+    these limits are exceeded, the program searches for tensions that keep them; and for cheaper ones where the
+    objective weighs more than their sum of squares, which is least at each instant.
     """
     start = time.perf_counter()
     audit = search.audit_motion(search.scenario, None)
@@ -190,7 +191,11 @@ def _fixed_motion(search: Search) -> Plan:
         status = MotionStatus.NOT_FOUND
     plan = Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent)
     if audit.passed:
-        return plan
+        weighed = search.scenario.task.objective
+        if weighed.margin is weighed.tension_rate is None or not other_tensions_exist(search.scenario, audit):
+            return plan
+        chosen = _free_motion(search, None)
+        return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan
     left = _durations(search, search.scenario)
     relaxed = other_duration(search, search.scenario, left, audit) + other_limits(search, search.scenario, None, audit)
     return replace(plan, relaxations=tuple(relaxed))

@@ -66,12 +66,13 @@ def test_exact_waypoints_are_passed_though_the_tube_is_used():
     assert found.tracking_error_max > 1e-3
 
 
-def test_margin_is_the_largest_that_there_is():
+@pytest.mark.parametrize("duration", [{"min": 1, "max": 1.2}, 1.0], ids=["open", "fixed"])
+def test_margin_is_the_largest_that_there_is(duration):
     """At a resting pose a linear program knows it: max s with A t = w and t at least s inside its limits."""
     robot = load("ipanema-1")
     path = {"kind": "rest", "pose": [0.2, 0.1, 1]}
     objective = {"margin": 1e-3, "tension": 1e4}
-    found = plan(robot, {"path": path, "duration": {"min": 1, "max": 1.2}, "steps": 5, "objective": objective})
+    found = plan(robot, {"path": path, "duration": duration, "steps": 5, "objective": objective})
     assert found.feasible, found.report()
     dynamics = Dynamics(robot)
     pose = np.array([*path["pose"], 0, 0, 0])
@@ -87,6 +88,22 @@ def test_margin_is_the_largest_that_there_is():
         bounds=[(None, None)] * (m + 1),
     )
     assert found.margin == pytest.approx(-best.fun, rel=1e-4)
+
+
+def test_tensions_of_a_fixed_motion_are_those_that_the_objective_prefers():
+    """Least squares at each instant jump where a cable becomes slack; the weight of their rates smooths them."""
+    task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.4, 1.6]}, "duration": 1, "steps": 50}
+
+    def squares(found):
+        rates = np.diff(found.audit.tensions, axis=0) / np.diff(found.audit.times)[:, None]
+        return np.mean(np.sum(found.audit.tensions**2, axis=1)), np.mean(np.sum(rates**2, axis=1))
+
+    least, smooth = (plan("ipanema-1", task | {"objective": weights}) for weights in ({}, {"tension_rate": 100}))
+    assert least.feasible and smooth.feasible
+    (size, rate), (larger, lower) = squares(least), squares(smooth)
+    weight = load("ipanema-1").force_scale
+    assert larger > size and lower < rate
+    assert larger / weight**2 + lower / 100**2 < size / weight**2 + rate / 100**2
 
 
 def test_tension_rates_hold_in_the_saved_trajectory():

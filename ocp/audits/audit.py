@@ -21,7 +21,7 @@ from .drift import Drift, drift
 from .excess import Excess
 from .tensions import INDEPENDENT, TOLERANCE, Distribution, in_all_winds, scaled
 
-__all__ = ["Audit", "audit", "other_tensions_may_pass"]
+__all__ = ["Audit", "audit", "other_tensions_exist", "other_tensions_may_pass"]
 
 
 @dataclass(frozen=True)
@@ -161,6 +161,11 @@ def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:
     exceeded = {excess.limit for excess in audit.excess}
     if audit.violation.max() > audit.tolerance or not exceeded <= scenario.limits.of_tensions:
         return False
+    return other_tensions_exist(scenario, audit)
+
+
+def other_tensions_exist(scenario: Scenario, audit: Audit) -> bool:
+    """Return whether the cables can give a motion's wrenches by tensions other than the audited ones."""
     A = scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
     values = np.linalg.svd(scaled(scenario, A), compute_uv=False)
     return scenario.robot.m > values.shape[1] or bool((values[:, -1] < INDEPENDENT * values[:, 0]).any())
