@@ -122,6 +122,9 @@ def plan(
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         planned = plan_motion(loaded, read, watch)
         written = {"file": planned.save(target)}
+        if not planned.feasible:
+            watch.now("searching for feasible tasks near this one")
+            _ = planned.relaxations
         watch.now("drawing")
         pictures = planned.plot(figures) if figures else []
         if report is not None:

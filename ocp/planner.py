@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ..errors import InputError
@@ -28,7 +29,7 @@ from .cost import cost
 from .durations import Durations, durations
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
-from .relaxations import other_duration, other_limits
+from .relaxations import near_fixed_motion, near_motion
 from .result import Plan
 from .search import ENDS, Search
 from .start import deviation_from
@@ -197,8 +198,7 @@ def _fixed_motion(search: Search) -> Plan:
         chosen = _free_motion(search, None)
         return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan
     left = _durations(search, search.scenario)
-    relaxed = other_duration(search, search.scenario, left, audit) + other_limits(search, search.scenario, None, audit)
-    return replace(plan, relaxations=tuple(relaxed))
+    return replace(plan, offers=partial(near_fixed_motion, search, search.scenario, left, audit))
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
@@ -230,8 +230,10 @@ def _blocked(search: Search) -> Plan | None:
         return None
     start = time.perf_counter()
     motion = between_fixed_values(slowest)
-    proven = proof.of(audit(slowest, motion, per_output=1))
-    return Plan(slowest, MotionStatus.INFEASIBLE, motion, proven, 0.0, time.perf_counter() - start)
+    audited = audit(slowest, motion, per_output=1)
+    seconds = time.perf_counter() - start
+    offers = partial(near_motion, search, slowest, motion, audited)
+    return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 
 
 def _time_law(search: Search) -> tuple[Plan | None, bool]:
@@ -262,8 +264,8 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
-    relaxed = other_duration(search, slowest, left, audit) + other_limits(search, slowest, None, audit)
-    return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, relaxations=tuple(relaxed)), own
+    offers = partial(near_fixed_motion, search, slowest, left, audit)
+    return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
 def _coarse(search: Search) -> Deviation | None:
@@ -294,8 +296,9 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
 def _closest(search: Search, reason: str) -> Plan:
     """Return the best plan; if it is not feasible, with the limits that its motion keeps if they are looser."""
     plan = search.best(reason)
-    relaxed = [] if plan.feasible else other_limits(search, plan.scenario, plan.deviation, plan.audit)
-    return replace(plan, relaxations=tuple(relaxed))
+    if plan.feasible:
+        return plan
+    return replace(plan, offers=partial(near_motion, search, plan.scenario, plan.deviation, plan.audit))
 
 
 def _refine(search: Search, outcome: Outcome) -> str:

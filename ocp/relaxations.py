@@ -8,10 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..models.parsing import validate
+from ..models.ranges import PositiveRange
 from ..text import quantity
-from .audits.audit import Audit
+from .audits.audit import Audit, other_tensions_may_pass
 from .audits.excess import Excess
 from .durations import Durations
+from .nlp.rows import Mesh
+from .nlp.solver import Outcome
 from .result import Plan, Relaxed
 from .search import Search
 from .status import MotionStatus
@@ -20,13 +23,19 @@ from .tasks.lay_out import lay_out
 from .tasks.scenario import Scenario
 from .tasks.task import Task
 
-__all__ = ["other_duration", "other_limits"]
+__all__ = ["near_fixed_motion", "near_motion"]
 
 LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
 LONGEST = 100.0  # times the requested duration: a longer one does not help
 TRIES = 3  # of a duration: not all that is exceeded falls as speeds and accelerations do
 DIGITS = 4  # of what is offered: reports print no more
 HALVINGS = 12  # of a margin
+PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
+TIME_COUNTS = 1e-2  # of the requested duration: it adds one to the objective, so that other costs hardly matter
+LONGEST_CHOSEN = 20.0  # times the requested duration: the program starts at its geometric mean with the requested one
+LONGER_CHOSEN = 1.05  # than the shortest duration, at which almost nothing is left to choose
+BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
+LEAST_SECONDS = 5.0  # for a program, however short the search was
 
 
 class Change(NamedTuple):
@@ -38,7 +47,19 @@ class Change(NamedTuple):
     possible: float
 
 
-def other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+    """Return what would make a fixed motion feasible; `left` are the durations that the tensions allow."""
+    chosen = _soft_limits(search, None) if other_tensions_may_pass(scenario, audit) else []
+    return _other_duration(search, scenario, left, audit) + (chosen or _other_limits(search, scenario, None, audit))
+
+
+def near_motion(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
+    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one."""
+    limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
+    return _longer_duration(search) + limits
+
+
+def _other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return the nearest duration at which a scenario's fixed motion is possible, if one is known.
 
     Speeds fall with the duration, accelerations with its square; `left` are the durations that the tensions allow.
@@ -79,9 +100,12 @@ def _slower(excess: Excess) -> float:
     return ratio**0.5 if excess.unit.endswith("/s^2") else ratio if excess.unit.endswith("/s") else 1.0
 
 
-def other_limits(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
+def _other_limits(
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, beyond: float = 0.0
+) -> list[Relaxed]:
     """Return looser bounds for all limits that a motion exceeds; with all of these changes together its audit passes.
 
+    They are looser than the motion needs by `beyond` of their change.
     The list is empty if the motion exceeds what a task cannot loosen: tension limits, limits of the robot's file, the
     ends of the motion, the inside of an obstacle.
     """
@@ -89,7 +113,7 @@ def other_limits(search: Search, scenario: Scenario, deviation: Deviation | None
     least = scenario.hard_margin
     for _ in range(TRIES):
         for excess in audit.excess:
-            change = _loosened(given, excess, scenario)
+            change = _loosened(given, excess, scenario, beyond)
             if change is None:
                 return []
             first = changes.get(change.name, change)
@@ -115,6 +139,64 @@ def other_limits(search: Search, scenario: Scenario, deviation: Deviation | None
     return [Relaxed(*change, plan) for change in changes.values()]
 
 
+def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
+    """Return looser bounds from the motion that exceeds the limits which a task can loosen by least.
+
+    The list is empty if the program has no solution with these limits soft.
+    """
+    scenario = search.scenario
+    limits = scenario.task.limits
+    soft = {
+        limit.name: PREFERRED * limit.scale
+        for limit in scenario.limits
+        if limit.soft is None and (limit.name == "keep_out" or getattr(limits, limit.name, None) is not None)
+    }
+    if scenario.hard_margin:
+        soft["margin"] = PREFERRED * scenario.robot.force_scale
+    if not soft:
+        return []
+    softer = scenario.task.model_copy(update={"limits": limits.model_copy(update={"soft": limits.soft | soft})})
+    outcome = _solved(search, replace(lay_out(scenario.robot, softer), path=scenario.path), start)
+    if not outcome.success:
+        return []
+    lasting = scenario.lasting(outcome.duration)
+    audit = search.audit_motion(lasting, outcome.deviation)
+    return _other_limits(search, lasting, outcome.deviation, audit, BEYOND)
+
+
+def _longer_duration(search: Search) -> list[Relaxed]:
+    """Return a longer duration at which a scenario's motion, which the planner chooses, is possible, if it is shown."""
+    scenario, task = search.scenario, search.scenario.task
+    if not all(path.stretches for path in (scenario.path, *scenario.carrier_paths.values())):
+        return []
+    requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
+    open_task = task.model_copy(
+        update={
+            "duration": PositiveRange(min=requested, max=LONGEST_CHOSEN * requested),
+            "objective": task.objective.model_copy(update={"time": TIME_COUNTS * requested}),
+        }
+    )
+    outcome = _solved(search, lay_out(scenario.robot, open_task), None)
+    for attempt in range(TRIES):
+        if not outcome.success:
+            break
+        near = _rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
+        longer = lay_out(scenario.robot, task.model_copy(update={"duration": near}))
+        outcome = _solved(search, longer, outcome.deviation.stretched(near / outcome.duration), 2**attempt)
+        audit = search.audit_motion(longer, outcome.deviation)
+        if audit.passed:
+            plan = Plan(longer, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
+            return [Relaxed("duration", "s", requested, near, plan)]
+    return []
+
+
+def _solved(search: Search, scenario: Scenario, guess: Deviation | None, finer: int = 1) -> Outcome:
+    """Solve another scenario's program, in the time that the task's limit left and no longer than the search took."""
+    beside = Search(scenario, {}, search.progress)
+    beside.solve_s = max(scenario.task.time_limit - max(search.solve_s, LEAST_SECONDS), search.solve_s)
+    return beside.solve("program of a relaxation", Mesh(finer * scenario.task.steps), guess)
+
+
 def _rounded(value: float, up: bool) -> float:
     """Return a number of as many digits as reports print, on the side that keeps what it is for."""
     if not value:
@@ -137,11 +219,10 @@ def _audited(
     return looser, search.audit_motion(looser, deviation, "audit, looser limits")
 
 
-def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario) -> Change | None:
+def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond: float) -> Change | None:
     """Return the change of a task's field that accepts an excess, made in `given`; None if there is no such field."""
-    limits, value = given["limits"], excess.value
-    above = value > excess.bound
-    value = _rounded(value, above)
+    limits, above = given["limits"], excess.value > excess.bound
+    value = _rounded(excess.value + beyond * (excess.value - excess.bound), above)
     name, bound = f"limits.{excess.limit}", limits.get(excess.limit)
     if excess.limit == "tube.position":
         given["tube"]["position"], name = value, excess.limit

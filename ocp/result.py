@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,9 +56,8 @@ class Plan:
         The steps of the planner, in order, with their messages and times.
     objective
         Value of the objective that the solver reached, where it solved a program; a plan without one has None.
-    relaxations
-        If not feasible: fields of tasks near this one that are feasible, as far as the planner knows some. Those with
-        the same plan have to change together.
+    offers
+        Computes `relaxations`.
     """
 
     scenario: Scenario
@@ -72,7 +72,7 @@ class Plan:
     iterates: tuple[tuple[int, float, float], ...] = ()
     stages: tuple[Stage, ...] = ()
     objective: float | None = None
-    relaxations: tuple[Relaxed, ...] = ()
+    offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
 
     @property
     def feasible(self) -> bool:
@@ -109,6 +109,15 @@ class Plan:
         {G}; `wind` is set for a task with a box of winds.
         """
         return None if self.feasible else self.audit.certificate
+
+    @cached_property
+    def relaxations(self) -> tuple[Relaxed, ...]:
+        """Return, if not feasible, fields of tasks near this one that are feasible, as far as the planner knows some.
+
+        Those with the same plan have to change together. They are computed when they are first used, which can take
+        longer than the plan: programs are solved for them in the time that its limit left.
+        """
+        return tuple(self.offers())
 
     @property
     def relaxed(self) -> Relaxed | None:

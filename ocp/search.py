@@ -43,7 +43,7 @@ class Search:
     """Solve one scenario's programs, and record the time and the message of each stage."""
 
     def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
-        self.scenario, self._solvers, self._progress = scenario, solvers, progress
+        self.scenario, self.progress, self._solvers = scenario, progress, solvers
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
         self._iterates: list[tuple[int, float, float]] = []
@@ -60,8 +60,8 @@ class Search:
     def _iteration(self, iteration: int, objective: float, infeasibility: float) -> None:
         """Record an iteration, and report it."""
         self._iterates.append((iteration, objective, infeasibility))
-        if self._progress is not None:
-            self._progress(iteration, objective, infeasibility)
+        if self.progress is not None:
+            self.progress(iteration, objective, infeasibility)
 
     @property
     def seconds_left(self) -> float:
