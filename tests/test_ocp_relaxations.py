@@ -107,7 +107,8 @@ def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
 
 
 def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
-    task = TASK | {"path": {**LINE, "end": [0.6, 0.4, 1.6]}, "duration": 1, "steps": 40, "limits": {"tension_rate": 100}}
+    path = {**LINE, "end": [0.6, 0.4, 1.6]}
+    task = {"path": path, "duration": 1, "steps": 40, "limits": {"tension_rate": 100}}
     planned = plan(ROBOT, task)
     assert planned.status is MotionStatus.NOT_FOUND
     (rate,) = (relaxed.possible for relaxed in planned.relaxations if relaxed.name == "limits.tension_rate")
