@@ -50,7 +50,7 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
     return parse_yaml(text, model, where, path.parent)
 
 
-def read_bytes(path: Path, what: str) -> bytes:
+def read_bytes(path: Path, what: str, largest: int = LARGEST_FILE) -> bytes:
     """Return the content of `path`, or raise InputError if it cannot be read or is too large; `what` describes it."""
     where = printable(str(path))
     try:
@@ -60,10 +60,10 @@ def read_bytes(path: Path, what: str) -> bytes:
         if not stat.S_ISREG(kind):
             raise InputError(f"{where} must be {what}, got a device or a pipe")
         with path.open("rb") as stream:
-            content = stream.read(LARGEST_FILE + 1)
-        if len(content) > LARGEST_FILE:
+            content = stream.read(largest + 1)
+        if len(content) > largest:
             size = max(len(content), path.stat().st_size)
-            raise InputError(f"{where} must be {what} of at most {LARGEST_FILE / 1e6:g} MB, got {size / 1e6:.1f} MB")
+            raise InputError(f"{where} must be {what} of at most {largest / 1e6:g} MB, got {size / 1e6:.1f} MB")
         return content
     except InputError:
         raise

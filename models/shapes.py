@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from pathlib import Path
+from typing import Any, Literal, Self, TypeAlias
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
 
-from .part import Part, Positive, Vector3
+from .part import AT_ORIGIN, Part, Pose, Positive, Vector3
+from .points import placed, rotations
+from .polyhedron import Polyhedron, convex_hull, polyhedron
+from .stl import read_stl
 
-__all__ = ["Block", "Capsule", "Sphere"]
+__all__ = ["Block", "Capsule", "ConvexMesh", "Shape", "Sphere"]
+
+DENT = 1e-5  # of its size by which a convex surface may be inside its hull: files have 7 digits
 
 
 class Sphere(Part):
@@ -29,14 +36,123 @@ class Capsule(Part):
 
 
 class Block(Part):
-    """A box along the axes of its frame."""
+    """A box along the axes of its frame, or turned about its centre."""
 
     kind: Literal["box"]
-    min: Vector3 = Field(description="corner in its frame [m]")
-    max: Vector3 = Field(description="corner in its frame [m]")
+    min: Vector3 = Field(description="corner in its frame, before it is turned [m]")
+    max: Vector3 = Field(description="corner in its frame, before it is turned [m]")
+    attitude: Vector3 | None = Field(
+        default=None, description="roll, pitch, yaw by which it is turned about its centre [rad]; default: not turned"
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if any(low >= high for low, high in zip(self.min, self.max, strict=True)):
             raise ValueError(f"min must be smaller than max in each coordinate, got {self.min} and {self.max}")
         return self
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Return its centre, (3,) [m]."""
+        return (np.array(self.min) + np.array(self.max)) / 2
+
+    @property
+    def half(self) -> np.ndarray:
+        """Return half of its edges, (3,) [m]."""
+        return (np.array(self.max) - np.array(self.min)) / 2
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Return the directions of its edges as columns, (3, 3) [-]."""
+        return np.eye(3) if self.attitude is None else rotations(np.array(self.attitude))
+
+
+class ConvexMesh(Part):
+    """A convex body: the hull of points, or of the triangles of an STL file.
+
+    A file is read once, where the task is read: a saved task has its vertices. What a distance costs grows with the
+    faces of the hull, of which there may be 200.
+    """
+
+    kind: Literal["mesh"]
+    file: str | None = Field(
+        default=None,
+        description="in a task file: an STL file, binary or text, relative to the task file, instead of vertices",
+    )
+    hull: bool = Field(
+        default=False, description="of a file: accept a surface that is not convex, and take its convex hull"
+    )
+    vertices: tuple[Vector3, ...] = Field(
+        default=(), description="points in the body's own axes, in units of `scale`, of which it is the convex hull"
+    )
+    scale: Positive = Field(
+        default=1.0,
+        description="length of a unit of vertices or file [m]: 0.001 for millimetres; required for a file, since STL "
+        "has no unit",
+    )
+    pose: Pose = Field(
+        default=AT_ORIGIN, description="of the body's axes in its frame, x, y, z, roll, pitch, yaw [m, rad]"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, dict) or not isinstance(data.get("file"), str):
+            return data
+        if set(data) - set(cls.model_fields):  # a misspelt key is reported before what is missing without it
+            return data
+        name, scale = data["file"], data.get("scale")
+        if data.get("vertices"):
+            raise ValueError(f"vertices must be left out, since file has them, got both and {name!r}")
+        if scale is None:
+            raise ValueError(
+                f"scale must be given with the file {name!r}, since STL has no unit: 0.001 for millimetres"
+            )
+        triangles = read_stl((info.context or {}).get("folder", Path()) / name)
+        try:
+            body = convex_hull(triangles.reshape(-1, 3))
+        except ValueError as error:
+            raise ValueError(f"file {name!r} {error}") from None
+        dent = 0.0 if data.get("hull") else _dent(body, triangles)
+        if dent > DENT * body.size:
+            by = dent * scale if isinstance(scale, int | float) else dent
+            raise ValueError(
+                f"file {name!r} must be convex, got a surface up to {by:.3g} m inside its convex hull; write hull: "
+                "true to keep out of the hull, or give several convex parts"
+            )
+        kept = {key: value for key, value in data.items() if key not in ("file", "hull")}
+        return kept | {"vertices": tuple(tuple(corner) for corner in body.corners.tolist())}
+
+    @model_validator(mode="after")
+    def _spans_a_body(self) -> Self:
+        if not self.vertices:
+            raise ValueError("vertices must be four points or more, or file the name of an STL file, got neither")
+        try:
+            polyhedron(self.vertices)
+        except ValueError as error:
+            raise ValueError(f"vertices {error}") from None
+        return self
+
+    @property
+    def body(self) -> Polyhedron:
+        """Return its faces and edges in its frame [m]."""
+        own = polyhedron(self.vertices)
+        pose, turned = np.array(self.pose), rotations(np.array(self.pose[3:]))
+        normals = own.normals @ turned.T
+        return Polyhedron(
+            normals=normals,
+            offsets=self.scale * own.offsets + normals @ pose[:3],
+            edges=placed(pose, self.scale * own.edges.reshape(-1, 3)).reshape(-1, 2, 3),
+            corners=placed(pose, self.scale * own.corners),
+        )
+
+
+Shape: TypeAlias = Sphere | Capsule | Block | ConvexMesh
+
+
+def _dent(body: Polyhedron, triangles: np.ndarray) -> float:
+    """Return how far triangles (n, 3, 3) are inside their convex hull: the largest distance of any from a face."""
+    deepest = 0.0
+    for some in np.array_split(triangles, 1 + len(triangles) // 10_000):
+        deepest = max(deepest, float((-body.beyond(some)).max(axis=1).min(axis=1).max()))
+    return deepest

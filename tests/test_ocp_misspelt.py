@@ -40,6 +40,16 @@ MISSPELT = {
         "center",
         "centre",
     ),
+    "keep_out, mesh": (
+        circle(limits={"keep_out": [{"kind": "mesh", "file": "part.stl", "scal": 0.001}]}),
+        "scal",
+        "scale",
+    ),
+    "keep_out, box": (
+        circle(limits={"keep_out": [{"kind": "box", "min": [0, 0, 0], "max": [1, 1, 1], "atitude": [0, 0, 1]}]}),
+        "atitude",
+        "attitude",
+    ),
     "soft": (circle(limits={"cable_speed": 1, "soft": {"cable_spede": 0.1}}), "cable_spede", "cable_speed"),
     "objective": (circle(objective={"tensions": 5}), "tensions", "tension"),
     "duration": (circle(duration={"minimum": 1, "max": 2}), "minimum", "min"),

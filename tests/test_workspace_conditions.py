@@ -319,15 +319,22 @@ def test_cables_keep_away_from_obstacles():
     ends = places.pose[:, None, :3] + np.einsum("nij,mj->nmi", turned, robot.attachments)
     points = robot.home_anchors[None, :, None] * (1 - shares) + ends[:, :, None] * shares  # (n, m, 801, 3)
     low, high, centre = np.array([0.5, 0.5, 1.5]), np.array([1.0, 1.5, 2.5]), np.array([-1.0, 0.5, 2.0])
+    angles, middle = [0.4, -0.5, 0.9], (low + high) / 2
+    off = (points - middle) @ Rotation.from_euler("ZYX", angles[::-1]).as_matrix()  # in the turned box
+    corners = [[x, y, z] for x in (-0.25, 0.25) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
     tip = np.array([0.0, 0.0, -1.5])  # of the capsule, from the centre
     within = np.clip((points - centre) @ tip / (tip @ tip), 0, 1)[..., None]
     away = {
         "box": np.linalg.norm(points - np.clip(points, low, high), axis=-1),
+        "turned": np.linalg.norm(off - np.clip(off, low - middle, high - middle), axis=-1),
+        "mesh": np.linalg.norm(off - np.clip(off, low - middle, high - middle), axis=-1),
         "sphere": np.linalg.norm(points - centre, axis=-1) - 0.3,
         "capsule": np.linalg.norm(points - centre - tip * within, axis=-1) - 0.2,
     }
     obstacles = {
         "box": {"kind": "box", "min": low.tolist(), "max": high.tolist()},
+        "turned": {"kind": "box", "min": low.tolist(), "max": high.tolist(), "attitude": angles},
+        "mesh": {"kind": "mesh", "vertices": corners, "pose": [*middle.tolist(), *angles]},
         "sphere": {"kind": "sphere", "centre": centre.tolist(), "radius": 0.3},
         "capsule": {"kind": "capsule", "start": centre.tolist(), "end": (centre + tip).tolist(), "radius": 0.2},
     }
@@ -349,7 +356,10 @@ def test_a_cable_through_an_obstacle_is_not_free_whatever_its_kind():
         low, high = (at - 0.01).tolist(), (at + 0.01).tolist()
         ball = {"kind": "sphere", "centre": at.tolist(), "radius": 0.01}
         capsule = {"kind": "capsule", "start": low, "end": high, "radius": 0.01}
-        for obstacle in (ball, capsule, {"kind": "box", "min": low, "max": high}):
+        box = {"kind": "box", "min": low, "max": high}
+        corners = [[x, y, z] for x in (-0.01, 0.01) for y in (-0.01, 0.01) for z in (-0.01, 0.01)]
+        mesh = {"kind": "mesh", "vertices": corners, "pose": [*at, 0.3, 0.2, 0.1]}
+        for obstacle in (ball, capsule, box, box | {"attitude": [0.3, 0.2, 0.1]}, mesh):
             assert Interference(obstacles=(obstacle,)).holds(robot, places)[0] == free, obstacle
 
 

@@ -1,7 +1,7 @@
 """Distances between points, cables and obstacles, as expressions that a nonlinear program can differentiate.
 
 Points are (3, 1), CasADi SX or DM. Distances are the true ones, except within 1e-6 m where things touch. Around the
-corners of a box they are rounded, so that a program can pass them. Inside a box the nearest face counts.
+corners of a box they are rounded, so that a program can pass them. Inside a box or a mesh the nearest face counts.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
-from ...models.shapes import Block, Capsule, Sphere
+from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
+from .convex_clearance import cable_outside_mesh, point_outside_mesh
 
 __all__ = ["between_cables", "between_points", "cable_outside", "point_outside"]
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
-Place: TypeAlias = Sphere | Capsule | Block
+Place: TypeAlias = Shape
 
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
 _BISECTIONS = 20
@@ -51,8 +52,10 @@ def point_outside(place: Place, p: Point) -> Any:
     if isinstance(place, Capsule):
         return _from_segment(p, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
-        beyond = _beyond(ca.DM(place.min), ca.DM(place.max), p)
+        beyond = _beyond(ca.DM(place.min), ca.DM(place.max), _before_turn(place, p))
         return ca.if_else(_largest(beyond) <= 0, _largest(beyond), ca.sqrt(_squared(beyond) + _TINY))
+    if isinstance(place, ConvexMesh):
+        return point_outside_mesh(place, p)
     raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 
@@ -63,8 +66,19 @@ def cable_outside(place: Place, p: Point, p_end: Point) -> Any:
     if isinstance(place, Capsule):
         return between_cables(p, p_end, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
-        return _cable_outside_box()(ca.DM(place.min), ca.DM(place.max), p, p_end)
+        ends = (_before_turn(place, p), _before_turn(place, p_end))
+        return _cable_outside_box()(ca.DM(place.min), ca.DM(place.max), *ends)
+    if isinstance(place, ConvexMesh):
+        return cable_outside_mesh(place, p, p_end)
     raise TypeError(f"{type(place).__name__} is not an obstacle")
+
+
+def _before_turn(place: Block, p: Point) -> Point:
+    """Return the point that a turned box turns to p."""
+    if place.attitude is None:
+        return p
+    centre = ca.DM(place.centre)
+    return centre + ca.mtimes(ca.DM(place.axes.T), p - centre)
 
 
 @cache

@@ -7,7 +7,7 @@ import numpy as np
 from ...figures.animation import Scene
 from ...figures.robot import box_edges
 from ..result import Plan
-from ..tasks.task_limits import AnyKeepOut, Block, Sphere
+from ..tasks.task_limits import AnyKeepOut, Block, ConvexMesh, Sphere
 
 TRAIL = 10  # every so many audited instants have a point of the trail
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
@@ -42,7 +42,9 @@ def scene(plan: Plan, times: np.ndarray) -> Scene:
 def outline(place: AnyKeepOut) -> list[np.ndarray]:
     """Return lines (n, 3) in {G} [m] along the surface of a place to keep out of."""
     if isinstance(place, Block):
-        return box_edges(np.array(place.min), np.array(place.max))
+        return [place.centre + edge @ place.axes.T for edge in box_edges(-place.half, place.half)]
+    if isinstance(place, ConvexMesh):
+        return list(place.body.edges)
     if isinstance(place, Sphere):
         centre = np.array(place.centre)
         return [centre + ring for ring in _rings(place.radius, np.eye(3))]

@@ -64,7 +64,11 @@ class Block(KeepOut, shapes.Block):
     """A box to keep out of."""
 
 
-AnyKeepOut = Annotated[Sphere | Capsule | Block, Field(discriminator="kind")]
+class ConvexMesh(KeepOut, shapes.ConvexMesh):
+    """A convex body with plane faces to keep out of, as an STL file or the points that it is the hull of."""
+
+
+AnyKeepOut = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminator="kind")]
 
 
 class TaskLimits(Part):

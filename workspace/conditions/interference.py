@@ -15,16 +15,18 @@ from pydantic import Field
 from ...models import Robot
 from ...models.part import Box, NonNegative, Positive
 from ...models.points import anchors, attachments, in_frame
-from ...models.shapes import Block, Capsule, Sphere
+from ...models.polyhedron import Polyhedron
+from ...models.shapes import Block, Capsule, ConvexMesh, Sphere
 from ..condition import Condition
 from ..places import Places
 
 __all__ = ["Interference"]
 
 _BISECTIONS = 40  # of a cable: its point nearest to a box, to 1e-12 of its length
+_ROUNDING = 1e-12  # of the size of a mesh
 
 
-Obstacle = Annotated[Sphere | Capsule | Block, Field(discriminator="kind")]
+Obstacle = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminator="kind")]
 
 
 class Interference(Condition):
@@ -41,7 +43,7 @@ class Interference(Condition):
         default=None,
         description="the platform's body in its own frame, which no cable may enter [m]; default: not checked",
     )
-    obstacles: tuple[Obstacle, ...] = Field(default=(), description="spheres, capsules and boxes in {G}")
+    obstacles: tuple[Obstacle, ...] = Field(default=(), description="spheres, capsules, boxes and convex meshes in {G}")
     clearance: NonNegative = Field(default=0.0, description="minimum distance between cables and obstacles [m]")
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
@@ -95,7 +97,10 @@ def _separate(robot: Robot) -> list[tuple[int, int]]:
 def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
     """Return the distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; at most 0 where they meet."""
     if isinstance(obstacle, Block):
-        return _from_box(np.array(obstacle.min), np.array(obstacle.max), p, p_end)
+        before_turn = [(end - obstacle.centre) @ obstacle.axes for end in (p, p_end)]
+        return _from_box(-obstacle.half, obstacle.half, *before_turn)
+    if isinstance(obstacle, ConvexMesh):
+        return _from_mesh(obstacle.body, p, p_end)
     if isinstance(obstacle, Sphere):
         start = end = np.array(obstacle.centre)
     else:
@@ -115,6 +120,26 @@ def _from_box(low: np.ndarray, high: np.ndarray, p: np.ndarray, p_end: np.ndarra
         first, last = np.where(falling, middle, first), np.where(falling, last, middle)
     at = p + last[:, None] * along
     return np.linalg.norm(at - np.clip(at, low, high), axis=1)
+
+
+def _from_mesh(body: Polyhedron, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
+    """Return the distance of segments from a convex body, zero inside: that of its edges, or of an end from a face."""
+    nearest = np.full(len(p), np.inf)
+    for start, end in body.edges:
+        corner, other = (np.broadcast_to(point, p.shape) for point in (start, end))
+        nearest = np.minimum(nearest, segment_distance(p, p_end, corner, other))
+    for end in (p, p_end):
+        heights = body.beyond(end)
+        height = heights.max(axis=1)
+        below = end - height[:, None] * body.normals[heights.argmax(axis=1)]
+        on_face = body.beyond(below).max(axis=1) <= _ROUNDING * body.size
+        nearest = np.where(on_face, np.minimum(nearest, height), nearest)
+    at, along = body.beyond(p), body.beyond(p_end) - body.beyond(p)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = -at / along
+    entry = np.where(along < 0, crossing, np.where((along == 0) & (at > 0), np.inf, 0.0)).max(axis=1)
+    leave = np.where(along > 0, crossing, 1.0).min(axis=1)
+    return np.where(np.maximum(entry, 0.0) <= np.minimum(leave, 1.0), 0.0, nearest)
 
 
 def _enters(low: np.ndarray, high: np.ndarray, attachment: np.ndarray, anchor: np.ndarray) -> np.ndarray:

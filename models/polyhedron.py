@@ -1,0 +1,99 @@
+"""`Polyhedron`: the convex hull of points, as its faces and edges."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = ["MOST_FACES", "Polyhedron", "convex_hull", "polyhedron"]
+
+MOST_FACES = 200  # what a distance costs grows with them
+FLAT = 1e-9  # of the largest extent: thinner bodies have no inside
+SAME_PLANE = 1e-6  # difference of unit normals, and of distances relative to the size: files have 7 digits
+
+
+class Polyhedron(NamedTuple):
+    """A convex body between planes.
+
+    Attributes
+    ----------
+    normals
+        Outward, of length one, one row a face, (f, 3) [-].
+    offsets
+        Distance of each face's plane from the origin along its normal, (f,) [m].
+    edges
+        The two ends of each edge, (e, 2, 3) [m].
+    corners
+        (k, 3) [m].
+    """
+
+    normals: np.ndarray
+    offsets: np.ndarray
+    edges: np.ndarray
+    corners: np.ndarray
+
+    @property
+    def size(self) -> float:
+        """Return the diagonal of the box around the corners [m]."""
+        return float(np.linalg.norm(np.ptp(self.corners, axis=0)))
+
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        """Return how far points (..., 3) are beyond the plane of each face, (..., f) [m]; all negative inside."""
+        return points @ self.normals.T - self.offsets
+
+
+@lru_cache(maxsize=64)
+def polyhedron(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
+    """Return the convex hull of points [m], computed once; `convex_hull` has the errors."""
+    return convex_hull(np.array(points, dtype=float))
+
+
+def convex_hull(points: np.ndarray) -> Polyhedron:
+    """Return the convex hull of points (n, 3) [m]; faces that lie in one plane up to `SAME_PLANE` are one.
+
+    Raises
+    ------
+    ValueError
+        If the points lie in one plane, or the hull has more than `MOST_FACES` faces.
+    """
+    from scipy.spatial import ConvexHull  # loads for longer than most tasks take, which need none
+
+    places = np.unique(points, axis=0)
+    middle = places.mean(axis=0)
+    arms = places - middle
+    sizes = np.linalg.svd(arms, compute_uv=False) if len(arms) > 3 else np.zeros(3)
+    if sizes[2] <= FLAT * sizes[0]:
+        raise ValueError(f"must span a body, got {len(places)} different points in one plane or less")
+    hull = ConvexHull(arms)
+    size = float(np.linalg.norm(arms, axis=1).max())
+    face_of, firsts = _faces_of(hull.equations / [1, 1, 1, size])
+    normals = hull.equations[firsts, :3]
+    corners = arms[hull.vertices]
+    offsets = (corners @ normals.T).max(axis=0)  # the plane of the first triangle may cut off what others have
+    edges = _edges(hull.simplices, hull.neighbors, face_of)
+    return Polyhedron(normals, offsets + normals @ middle, places[edges], places[hull.vertices])
+
+
+def _faces_of(planes: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Return the number of the face of each triangle, (n,), and a triangle of each, from their planes (n, 4)."""
+    face_of, firsts = np.zeros(len(planes), dtype=int), list[int]()
+    for triangle, plane in enumerate(planes):
+        same = np.flatnonzero(np.abs(planes[firsts] - plane).max(axis=1) < SAME_PLANE)
+        face_of[triangle] = same[0] if same.size else len(firsts)
+        if not same.size:
+            firsts.append(triangle)
+            if len(firsts) > MOST_FACES:
+                raise ValueError(f"must have a convex hull of at most {MOST_FACES} faces, got more")
+    return face_of, firsts
+
+
+def _edges(triangles: np.ndarray, neighbours: np.ndarray, face_of: np.ndarray) -> np.ndarray:
+    """Return the pairs of points (e, 2) between triangles of different faces."""
+    edges = []
+    for triangle, (ends, beside) in enumerate(zip(triangles, neighbours, strict=True)):
+        for opposite in range(3):  # the neighbour of that number shares the other two points
+            if triangle < beside[opposite] and face_of[triangle] != face_of[beside[opposite]]:
+                edges.append(np.delete(ends, opposite))
+    return np.array(edges)

@@ -1,0 +1,66 @@
+"""Read the triangles of an STL file, binary or text: `read_stl`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs import printable
+from .parsing import read_bytes
+from .part import LARGEST
+
+__all__ = ["read_stl"]
+
+LARGEST_FILE = 50_000_000  # [bytes], a million triangles
+HEADER, RECORD = 84, 50  # bytes of a binary file: before the triangles, and of each
+VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+
+
+def read_stl(path: Path) -> np.ndarray:
+    """Return the corners of all triangles of a file, (n, 3, 3), in the file's unit, which STL does not state.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is cut off or has no triangles, or coordinates that are not finite; one line that names
+        the file.
+    """
+    where, content = printable(path.name), read_bytes(path, "an STL file", LARGEST_FILE)
+    count = int.from_bytes(content[HEADER - 4 : HEADER], "little") if len(content) >= HEADER else 0
+    if content[:5].lower() == b"solid" and len(content) != HEADER + RECORD * count:
+        triangles = _from_text(content, where)
+    else:
+        triangles = _from_binary(content, count, where)
+    if not len(triangles):
+        raise InputError(f"{where} must have triangles, got none")
+    wrong = np.flatnonzero(~(np.abs(triangles) <= LARGEST).all(axis=(1, 2)))
+    if wrong.size:
+        raise InputError(
+            f"{where} must have finite coordinates up to {LARGEST:g}, got others in triangle {wrong[0] + 1}"
+        )
+    return triangles
+
+
+def _from_binary(content: bytes, count: int, where: str) -> np.ndarray:
+    if len(content) < HEADER:
+        raise InputError(f"{where} must be an STL file, got {len(content)} bytes that are none")
+    if len(content) < HEADER + RECORD * count:
+        raise InputError(
+            f"{where} must have the {count} triangles that its header states, {HEADER + RECORD * count} bytes, got "
+            f"{len(content)} bytes"
+        )
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    return np.frombuffer(content, record, count, HEADER)["corners"].astype(float)
+
+
+def _from_text(content: bytes, where: str) -> np.ndarray:
+    vertices = VERTEX.findall(content)
+    if b"endsolid" not in content or len(vertices) % 3 or len(vertices) != content.count(b"vertex"):
+        raise InputError(f"{where} must be an STL file, got text that is cut off after {len(vertices)} vertices")
+    try:
+        return np.array(vertices, dtype="S32").astype(float).reshape(-1, 3, 3)
+    except ValueError:
+        raise InputError(f"{where} must have numbers as coordinates, got a vertex with another word") from None
