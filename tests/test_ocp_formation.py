@@ -27,7 +27,7 @@ def there_and_back(**changes):
     task = {
         "path": {"kind": "waypoints", "shape": "spline", "points": [[-3, 0, 0], [3, 0, 0], [-3, 0, 0]]},
         "duration": 16,
-        "steps": 64,
+        "steps": 32,
         "tube": {"position": "free", "attitude": "free", "ends": "exact", "waypoints": "exact"},
         "base": {"kind": "free", "ends": "rest"},
         "objective": {"deviation": 1.0},
