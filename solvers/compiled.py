@@ -2,7 +2,8 @@
 
 Importing Numba and loading the machine code from the disk takes about a second, compiling it (once on a machine) some
 30 s. A process pays for that once it has lost as much time to plain Python, or has solved 200 problems one by one and
-the machine code is on the disk, or when it calls `load`, as a control loop does before it starts.
+the machine code is on the disk, or when it calls `load`, as a control loop does before it starts. It looks at the disk
+again from time to time: another process may have compiled it.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ _MODULES = (
 
 _lock = threading.Lock()
 _lost = 0.0  # seconds spent in plain Python so far
-_alone = 0  # single problems solved in plain Python so far
-_patience: float | None = None
+_alone = 0  # single problems solved in plain Python since the disk was last looked at
+_patience = _SECONDS_TO_LOAD  # seconds of plain Python until the disk is looked at for machine code
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,12 +117,13 @@ def _lose(seconds: float, problems: int = 0) -> None:
     global _lost, _alone, _patience
     _lost += seconds
     _alone += problems
-    if _lost > _SECONDS_TO_LOAD or _alone > _LOOP:
-        if _patience is None:
-            _forget_old_code()
-            _patience = 0.0 if _on_disk() else _SECONDS_TO_COMPILE
-        if _lost > _patience:
-            load()
+    if _lost <= _patience and _alone <= _LOOP:
+        return
+    _forget_old_code()
+    if _on_disk() or _lost > _SECONDS_TO_COMPILE:
+        load()
+    else:
+        _patience, _alone = min(2.0 * _patience, _SECONDS_TO_COMPILE), 0
 
 
 def _compile() -> Kernels:

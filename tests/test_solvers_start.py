@@ -103,7 +103,7 @@ def test_a_loop_of_single_problems_loads_machine_code_that_is_there(monkeypatch)
     monkeypatch.setattr(compiled, "_forget_old_code", lambda: None)
     for on_disk in (False, True):
         monkeypatch.setattr(compiled, "_on_disk", lambda there=on_disk: there)
-        for name, value in (("_lost", 0.0), ("_alone", 0), ("_patience", None)):
+        for name, value in (("_lost", 0.0), ("_alone", 0), ("_patience", 1.0)):
             monkeypatch.setattr(compiled, name, value)
         for _ in range(300):
             compiled._lose(1e-4, problems=1)
@@ -118,10 +118,24 @@ def test_machine_code_is_loaded_once_that_would_have_been_quicker(on_disk, secon
     monkeypatch.setattr(compiled, "_forget_old_code", lambda: None)
     monkeypatch.setattr(compiled, "_lost", 0.0)
     monkeypatch.setattr(compiled, "_alone", 0)
-    monkeypatch.setattr(compiled, "_patience", None)
+    monkeypatch.setattr(compiled, "_patience", 1.0)
     compiled._lose(0.9 * seconds)
     assert not loads
     compiled._lose(0.2 * seconds)
+    assert loads
+
+
+def test_machine_code_that_another_process_compiles_meanwhile_is_loaded(monkeypatch):
+    loads = []
+    monkeypatch.setattr(compiled, "load", lambda: loads.append(1))
+    monkeypatch.setattr(compiled, "_forget_old_code", lambda: None)
+    for name, value in (("_lost", 0.0), ("_alone", 0), ("_patience", 1.0)):
+        monkeypatch.setattr(compiled, name, value)
+    monkeypatch.setattr(compiled, "_on_disk", lambda: False)
+    compiled._lose(4.0)
+    assert not loads
+    monkeypatch.setattr(compiled, "_on_disk", lambda: True)
+    compiled._lose(4.5)  # not 30 s
     assert loads
 
 
