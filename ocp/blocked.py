@@ -8,6 +8,7 @@ platform can move inside the tube.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,9 +20,10 @@ from .audits.checks import LENGTH_TOLERANCE
 from .audits.excess import Excess
 from .audits.tensions import Distribution
 from .limits import Limit, Rate
-from .tasks.ends import fixed_values
+from .tasks.ends import AT_REST, fixed_values
 from .tasks.paths import Motion
 from .tasks.scenario import ATTITUDE, Scenario
+from .too_fast import too_fast
 
 __all__ = ["Blocked", "blocked"]
 
@@ -63,6 +65,9 @@ def blocked(scenario: Scenario) -> Blocked | None:
     platform, carriers = _at_places(scenario, times, freedom)
     proven = _exceeded(scenario, times, freedom, platform, carriers)
     proven += _stretched(scenario, times, freedom, platform, carriers)
+    known = {(excess.limit, excess.about) for excess in proven}
+    hurried = _hurried(scenario, times, freedom, platform, carriers)
+    proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
     return Blocked(proven, certificate) if proven or certificate is not None else None
 
@@ -155,6 +160,23 @@ def _stretched(
     length = float(scenario.dynamics.cable_lengths(platform.pose[row], carriers.pose[row])[cable])
     kept, why = float(robot.fixed_lengths[cable]), "with the drive fixed-length it stays"
     return [Excess("cable_length", f"cable {cable + 1}", float(times[row]), length, kept, "m", "exactly", why)]
+
+
+def _hurried(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> Iterator[Excess]:
+    """Yield the limits of speeds and accelerations that are exceeded because the duration is too short."""
+    order = np.argsort(times)
+    which = np.minimum(np.arange(len(times)), 2)  # of `freedom`: start, end, between
+    poses = np.concatenate([platform.pose[None], carriers.pose.swapaxes(0, 1)])[:, order]
+    spread = np.zeros((len(poses), len(times)))
+    for row, kind in enumerate(which):
+        spread[:, row] = np.where((freedom[kind][:, 0] == FREE).any(axis=1), np.inf, 0.0)
+        spread[0, row] += _reach(scenario, freedom[kind])
+    speeds = np.concatenate([platform.velocity[None], carriers.velocity.swapaxes(0, 1)])[:, :2, :3]
+    given = np.stack([freedom[end][:, 1, :3] == GIVEN for end in (0, 1)], axis=1)
+    moving = ~given | (np.abs(speeds) >= AT_REST)
+    return too_fast(scenario, times[order], poses, spread[:, order], ~np.any(moving, axis=(1, 2)))
 
 
 def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

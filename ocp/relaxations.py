@@ -35,6 +35,7 @@ TIME_COUNTS = 1e-2  # of the requested duration: it adds one to the objective, s
 LONGEST_CHOSEN = 20.0  # times the requested duration: the program starts at its geometric mean with the requested one
 LONGER_CHOSEN = 1.05  # than the shortest duration, at which almost nothing is left to choose
 BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
+SHRINK = 5e-3  # of the limits, for what happens between the nodes
 LEAST_SECONDS = 5.0  # for a program, however short the search was
 
 
@@ -156,7 +157,9 @@ def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
     if not soft:
         return []
     softer = scenario.task.model_copy(update={"limits": limits.model_copy(update={"soft": limits.soft | soft})})
-    outcome = _solved(search, replace(lay_out(scenario.robot, softer), path=scenario.path), start)
+    outcome = _solved(
+        search, replace(lay_out(scenario.robot, softer), path=scenario.path), start, Mesh(scenario.task.steps)
+    )
     if not outcome.success:
         return []
     lasting = scenario.lasting(outcome.duration)
@@ -176,13 +179,14 @@ def _longer_duration(search: Search) -> list[Relaxed]:
             "objective": task.objective.model_copy(update={"time": TIME_COUNTS * requested}),
         }
     )
-    outcome = _solved(search, lay_out(scenario.robot, open_task), None)
+    outcome = _solved(search, lay_out(scenario.robot, open_task), None, Mesh(task.steps))
     for attempt in range(TRIES):
         if not outcome.success:
             break
         near = _rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
+        mesh = Mesh(task.steps * 2**attempt, shrink=SHRINK * (1 + attempt))
         longer = lay_out(scenario.robot, task.model_copy(update={"duration": near}))
-        outcome = _solved(search, longer, outcome.deviation.stretched(near / outcome.duration), 2**attempt)
+        outcome = _solved(search, longer, outcome.deviation.stretched(near / outcome.duration), mesh)
         audit = search.audit_motion(longer, outcome.deviation)
         if audit.passed:
             plan = Plan(longer, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
@@ -190,11 +194,11 @@ def _longer_duration(search: Search) -> list[Relaxed]:
     return []
 
 
-def _solved(search: Search, scenario: Scenario, guess: Deviation | None, finer: int = 1) -> Outcome:
+def _solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
     """Solve another scenario's program, in the time that the task's limit left and no longer than the search took."""
     beside = Search(scenario, {}, search.progress)
     beside.solve_s = max(scenario.task.time_limit - max(search.solve_s, LEAST_SECONDS), search.solve_s)
-    return beside.solve("program of a relaxation", Mesh(finer * scenario.task.steps), guess)
+    return beside.solve("program of a relaxation", mesh, guess)
 
 
 def _rounded(value: float, up: bool) -> float:

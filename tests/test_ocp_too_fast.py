@@ -1,0 +1,90 @@
+"""A motion is proven too fast only if no motion is slow enough, and then if its ends alone show it."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from towline.models import Dynamics, load
+from towline.ocp import MotionStatus, plan
+from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.task import read_task
+from towline.ocp.too_fast import too_fast
+
+ROBOT = load("ipanema-1")
+TIMES = np.linspace(0.0, 2.0, 41)
+FINE = np.linspace(0.0, 2.0, 4001)
+
+
+def scenario(speed, acceleration):
+    """A laid-out task with limits of the platform; its path does not matter here."""
+    limits = {"platform_speed": speed, "platform_acceleration": acceleration}
+    return lay_out(ROBOT, read_task({"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 2, "limits": limits}))
+
+
+def exceeded(limited, places, spread, rests):
+    """The names of the limits that are proven exceeded."""
+    poses = np.zeros((1 + len(ROBOT.carriers), len(TIMES), 6))
+    poses[0, :, :3] = places
+    off = np.zeros(poses.shape[:2])
+    off[0] = spread
+    return {excess.limit for excess in too_fast(limited, TIMES, poses, off, np.array([rests]))}
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.booleans())
+def test_a_motion_that_exists_is_never_proven_too_fast(seed, rests):
+    """Any motion inside a tube about places, with its own largest speed and acceleration as limits."""
+    rng = np.random.default_rng(seed)
+    if rests:  # u^2 (3 - 2 u) of a straight line: at rest at both ends
+        end, u = rng.uniform(-1, 1, 3), FINE / 2
+        motion = (u**2 * (3 - 2 * u))[:, None] * end
+        places = motion[::100] + rng.uniform(-0.1, 0.1, (41, 3))
+    else:
+        waves = np.sin(rng.uniform(0, 10, (5, 1)) * FINE + rng.uniform(0, 6, (5, 1)))
+        motion = (rng.uniform(-0.1, 0.1, (3, 5)) @ waves).T
+        places = motion[::100] + rng.uniform(-0.2, 0.2, (41, 3))
+    spread = np.linalg.norm(places - motion[::100], axis=1)
+    step = FINE[1]
+    speed = np.linalg.norm(np.diff(motion, axis=0), axis=1).max() / step
+    acceleration = np.linalg.norm(np.diff(motion, 2, axis=0), axis=1).max() / step**2
+    limited = scenario(speed * (1 + 1e-3), acceleration * (1 + 1e-2))
+    assert not exceeded(limited, places, spread, rests)
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_the_bounds_between_two_rests_are_those_of_constant_speed_and_of_bang_bang(share):
+    """Over d in T: the speed is at least d / T; the acceleration at least 4 d / T^2, which bang-bang control has."""
+    places = np.zeros((41, 3))
+    places[-1] = [0.6, 0.0, 0.8]
+    spread = np.full(41, np.inf)
+    spread[[0, -1]] = 0.0
+    assert exceeded(scenario(0.5 * share, 100), places, spread, True) == ({"platform_speed"} if share < 1 else set())
+    of_acceleration = {"platform_acceleration"} if share < 1 else set()
+    assert exceeded(scenario(100, 1.0 * share), places, spread, True) == of_acceleration
+    assert not exceeded(scenario(100, 1.0 * share), places, spread, False)
+
+
+@pytest.mark.parametrize("tube", ["free", 0.05])
+def test_planning_ends_at_once_and_offers_a_duration(tube):
+    path = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
+    task = {"path": path, "duration": 1, "steps": 20, "tube": {"position": tube}, "limits": {"platform_speed": 0.3}}
+    planned = plan(ROBOT, task)
+    assert planned.status is MotionStatus.INFEASIBLE
+    assert [stage.name for stage in planned.stages] == ["ends and path"]
+    longer = {relaxed.name: relaxed.possible for relaxed in planned.relaxations}["duration"]
+    assert longer > np.linalg.norm([0.5, 0.3, 0.2]) / 0.3
+    assert plan(ROBOT, task | {"duration": longer}).feasible
+
+
+def test_cables_are_too_fast_where_their_lengths_change_too_much():
+    """The lengths at both ends are known where the platform is, whatever it does between."""
+    path = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
+    task = {"path": path, "duration": 2, "tube": {"position": "free"}, "steps": 20}
+    poses = np.array([[*path["start"], 0, 0, 0], [*path["end"], 0, 0, 0]])
+    home = np.tile(ROBOT.carrier_home, (2, 1, 1))
+    change = np.abs(np.diff(Dynamics(ROBOT).cable_lengths(poses, home), axis=0)).max()
+    assert (
+        plan(ROBOT, task | {"limits": {"cable_speed": 0.98 * change / 2}}).stages[0].message.startswith("cable_speed")
+    )
+    assert not plan(ROBOT, task | {"limits": {"cable_speed": 3 * change / 2}}).stages[0].message
