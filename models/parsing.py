@@ -15,12 +15,14 @@ from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer, ComposerError
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.scanner import Scanner, ScannerError
 
 from ..errors import InputError
 from ..inputs import LONGEST_TEXT, printable, shown
 from .schema import json_schema
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
+MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -81,6 +83,7 @@ def parse_yaml(text: str, model: type[Model], where: str, folder: Path | None = 
     """
     reader = YAML(typ="safe", pure=True)
     reader.Composer = _PlainComposer
+    reader.Scanner = _ShallowScanner
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # ruamel warns of what YAML 1.1 would have made of a number
@@ -234,6 +237,17 @@ class _PlainComposer(Composer):
                 problem=f"has a YAML tag ({shown(str(event.tag))[1:-1]})", problem_mark=event.start_mark
             )
         return super().compose_node(parent, index)
+
+
+class _ShallowScanner(Scanner):
+    """Refuses brackets in brackets without end: for each that opens, the scanner goes through all that are open."""
+
+    def fetch_flow_collection_start(self, *arguments: Any, **named: Any) -> None:
+        if self.flow_level >= MOST_BRACKETS:
+            raise ScannerError(
+                problem=f"has brackets more than {MOST_BRACKETS} deep", problem_mark=self.reader.get_mark()
+            )
+        super().fetch_flow_collection_start(*arguments, **named)
 
 
 def _problem(error: Exception) -> str:

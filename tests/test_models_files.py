@@ -155,9 +155,10 @@ def test_wrong_file_gives_one_line_with_file_field_and_value(case, tmp_path):
         (b"\xff\xfe\x00", r"must be a YAML file in UTF-8, got another text \(byte 0\)"),
         (b"a: \x00", "is not YAML"),
         (b"x" * 50_000_000, r"must be a YAML file of at most 1 MB, got 50\.0 MB"),
-        (b"[" * 5000, "is not YAML"),
+        (b"[" * 1_000_000, r"is not YAML \(has brackets more than 50 deep, line 1\)"),  # at once
+        (b"- " * 5000, "is not YAML"),
     ],
-    ids=["empty", "words", "list", "bytes", "nul", "50 MB", "deep"],
+    ids=["empty", "words", "list", "bytes", "nul", "50 MB", "brackets", "dashes"],
 )
 def test_files_that_are_no_mapping(content, message, tmp_path):
     file = tmp_path / "my.yaml"
