@@ -25,6 +25,11 @@ class Sphere(Part):
     centre: Vector3 = Field(description="in its frame [m]")
     radius: Positive = Field(description="[m]")
 
+    @property
+    def thickness(self) -> float:
+        """Return the least distance of two planes between which it fits [m]."""
+        return 2 * self.radius
+
 
 class Capsule(Part):
     """All points within `radius` of the line from `start` to `end`."""
@@ -33,6 +38,11 @@ class Capsule(Part):
     start: Vector3 = Field(description="in its frame [m]")
     end: Vector3 = Field(description="in its frame [m]")
     radius: Positive = Field(description="[m]")
+
+    @property
+    def thickness(self) -> float:
+        """Return the least distance of two planes between which it fits [m]."""
+        return 2 * self.radius
 
 
 class Block(Part):
@@ -60,6 +70,11 @@ class Block(Part):
     def half(self) -> np.ndarray:
         """Return half of its edges, (3,) [m]."""
         return (np.array(self.max) - np.array(self.min)) / 2
+
+    @property
+    def thickness(self) -> float:
+        """Return the least distance of two planes between which it fits [m]."""
+        return 2 * float(self.half.min())
 
     @property
     def axes(self) -> np.ndarray:
@@ -145,6 +160,11 @@ class ConvexMesh(Part):
             edges=placed(pose, self.scale * own.edges.reshape(-1, 3)).reshape(-1, 2, 3),
             corners=placed(pose, self.scale * own.corners),
         )
+
+    @property
+    def thickness(self) -> float:
+        """Return the least distance of two planes between which it fits, one of them along a face [m]."""
+        return float(-self.body.beyond(self.body.corners).min(axis=0).max())
 
 
 Shape: TypeAlias = Sphere | Capsule | Block | ConvexMesh

@@ -16,8 +16,10 @@ from towline.errors import InputError
 from towline.models import load
 from towline.models.parsing import to_yaml
 from towline.ocp import plan, read_task
+from towline.ocp.audits.audit import audit
 from towline.ocp.limits.clearance import cable_outside, point_outside
 from towline.ocp.reports.scene import outline
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task_limits import Block, ConvexMesh
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -297,3 +299,45 @@ def test_the_planner_goes_around_what_is_in_its_way(kind, tmp_path):
     blocked = plan(robot, at_end)
     assert blocked.status.value == "infeasible"
     assert "keep_out of platform outside part" in blocked.report().splitlines()[0]
+
+
+@settings(max_examples=15, deadline=None)
+@given(share=st.floats(0.4, 0.6), thin=st.sampled_from([1e-4, 1e-3]))
+def test_the_audit_is_not_jumped_over(share, thin):
+    """At 5 m/s platform and cables pass a sheet and a wire between two of its instants: both are reported."""
+    line = {"kind": "line", "start": [0, -0.3, 1], "end": [0.6, 0.3, 1.1]}
+    robot, x = load("ipanema-1"), 0.6 * share
+    nobody = {"platform": None, "carriers": None, "cables": None}
+    sheet = {"kind": "box", "name": "sheet", "min": [x, -2, 0], "max": [x + thin, 2, 3], **nobody, "platform": 0.0}
+    slower = read_task({"path": line, "duration": 0.3})
+    anchors, ends = lay_out(robot, slower).dynamics.points(np.array([x, 0.6 * share - 0.3, 1 + 0.1 * share, 0, 0, 0]))
+    middle = (anchors[0] + ends[0]) / 2
+    across = np.cross(anchors[0] - ends[0], [0.6, 0.6, 0.1])
+    across *= 0.1 / np.linalg.norm(across)
+    tips = {"start": (middle - across).tolist(), "end": (middle + across).tolist(), "radius": thin / 2}
+    wire = {"kind": "capsule", "name": "wire", **tips, **nobody, "cables": 0.0}
+    audited = audit(
+        lay_out(robot, read_task({"path": line, "duration": 0.3, "limits": {"keep_out": [sheet, wire]}})), None
+    )
+    about = [excess.about.split(" outside ") for excess in audited.excess if excess.limit == "keep_out"]
+    assert ["platform", "sheet"] in about
+    assert ["cable 1", "wire"] in about
+    slow = audit(lay_out(robot, read_task({"path": line, "duration": 30, "limits": {"keep_out": [sheet, wire]}})), None)
+    assert {excess.about for excess in slow.excess} >= {"platform outside sheet", "cable 1 outside wire"}
+
+
+@pytest.mark.parametrize("kind", ["box", "mesh", "capsule", "sphere"])
+def test_what_a_motion_passes_by_is_not_reported(kind):
+    """Neither by the audit nor by its closer look, however thin it is."""
+    shape = {
+        "box": {"min": [0, -0.3, 1.01], "max": [0.6, 0.3, 1.0101]},
+        "mesh": {"vertices": (CUBE * [0.6, 0.6, 1e-4] + [0, -0.3, 1.01]).tolist()},
+        "capsule": {"start": [0, -0.3, 1.01], "end": [0.6, 0.3, 1.01], "radius": 1e-4},
+        "sphere": {"centre": [0.3, 0, 1.01], "radius": 1e-4},
+    }
+    place = {"kind": kind, **shape[kind], "cables": None}
+    robot = load("point-mass-3")
+    low, high = robot.home[:3] * [1, 1, 0] + [0, -0.3, 1], robot.home[:3] * [1, 1, 0] + [0.6, 0.3, 1]
+    task = {"path": {"kind": "line", "start": low.tolist(), "end": high.tolist()}, "duration": 0.3}
+    scenario = lay_out(robot, read_task(task | {"limits": {"keep_out": [place]}}))
+    assert [excess for excess in audit(scenario, None).excess if excess.limit == "keep_out"] == []

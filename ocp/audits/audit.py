@@ -19,6 +19,7 @@ from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
 from .checks import AuditedMotion, excesses
 from .drift import Drift, drift
 from .excess import Excess
+from .jumps import jumped_over
 from .tensions import INDEPENDENT, TOLERANCE, Distribution, in_all_winds, scaled
 
 __all__ = ["Audit", "audit", "other_tensions_exist", "other_tensions_may_pass"]
@@ -131,7 +132,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | Non
     off_path = scenario.off_path(times, motion, carriers)
     audited = AuditedMotion(scenario, deviation, times, motion, carriers, tensions, off_path)
     limited = audited.limited()
-    exceeded = excesses(audited, limited)
+    exceeded = excesses(audited, limited) + jumped_over(audited, limited)
     if result.beyond > TOLERANCE and result.row is not None:
         why = "wrench error of tensions inside their limits less the margin"
         at = float(times[result.row])

@@ -85,6 +85,9 @@ class Limit(ABC):
     per_metre
         How much a value can change while each point of the platform moves by at most one metre and all else stays;
         infinite if that is not known. Of a distance it is one. With it the planner proves that a place is in the way.
+    thickness
+        Of a distance from a place, how thin this is [m]: between two instants a motion may jump over what is thinner
+        than the motion, so the audit looks more closely there. Infinite: it is not checked.
     """
 
     name: str = "limit"
@@ -97,6 +100,7 @@ class Limit(ABC):
     hull: Hull | None = None
     shown: bool = True
     per_metre: float = np.inf
+    thickness: float = np.inf
 
     @abstractmethod
     def values(self, state: State) -> ca.SX:

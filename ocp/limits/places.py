@@ -39,6 +39,7 @@ class _Outside(Limit):
 
     def __init__(self, place: Place, called: str, riding: bool, least: float):
         self._place, self._called, self._riding, self.low = place, called, riding, least
+        self.thickness = place.thickness
         if riding:  # what is far from the platform moves farther in its frame than its points in {G}
             self.per_metre = np.inf
 
