@@ -5,19 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from towline.benchmarks.random_tasks import ROBOTS, attempt, random_task, wrong
+from towline.benchmarks.random_families import FAMILIES, ROBOTS, random_task
+from towline.benchmarks.random_tasks import attempt, wrong
 from towline.models import load
 from towline.ocp import MotionStatus, plan
 
 
 @pytest.mark.parametrize("seed", range(2 * len(ROBOTS)))
 def test_a_random_task_ends_in_a_plan_or_a_proof(seed):
-    assert attempt(seed).result in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
+    assert attempt("ordinary", seed).result in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
+
+
+@pytest.mark.parametrize("family", [family for family in FAMILIES if family not in ("ordinary", "team")])
+def test_a_task_of_each_family_ends_in_a_plan_or_a_proof(family):
+    assert attempt(family, 0).result in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
 
 
 def test_the_check_can_see():
     """A plan with a tension beyond its limit, or tensions of another motion, is found out."""
-    name, task = random_task(2)
+    name, task = random_task("ordinary", 2)
     found = plan(load(name), task)
     assert found.feasible
     assert wrong(found) == ""

@@ -1,0 +1,277 @@
+"""Random tasks of each family: `random_task` determines one by its family and a seed.
+
+    ordinary   lines, waypoints and circles with tubes, margins, open durations; a fifth leaves nothing to choose
+    lift       lift, move, lower, over a few centimetres or more, sometimes with dwell times
+    rack       a box stands in the way from one place to another
+    window     the way leads through a hole in a wall
+    team       three or four quadrotors carry a load two metres, past a ball every other time
+    moving     the motion begins while platform and carriers move
+
+Where a family needs places at which the platform can rest, they are chosen so that tensions exist there with the
+carriers at home. Nothing else makes a task feasible: some are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..distribution import wrench_problem
+from ..models import Dynamics, Robot, load
+from ..ocp import Task
+from ..solvers import solve
+
+__all__ = ["FAMILIES", "ROBOTS", "random_task"]
+
+ROBOTS = ("wang-flying", "wang-ctmrts-6", "ipanema-1", "cogiro", "planar-4", "wang-flying-quadrotor")
+OF_SPACE = ("ipanema-1", "cogiro", "wang-flying", "caroca", "ipanema-2", "the-cable-robot-simulator")
+TEAMS = ("multi-quadrotor-3", "multi-quadrotor-4")
+TEAM_STEPS = 50
+
+
+def random_task(family: str, seed: int) -> tuple[str, Task]:
+    """Return a robot's name and a task for it, of a family of `FAMILIES`."""
+    name, task = FAMILIES[family](np.random.default_rng(seed), seed)
+    return name, Task.model_validate({"name": f"{family}-{seed}", **task})
+
+
+def _ordinary(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a robot's name and a task for it: path, duration, tube, base, limits and objective of any kind.
+
+    Where the planner has something to choose, the platform can rest at the points that make the path, with its carriers
+    at home. Every fifth task leaves nothing to choose and goes anywhere.
+    """
+    name = ROBOTS[seed % len(ROBOTS)]
+    robot = load(name)
+    size = _size(robot)
+    fixed = seed % 5 == 0
+    path = _path(rng, robot, 0.25 * size, anywhere=fixed)
+    task: dict[str, Any] = {"path": path, "steps": 40}
+    stretches = path["kind"] in ("line", "waypoints")
+    duration = float(rng.uniform(3.0, 8.0))
+    if stretches:
+        task["duration"] = duration
+    if fixed:
+        task["base"] = _fixed_base(rng, robot)
+        return name, task
+    task["margin"] = float(rng.choice([0.0, 0.05]))
+    task["base"] = _base(rng, robot)
+    if stretches and rng.random() < 0.3:
+        task["duration"] = {"min": 0.5 * duration, "max": 3.0 * duration}
+        task["objective"] = {"time": 1.0}
+    if rng.random() < 0.5:
+        task["tube"] = {"position": float(rng.choice([0.02, 0.1])) * size, "attitude": float(rng.choice([0.0, 0.1]))}
+    if rng.random() < 0.3:
+        task["limits"] = {"platform_speed": float(rng.uniform(2.0, 5.0)), "tension_rate": 1e4}
+    return name, task
+
+
+def _path(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool) -> dict[str, Any]:
+    """Return a path about the platform's home, in its degrees of freedom."""
+    home = robot.home
+
+    def near() -> np.ndarray:
+        return _place(rng, robot, reach, anywhere)
+
+    kind = rng.choice(["line", "waypoints", "circle"])
+    if kind == "circle" and robot.dof_mask[:2].all():
+        radius = 0.5 * float(np.linalg.norm((near() - home)[:2]))
+        rate = float(rng.choice([-1, 1]) * rng.uniform(0.3, 1.0))
+        return {
+            "kind": "circle",
+            "centre": home[:3].tolist(),
+            "radius": radius,
+            "rate": rate,
+            "attitude": home[3:].tolist(),
+        }
+    if kind == "waypoints":
+        return {"kind": "waypoints", "points": [near().tolist() for _ in range(3)]}
+    return {"kind": "line", "start": near().tolist(), "end": near().tolist()}
+
+
+def _place(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool = False) -> np.ndarray:
+    """Return a pose about the platform's home at which it can rest, (6,), unless it may be `anywhere`."""
+    dynamics, pose = Dynamics(robot), robot.home.copy()
+    for attempt in range(100):
+        pose = robot.home.copy()
+        pose[:3] += rng.uniform(-reach, reach, 3) * 0.97**attempt * robot.dof_mask[:3]
+        pose[3:] += rng.uniform(-0.05, 0.05, 3) * robot.dof_mask[3:]
+        if anywhere or _can_rest(dynamics, pose, np.zeros(6)):
+            break
+    return pose
+
+
+def _size(robot: Robot) -> float:
+    """Return the extent of the robot, between half a metre and three [m]."""
+    anchors = robot.anchors + robot.carrier_home[robot.carrier_of_cable, :3]
+    return float(np.clip(np.ptp(anchors, axis=0).max(), 0.5, 3.0))
+
+
+def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray) -> bool:
+    robot = dynamics.robot
+    A, w = dynamics.wrench_matrix(pose), dynamics.required_wrench(pose, rest, rest)
+    spare = 0.05 * (robot.t_max - robot.t_min)
+    return solve(wrench_problem(dynamics.robot, A, w, robot.t_min + 0.1, robot.t_max - spare)).feasible
+
+
+def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """Return carriers at rest at home, or one carrier that moves along a given path."""
+    carrier = robot.carriers[0]
+    if carrier.confined or carrier.efforts or rng.random() < 0.5:
+        return {"kind": "hold"}
+    start = robot.carrier_home[0]
+    end = start + np.r_[rng.uniform(-1, 1, 3), 0.0, 0.0, 0.0]
+    path = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
+    return {"kind": "given", "paths": {carrier.name: path}}
+
+
+def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """Return free carriers where the robot has some that can move: always for quadrotors, mostly for others."""
+    held, movable = (any(values) for values in zip(*((c.efforts, c.moves) for c in robot.carriers), strict=True))
+    if held or (movable and rng.random() < 0.8):
+        return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}
+    return {"kind": "hold"}
+
+
+def _lift(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task that lifts, moves and lowers the platform."""
+    name = OF_SPACE[seed % len(OF_SPACE)]
+    robot = load(name)
+    size = _size(robot)
+    start, end = _place(rng, robot, 0.25 * size), _place(rng, robot, 0.25 * size)
+    end[2], up = start[2], [0, 0, rng.uniform(0.02, 0.2) * size, 0, 0, 0]
+    points = [start, start + up, end + up, end]
+    path: dict[str, Any] = {"kind": "waypoints", "points": [point.tolist() for point in points]}
+    task = {"path": path, "duration": float(rng.uniform(3.0, 8.0)), "steps": 60, "base": _base(rng, robot)}
+    if rng.random() < 0.3:
+        path["dwell"] = [0.0, 0.3, 0.3, 0.0]
+    if rng.random() < 0.5:
+        task["tube"] = {"position": 0.02 * size}
+    return name, task
+
+
+def _rack(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task from place to place past a box that stands between them."""
+    name = OF_SPACE[seed % len(OF_SPACE)]
+    robot = load(name)
+    size = _size(robot)
+    start, end, middle = _apart(rng, robot, 0.3 * size)
+    half = 0.05 * size
+    box = {
+        "kind": "box",
+        "name": "rack",
+        "min": [middle[0] - half, middle[1] - 3 * half, middle[2] - size],
+        "max": [middle[0] + half, middle[1] + 3 * half, middle[2] + half],
+        **_distances(rng, robot),
+    }
+    return name, _past(rng, robot, start, end, [box])
+
+
+def _window(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task through a hole in a wall; the platform alone keeps clear of it, since the cables cannot."""
+    name = OF_SPACE[seed % len(OF_SPACE)]
+    robot = load(name)
+    size = _size(robot)
+    start, end, middle = _apart(rng, robot, 0.3 * size)
+    hole = middle + rng.uniform(-0.1, 0.1, 3) * size
+    half = 0.5 * float(np.ptp(robot.attachments, axis=0).max()) + 0.1 * size
+    far, thick = 3 * size, 0.02 * size
+    sides = {
+        "left": ([-far, -half], [-far, far]),
+        "right": ([half, far], [-far, far]),
+        "below": ([-half, half], [-far, -half]),
+        "above": ([-half, half], [half, far]),
+    }
+    across = _across(start, end)  # the axis of the wall's normal, and the other horizontal one
+    walls = []
+    for side, (along, up) in sides.items():
+        low, high = np.zeros(3), np.zeros(3)
+        low[across[0]], high[across[0]] = middle[across[0]] - thick, middle[across[0]] + thick
+        low[across[1]], high[across[1]] = hole[across[1]] + along[0], hole[across[1]] + along[1]
+        low[2], high[2] = hole[2] + up[0], hole[2] + up[1]
+        wall = {"kind": "box", "name": side, "min": low.tolist(), "max": high.tolist()}
+        walls.append({**wall, "cables": None, "carriers": None})
+    return name, _past(rng, robot, start, end, walls)
+
+
+def _apart(rng: np.random.Generator, robot: Robot, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return two places at which the platform can rest, far from each other, and the position between them."""
+    start = _place(rng, robot, reach)
+    others = [_place(rng, robot, reach) for _ in range(20)]
+    end = max(others, key=lambda pose: float(np.linalg.norm((pose - start)[:2])))
+    return start, end, 0.5 * (start + end)[:3]
+
+
+def _across(start: np.ndarray, end: np.ndarray) -> tuple[int, int]:
+    """Return the horizontal axis along which a line goes farthest, then the other one."""
+    first = int(np.abs(end - start)[:2].argmax())
+    return first, 1 - first
+
+
+def _distances(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """Return how far platform, cables and carriers stay from a place."""
+    return {"platform": float(rng.choice([0.0, 0.05])), "cables": None if rng.random() < 0.7 else 0.01}
+
+
+def _past(
+    rng: np.random.Generator, robot: Robot, start: np.ndarray, end: np.ndarray, places: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return a task from place to place on any path past obstacles."""
+    path = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
+    tube = {"position": "free", "attitude": float(rng.choice([0.0, 0.2]))}
+    task = {"path": path, "duration": float(rng.uniform(4.0, 8.0)), "tube": tube, "limits": {"keep_out": places}}
+    return task | {"steps": 60, "base": _base(rng, robot)}
+
+
+def _team(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task of quadrotors that carry a load two metres."""
+    name = TEAMS[seed % len(TEAMS)]
+    robot = load(name)
+    direction = rng.normal(size=3) * [1, 1, 0.3]
+    start, end = robot.home.copy(), robot.home.copy()
+    end[:3] += 2.0 * direction / np.linalg.norm(direction)
+    task: dict[str, Any] = {
+        "path": {"kind": "line", "start": start.tolist(), "end": end.tolist()},
+        "base": {"kind": "free"},
+        "tube": {"position": "free", "attitude": 0.3},
+        "steps": TEAM_STEPS,
+        "duration": float(rng.uniform(3.0, 5.0)),
+    }
+    if rng.random() < 0.5:
+        task |= {"duration": {"min": 1.0, "max": 6.0}, "objective": {"time": 0.1}}
+    if rng.random() < 0.5:
+        ball = {"kind": "sphere", "name": "ball", "centre": (0.5 * (start + end)[:3]).tolist(), "radius": 0.15}
+        task["limits"] = {"keep_out": [{**ball, "platform": 0.1, "cables": 0.02, "carriers": 0.3}]}
+    return name, task
+
+
+def _moving(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task that begins while the platform moves."""
+    name = OF_SPACE[seed % len(OF_SPACE)]
+    robot = load(name)
+    size = _size(robot)
+    start, end = _place(rng, robot, 0.2 * size), _place(rng, robot, 0.2 * size)
+    velocity = np.r_[rng.uniform(-0.1, 0.1, 3) * size, 0, 0, 0]
+    measured = start + np.r_[rng.uniform(-0.01, 0.01, 3) * size, 0, 0, 0]
+    return name, {
+        "path": {"kind": "line", "start": start.tolist(), "end": end.tolist()},
+        "duration": float(rng.uniform(3.0, 6.0)),
+        "tube": {"position": "free"},
+        "steps": 40,
+        "base": _base(rng, robot),
+        "initial": {"pose": measured.tolist(), "velocity": velocity.tolist()},
+    }
+
+
+Family = Callable[[np.random.Generator, int], tuple[str, dict[str, Any]]]
+
+FAMILIES: dict[str, Family] = {
+    "ordinary": _ordinary,
+    "lift": _lift,
+    "rack": _rack,
+    "window": _window,
+    "team": _team,
+    "moving": _moving,
+}
