@@ -11,7 +11,10 @@ INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-versi
 demo: .venv/core.stamp
 	$(BIN)/towline demo
 
-test: lint types docs unit
+# The tests have two workers of their own; what comes before them has not.
+test: .venv/dev.stamp
+	$(MAKE) --jobs=2 lint types docs
+	$(MAKE) unit
 
 setup: .venv/dev.stamp
 
