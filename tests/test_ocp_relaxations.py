@@ -4,13 +4,19 @@ import numpy as np
 import pytest
 
 from towline.models import load
-from towline.ocp import MotionStatus, plan
+from towline.ocp import MotionStatus, plan, relaxations
 from towline.ocp.limits import Limit
 
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TASK = {"path": LINE, "duration": 2}
 BALL = {"kind": "sphere", "name": "post", "centre": [0.25, 0.15, 2.0], "radius": 0.2}
+
+
+@pytest.fixture(autouse=True)
+def unhurried(monkeypatch):
+    """A machine with other work to do is offered the same."""
+    monkeypatch.setattr(relaxations, "LEAST_SECONDS", 300.0)
 
 
 def with_change(task, relaxed):
