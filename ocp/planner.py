@@ -4,8 +4,9 @@ The planner works in stages, and ends with the first that decides:
 
 1. ends and path (`blocked`): what is impossible whatever the planner chooses, proven at once;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
-3. the nonlinear program (`program`), audited, and refined where the audit reports violations;
-4. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
+3. a path past obstacles (`global_path`), where the usual guess exceeds a limit at rest: the next stages start from it;
+4. the nonlinear program (`program`), audited, and refined where the audit reports violations;
+5. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
    result.
 """
 
@@ -27,6 +28,8 @@ from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
+from .global_path.global_path import find_global_path
+from .global_path.need import guess_exceeds, is_open
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
 from .relaxations import near_fixed_motion, near_motion
@@ -51,6 +54,7 @@ COARSE = 50  # steps: from four times as many on, the program of so few is solve
 COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 100 steps then takes a third of the time
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
+GLOBAL_SHARE = 0.2  # of the time limit
 SHRINK = 2e-3  # of the carriers' speed and acceleration limits
 NO_SLACK = 1e-6  # of the weight: a motion with less missing at its nodes is a start for another try
 
@@ -268,12 +272,26 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
-def _coarse(search: Search) -> Deviation | None:
+def _global_path(search: Search) -> Deviation | None:
+    """Return a motion past what the usual guess collides with; None if it needs none, or none is found."""
+    scenario = search.scenario
+    if scenario.count == 0 or search.knows(Mesh(scenario.task.steps)) or not is_open(scenario):
+        return None
+    with search.stage("global path") as stage:
+        exceeded = guess_exceeds(scenario)
+        if not exceeded:
+            return None
+        path, message = find_global_path(scenario, GLOBAL_SHARE * scenario.task.time_limit)
+        stage.message = f"the direct motion exceeds {exceeded}: {message}"
+        return None if path is None else path.guess(scenario)
+
+
+def _coarse(search: Search, start: Deviation | None) -> Deviation | None:
     """Return the optimum on a coarse mesh, to start a fine one from; None if that would save no time."""
     steps, coarse = search.scenario.task.steps, COARSE_OF_MANY if search.scenario.count > MANY else COARSE
     if steps < 4 * coarse or search.knows(Mesh(steps)):
         return None
-    outcome = search.solve("coarse program", Mesh(coarse), None)
+    outcome = search.solve("coarse program", Mesh(coarse), start)
     return outcome.deviation if outcome.success else None
 
 
@@ -281,8 +299,9 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     """Solve, audit and refine; if the program has no solution, search for the closest motion first."""
     scenario = search.scenario
     steps = scenario.task.steps
-    coarse = _coarse(search) if start is None else None
-    outcome = search.solve("nonlinear program", Mesh(steps), start or coarse, coarser=coarse is not None)
+    start, given = _global_path(search) if start is None else start, start is not None
+    coarse = None if given else _coarse(search, start)
+    outcome = search.solve("nonlinear program", Mesh(steps), coarse or start, coarser=coarse is not None)
     if not outcome.success and search.seconds_left > 0:
         closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:

@@ -1,0 +1,287 @@
+"""Plan motions past obstacles, each from the task alone, with default settings: no start, no side on which to pass.
+
+    python -m towline.benchmarks.scenes [WORD ...] [--list]
+
+WORDs select the scenes whose name contains one of them. Three scenes are of the kind that a cable robot on the ground
+meets. The others are those of coltrans-planning (IMRCLab, examples/benchmark): one to six quadrotors carry a point
+load through nothing, a window or a forest. Their obstacles, ends, cable lengths and bounds are theirs, and so is
+what they keep: 0.1 m between quadrotors and obstacles, 0.2 m among quadrotors, 0.01 m about the load. Masses (34 g of a
+quadrotor, 10 g of the load), thrust (0.6 N) and duration (8 s) are assumed.
+
+Each row has what the planner reports: status, CPU time, the largest violation of the audit and the reason.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..models import Robot, load
+from ..ocp import MotionStatus, Plan, plan
+
+Scene = tuple[Robot, dict[str, Any]]
+
+LENGTH = 0.5  # [m], of the quadrotors' cables
+QUADROTOR, APART, LOAD = 0.1, 0.2, 0.01  # [m]
+ROUND = [(1.57, 1.0), (0.0, 1.0), (4.2, 1.0)]
+SIX = [(azimuth, 1.1) for azimuth in (1.04, 0.0, 2.08, 3.16, 4.2, 5.24)]
+FIVE = [(azimuth, 1.2) for azimuth in (1.25, 0.0, 2.5, 3.75, 5.0)]
+FOUR = [(azimuth, 1.1) for azimuth in (0.0, 1.57, 3.14, 4.71)]
+FOUR_AT_GOAL = [(azimuth, 1.2) for azimuth in (0.0, 5.0, 3.14, 4.0)]
+TEAMS = {  # azimuth and elevation of each cable [rad]
+    1: [(0.0, np.pi / 2)],
+    2: [(1.57, 1.0), (1.57 + np.pi, 1.0)],
+    3: ROUND,
+    4: FOUR,
+    5: FIVE,
+    6: SIX,
+}
+GATE = [(0.5, 0.4, 0.4), (0.5, -0.4, 0.4)]  # x and y of the middle, and the width [m]
+TREES = [
+    (x, y, 0.1)
+    for x, y in (
+        (0.75, -0.25),
+        (-0.2, -0.25),
+        (-0.75, -0.25),
+        (0.7, 0.5),
+        (0.3, 0.25),
+        (-0.6, 0.5),
+        (0.5, 1.25),
+        (-0.1, 1.0),
+        (-0.5, 1.0),
+    )
+]
+THIN_TREES = [
+    (x, y, 0.05)
+    for x, y in (
+        (1.98, 0.7785),
+        (0.8853, 1.0672),
+        (1.5711, -1.1581),
+        (0.4922, -0.9134),
+        (1.8408, -0.3093),
+        (0.3165, 0.0511),
+        (2.9604, -1.0162),
+        (2.6036, 0.1167),
+        (1.1281, 0.1223),
+        (2.854, 1.0161),
+        (0.0059, 1.0431),
+    )
+]
+
+
+def main() -> None:
+    """Plan the scenes and print a row each."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("words", nargs="*", metavar="WORD", help="only scenes whose name contains one of these")
+    parser.add_argument("--list", action="store_true", help="print the names of the scenes")
+    options = parser.parse_args()
+    names = [name for name in SCENES if not options.words or any(word in name for word in options.words)]
+    if not names:
+        parser.error(f"WORD must be part of a scene's name ({', '.join(SCENES)}), got {' '.join(options.words)}")
+    if options.list:
+        print("\n".join(names))
+        return
+    print(f"{'scene':14} {'robots':>6} {'status':11} {'CPU s':>6} {'violation':>10}  reason")
+    undecided = 0
+    for name in names:
+        robot, task = SCENES[name]()
+        start = time.process_time()
+        planned = plan(robot, {"name": name} | task)
+        print(row(name, planned, time.process_time() - start), flush=True)
+        undecided += planned.status is MotionStatus.NOT_FOUND
+    sys.exit(undecided > 0)
+
+
+def row(name: str, planned: Plan, seconds: float) -> str:
+    """Return the row of a scene."""
+    audit = planned.audit
+    violation = "-" if planned.status is MotionStatus.INFEASIBLE else f"{audit.violation.max():.1e} N"
+    reason = planned.reason if not audit.excess else str(audit.excess[0])
+    robots = len([carrier for carrier in planned.scenario.robot.carriers if carrier.moves])
+    return f"{name:14} {robots:6} {planned.status.value:11} {seconds:6.1f} {violation:>10}  {reason}"
+
+
+def team(cables: list[tuple[float, float]]) -> Robot:
+    """Return quadrotors with one cable each to a point load, at azimuths and elevations [rad] about it."""
+    count = len(cables)
+    quadrotors, lines = [], []
+    for i, offset in enumerate(_offsets(cables), start=1):
+        quadrotors.append(
+            {
+                "name": f"quad{i}",
+                "kind": "quadrotor",
+                "home": [*offset.tolist(), 0.0, 0.0, 0.0],
+                "mass": 0.034,
+                "inertia": [1.7e-5, 1.7e-5, 2.9e-5, 0, 0, 0],
+                "thrust_max": 0.6,
+                "torque_max": [0.01, 0.01, 0.003],
+                "tilt_max": 0.6,
+                "speed_max": 2.0,
+                "acceleration_max": 3.0,
+            }
+        )
+        lines.append({"carrier": f"quad{i}", "anchor": [0, 0, 0], "attachment": [0, 0, 0], "length": LENGTH})
+        lines[-1] |= {"t_min": 0.002, "t_max": 0.5}
+    return Robot.model_validate(
+        {
+            "name": f"point-load-{count}",
+            "source": "cables and ends: coltrans-planning; masses, thrusts and tensions are assumed",
+            "platform": {"mass": 0.01, "dof": ["x", "y", "z"], "home": [0, 0, 0, 0, 0, 0]},
+            "carriers": quadrotors,
+            "drive": "fixed-length",
+            "cables": lines,
+        }
+    )
+
+
+def _offsets(cables: list[tuple[float, float]]) -> np.ndarray:
+    """Return the places of the quadrotors about the load, (n, 3) [m]."""
+    azimuth, elevation = np.array(cables).T
+    flat = np.cos(elevation)
+    return LENGTH * np.stack([np.cos(azimuth) * flat, np.sin(azimuth) * flat, np.sin(elevation)], axis=1)
+
+
+def carried(
+    count: int,
+    start: list[float],
+    end: list[float],
+    low: list[float],
+    high: list[float],
+    posts: list[tuple[float, float, float]],
+    at_goal: list[tuple[float, float]] | None = None,
+) -> Scene:
+    """Return a scene in which a team carries its load from `start` to `end`, inside a box and past square posts."""
+    cables = TEAMS[count]
+    robot = team(cables)
+    ends = [np.array(place) + _offsets(its) for place, its in ((start, cables), (end, at_goal or cables))]
+    around = {
+        carrier.name: {"kind": "line", "start": first.tolist(), "end": last.tolist()}
+        for carrier, first, last in zip(robot.carriers, *ends, strict=True)
+    }
+    keep = {"platform": LOAD, "carriers": QUADROTOR, "cables": 0.001}
+    places = [
+        {
+            "kind": "box",
+            "name": f"post {i}",
+            "min": [x - width / 2, y - width / 2, -1.5],
+            "max": [x + width / 2, y + width / 2, 1.5],
+            **keep,
+        }
+        for i, (x, y, width) in enumerate(posts, start=1)
+    ]
+    limits: dict[str, Any] = {"platform_box": {"min": low, "max": high}, "keep_out": places}
+    if count > 1:
+        limits["carrier_separation"] = APART
+    task = {
+        "path": {"kind": "line", "start": start, "end": end},
+        "duration": 8,
+        "steps": 60,
+        "tube": {"position": "free"},
+        "base": {"kind": "free", "ends": "rest" if at_goal is None else "exact", "around": around},
+        "limits": limits,
+    }
+    return robot, task
+
+
+def empty(count: int) -> Scene:
+    """Return the scene without obstacles."""
+    end = 1.5 if count == 6 else 1.2
+    return carried(count, [-0.5, 0, 0], [end, 0, 0], [-0.6, -1.0, -0.1], [4.0, 1.0, 1.0], [])
+
+
+def window(count: int) -> Scene:
+    """Return the gap of 0.4 m between two blocks."""
+    if count == 1:
+        low, high = [-1.5, -0.4, -0.1], [1.5, 0.4, 0.2]
+        return carried(1, [-1, 0, 0], [1, 0, 0], low, high, [(0.0, 0.4, 0.3), (0.0, -0.4, 0.3)])
+    wide = 0.8 if count == 5 else 0.6
+    at_goal = FOUR_AT_GOAL if count == 4 else None
+    return carried(count, [-0.5, 0, 0], [3.5, 0, 0], [-0.6, -wide, -0.1], [4.0, wide, 1.0], GATE, at_goal)
+
+
+def forest(count: int) -> Scene:
+    """Return the trees."""
+    if count == 1:
+        return carried(1, [-0.5, 0, 0], [3.5, 0, 0], [-0.6, -1.0, -0.1], [4.0, 1.0, 1.0], THIN_TREES)
+    at_goal = FOUR_AT_GOAL if count == 4 else None
+    return carried(count, [0, -1, 0], [0, 2, 0], [-0.76, -1.1, 0.0], [0.76, 2.1, 0.5], TREES, at_goal)
+
+
+def warehouse() -> Scene:
+    """Return a platform of 40 kg under eight crossed cables in a frame of 12 x 8 x 6 m, and a rack between its ends."""
+    like = load("cogiro")
+    size = np.array([12.0, 8.0]) / np.ptp(like.home_anchors[:, :2], axis=0)
+    cables = [
+        {
+            "carrier": "frame",
+            "anchor": [*(anchor[:2] * size).tolist(), float(anchor[2] * 6.0 / 5.42)],
+            "attachment": attachment.tolist(),
+            "t_min": 20,
+            "t_max": 3000,
+        }
+        for anchor, attachment in zip(like.anchors, like.attachments, strict=True)
+    ]
+    robot = Robot.model_validate(
+        {
+            "name": "warehouse",
+            "source": "cogiro, with another frame and a lighter platform",
+            "platform": {"mass": 40, "inertia": [12, 12, 10, 0, 0, 0], "com": [0, 0, 0.3], "home": [0, 0, 1, 0, 0, 0]},
+            "carriers": [{"name": "frame", "kind": "ground"}],
+            "cables": cables,
+        }
+    )
+    rack = {"kind": "box", "name": "rack", "min": [-0.5, -4, 0], "max": [0.5, 1, 1.5], "platform": 0.1, "cables": 0.05}
+    task = {
+        "path": {"kind": "line", "start": [-3, -1, 0.3], "end": [3, -1, 0.3]},
+        "duration": 12,
+        "tube": {"position": "free"},
+        "limits": {"keep_out": [rack]},
+    }
+    return robot, task
+
+
+def shelf() -> Scene:
+    """Return a load under three cables that is lifted past a shelf above it."""
+    place = {"kind": "box", "name": "shelf", "min": [-0.6, -0.2, 1.0], "max": [0.2, 0.2, 1.1]}
+    task = {
+        "path": {"kind": "line", "start": [0, 0, 0.3], "end": [0, 0, 1.8]},
+        "duration": 6,
+        "tube": {"position": "free"},
+        "limits": {"keep_out": [place | {"platform": 0.1, "cables": 0.02}]},
+    }
+    return load("point-mass-3"), task
+
+
+def hatch() -> Scene:
+    """Return a wall with a hole beside the straight way, through which three quadrotors carry their load."""
+    wall = {"kind": "box", "platform": 0.4, "carriers": 0.3, "cables": 0.05}
+    places = [
+        wall | {"name": "left", "min": [-0.1, 4.0, -3], "max": [0.1, 9, 6]},
+        wall | {"name": "right", "min": [-0.1, -9, -3], "max": [0.1, 1.0, 6]},
+        wall | {"name": "below", "min": [-0.1, 1.0, -3], "max": [0.1, 4.0, -0.5]},
+        wall | {"name": "above", "min": [-0.1, 1.0, 2.5], "max": [0.1, 4.0, 6]},
+    ]
+    task = {
+        "path": {"kind": "line", "start": [-3, 0, 0], "end": [3, 0, 0]},
+        "duration": 10,
+        "steps": 40,
+        "tube": {"position": "free", "attitude": "free"},
+        "base": {"kind": "free"},
+        "limits": {"keep_out": places, "carrier_separation": 0.6},
+    }
+    return load("multi-quadrotor-3"), task
+
+
+SCENES: dict[str, Callable[[], Scene]] = {"warehouse": warehouse, "shelf": shelf, "hatch": hatch}
+for _kind in (empty, window, forest):
+    for _count in range(1, 7):
+        SCENES[f"{_kind.__name__}_{_count}"] = lambda kind=_kind, count=_count: kind(count)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,185 @@
+"""`AtRest`: by how much a robot at rest keeps its task's limits, for many poses in one call."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...solvers import solve_batch
+from ..audits.tensions import INDEPENDENT, scaled
+from ..limits import Limit, Rate
+from ..tasks.scenario import Scenario
+
+__all__ = ["AtRest", "Kept", "unsure"]
+
+UNKNOWN = 2.0  # metres by which a limit may change while what moves moves by one, if the limit does not state it
+SPARE = 0.01  # of the weight, from the limits of tensions: a motion needs more than rest does
+BALANCED = 1e-9  # of the weight
+FINEST = 1e-3  # [m]
+MISSED = 0.1  # of the weight, which few cables cannot balance to the last bit; the program can
+
+
+class Kept(NamedTuple):
+    """By how much limits are kept by n poses at rest.
+
+    Attributes
+    ----------
+    slack
+        (n,) [m]: by how much everything that moves may move before a limit is exceeded; negative where one is.
+    points
+        (n, k, 3) [m]: what moves: attachments and carriers.
+    worst
+        (n,) index of the limit that is kept by least; -1 where there are no tensions.
+    """
+
+    slack: np.ndarray
+    points: np.ndarray
+    worst: np.ndarray
+
+
+class _Balance(NamedTuple):
+    """A (n, 6, m) and w (n, 6) in newtons, tensions (n, m), where they balance, and whether A spans all wrenches."""
+
+    A: np.ndarray
+    w: np.ndarray
+    tensions: np.ndarray
+    exists: np.ndarray
+    spans: bool
+
+
+class AtRest:
+    """Evaluate the hard limits of a scenario, and whether there are tensions, for platform and carriers at rest.
+
+    Limits of other units than metres are kept or not: their slack is in parts of the robot's size.
+    """
+
+    def __init__(self, scenario: Scenario, size: float, spare: float = SPARE):
+        self.scenario, self.size, self.spare = scenario, size, spare
+        robot = scenario.robot
+        self._tilting = [
+            i for i, carrier in enumerate(robot.carriers) if carrier.efforts and (i, 3) in scenario.carrier_free
+        ]
+
+    @cached_property
+    def _checked(self) -> list[tuple[int, Limit, slice, float]]:
+        """Return the limits that rest can exceed: index, limit, place among the values, and metres per unit of it."""
+        limits, checked = self.scenario.limits, []
+        for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
+            if limit.soft is not None or limit.is_equation or isinstance(limit, Rate):
+                continue
+            known = limit.per_metre if np.isfinite(limit.per_metre) else UNKNOWN
+            unit = 1.0 / known if limit.unit == "m" else self.size / limit.scale
+            checked.append((k, limit, place, unit))
+        return checked
+
+    @cached_property
+    def _evaluated(self) -> tuple[Any, Any, list[np.ndarray], np.ndarray]:
+        """Return the function of all limits with its arguments and values in place: no copies, no conversions."""
+        robot, function = self.scenario.robot, self.scenario.limits.function
+        arguments = [*(np.zeros(18) for _ in range(1 + len(robot.carriers))), np.zeros(robot.m), np.zeros(6)]
+        values = np.zeros(function.numel_out(0))
+        buffer: Any
+        buffer, evaluate = function.buffer()
+        for i, argument in enumerate(arguments):
+            buffer.set_arg(i, argument.data)
+        buffer.set_res(0, values.data)
+        return buffer, evaluate, arguments, values
+
+    def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
+        """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
+        anchors, attachments = self.scenario.dynamics.points(platform, carriers)
+        points = np.concatenate([attachments, anchors], axis=1)
+        balance = self._balance(platform, carriers)
+        A, w, tensions, exist = balance.A, balance.w, balance.tensions, balance.exists
+        slack, worst = self._slack(platform, self._tilted(A, carriers, tensions), tensions, off_path)
+        # The exact solver decides only where nothing else does: it takes longer than all limits.
+        open_ones = np.flatnonzero((slack >= 0.0) & ~exist)
+        if open_ones.size and balance.spans:
+            exist[open_ones] = solve_batch(A[open_ones], w[open_ones], *self._bounds).feasible
+        return Kept(np.where(exist, slack, np.minimum(slack, -self.size)), points, np.where(exist, worst, -1))
+
+    @cached_property
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the limits of the tensions less what a motion needs, (m,) each [N]."""
+        low, high = self.scenario.bounds()
+        spare = np.minimum(self.spare * self.scenario.robot.force_scale, (high - low) / 4)
+        return low + spare, high - spare
+
+    @cached_property
+    def _weight(self) -> np.ndarray | None:
+        """Return the wrench at rest (6,) in newtons, which no pose changes; None with wind, which turns with it."""
+        scenario, still = self.scenario, np.zeros(6)
+        if scenario.wind is not None and any(scenario.wind):
+            return None
+        return scaled(scenario, scenario.dynamics.required_wrench(scenario.robot.home, still, still)[None])[0]
+
+    def _balance(self, platform: np.ndarray, carriers: np.ndarray) -> _Balance:
+        """Return the tensions of least norm, cut to their limits, and where they balance what there is at rest."""
+        scenario, robot = self.scenario, self.scenario.robot
+        A = scaled(scenario, scenario.dynamics.wrench_matrix(platform, carriers))
+        if self._weight is not None:
+            w = np.broadcast_to(self._weight, platform.shape)
+        else:
+            still = np.zeros_like(platform)
+            w = scaled(scenario, scenario.dynamics.required_wrench(platform, still, still, wind=scenario.wind))
+        U, values, Vt = np.linalg.svd(A, full_matrices=False)
+        kept = values > INDEPENDENT * values[:, :1]
+        part = np.divide((U.swapaxes(1, 2) @ w[..., None])[..., 0], values, out=np.zeros_like(values), where=kept)
+        tensions = np.clip((Vt.swapaxes(1, 2) @ part[..., None])[..., 0], *self._bounds)
+        missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
+        dof = len(robot.platform.dof)
+        spans = robot.m >= dof and bool(kept[:, dof - 1].all())
+        return _Balance(A, w, tensions, missed <= (BALANCED if spans else MISSED) * robot.force_scale, spans)
+
+    def _tilted(self, A: np.ndarray, carriers: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+        """Return the carriers tilted as their efforts balance their weight and their cables."""
+        if not self._tilting:
+            return carriers
+        robot, carriers = self.scenario.robot, carriers.copy()
+        for i in self._tilting:
+            cables = robot.carrier_of_cable == i
+            pull = -np.einsum("nij,nj->ni", A[:, :3, cables], tensions[:, cables])
+            still = np.zeros_like(carriers[:, i])
+            tilt = robot.carriers[i].balanced_tilt(carriers[:, i], still, pull, np.array(robot.gravity))
+            if tilt is not None:
+                carriers[:, i, 3:5] = tilt
+        return carriers
+
+    def _slack(
+        self, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray, off_path: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the smallest slack of all limits (n,) [m], and the index of its limit."""
+        n, checked = len(platform), self._checked
+        if not checked:
+            return np.full(n, np.inf), np.zeros(n, int)
+        _, evaluate, arguments, values = self._evaluated
+        table = np.empty((n, len(values)))
+        for row in range(n):
+            arguments[0][:6] = platform[row]
+            for argument, pose in zip(arguments[1:], carriers[row], strict=False):
+                argument[:6] = pose
+            arguments[-2][:] = tensions[row]
+            if off_path is not None:
+                arguments[-1][:] = off_path[row]
+            evaluate()
+            table[row] = values
+        slack = np.empty((n, len(checked)))
+        at = np.zeros(n)
+        for column, (_, limit, place, unit) in enumerate(checked):
+            value = table[:, place] if type(limit).over is Limit.over else limit.over(at, table[:, place])
+            kept = np.minimum(value - limit.low, limit.high - value).min(axis=1) * unit
+            slack[:, column] = np.where(np.isnan(kept), -np.inf, kept)
+        least = slack.argmin(axis=1)
+        return slack[np.arange(n), least], np.array([checked[k][0] for k in least])
+
+
+def unsure(slack: np.ndarray, points: np.ndarray, slope: float = 1.0) -> np.ndarray:
+    """Return the indices k of poses between which and the next a limit may be exceeded, though both keep it.
+
+    `slack` (n,) [m] changes by at most `slope` times what any of `points` (n, k, 3) moves. Where they move less than
+    a millimetre nothing is unsure.
+    """
+    moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
+    return np.flatnonzero((slack[1:] + slack[:-1] < slope * moved) & (moved > FINEST))

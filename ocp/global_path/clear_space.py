@@ -1,0 +1,90 @@
+"""`ClearSpace`: which configurations are clear, and how far straight pieces between them are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.random import Generator
+
+from .at_rest import AtRest, unsure
+from .space import Space
+
+__all__ = ["ClearSpace"]
+
+OF_END = 0.9  # of the slack at an end: what is kept there, if that is less than the reserve
+RISE = 0.3  # of the distance from such an end: how fast the reserve returns
+STEP = 0.25  # of the robot's size: the longest step between places that are checked for tensions
+BATCH = 16  # places at a time
+TRIED, CHOSEN = 64, 6  # random configurations, and how many of those that are clear the trees grow to
+NARROW = 0.03  # of the robot's size: gaps much narrower do not count for more
+
+
+class ClearSpace:
+    """The configurations whose slack is the reserve or more; near an end that has less, as much as can be kept there.
+
+    Attributes
+    ----------
+    reserve
+        By how much all limits are kept [m].
+    evaluated
+        How many configurations have been evaluated.
+    """
+
+    def __init__(self, space: Space, rest: AtRest, reserve: float):
+        self.space, self.rest, self.reserve = space, rest, reserve
+        self.evaluated = 0
+        kept = rest(*space.poses(space.ends))
+        self._at_ends = np.minimum(reserve, OF_END * np.maximum(kept.slack, 0.0))
+        self._longest = STEP * space.size
+
+    def _evaluate(self, configurations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return by how much configurations (n, count) keep more than the reserve [m], and their points."""
+        self.evaluated += len(configurations)
+        kept = self.rest(*self.space.poses(configurations))
+        away = np.linalg.norm((configurations[:, None] - self.space.ends) * self.space.scale, axis=2)
+        needed = np.minimum(self.reserve, (self._at_ends + RISE * away).min(axis=1))
+        return kept.slack - needed, kept.points
+
+    def targets(self, rng: Generator) -> Iterator[np.ndarray]:
+        """Yield random configurations that are clear, those that are barely so first of all: they lie in gaps."""
+        while True:
+            tried = np.array([self.space.sample(rng) for _ in range(TRIED)])
+            yield tried[rng.integers(TRIED)]
+            slack, _ = self._evaluate(tried)
+            clear = np.flatnonzero(slack >= 0.0)
+            if clear.size:
+                weight = 1.0 / (slack[clear] + NARROW * self.space.size)
+                count = min(CHOSEN, clear.size)
+                yield from tried[rng.choice(clear, count, replace=False, p=weight / weight.sum())]
+
+    def advance(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return the farthest configuration on the straight way from `start`, which is clear, to `end`."""
+        length = float(np.linalg.norm((end - start) * self.space.scale))
+        if length == 0.0:
+            return end
+        shares = np.linspace(0.0, 1.0, int(np.ceil(length / self._longest)) + 1)
+        last = 0.0
+        for first in range(0, len(shares) - 1, BATCH):
+            chunk = shares[first : first + BATCH + 1]
+            last = self._clear_until(start, end, chunk)
+            if last < chunk[-1]:
+                break
+        return end if last == 1.0 else start + last * (end - start) if last > 0.0 else start
+
+    def _clear_until(self, start: np.ndarray, end: np.ndarray, shares: np.ndarray) -> float:
+        """Return the largest of `shares` of a straight way, or one between, up to which it is clear from the first."""
+        slack, points = self._evaluate(start + shares[:, None] * (end - start))
+        slack[0] = max(slack[0], 0.0)
+        while True:
+            bad = np.flatnonzero(slack < 0.0)
+            if bad.size:
+                shares, slack, points = shares[: bad[0]], slack[: bad[0]], points[: bad[0]]
+            open_ones = unsure(slack, points, 1 + RISE)
+            if not open_ones.size:
+                return float(shares[-1])
+            middle = (shares[open_ones] + shares[open_ones + 1]) / 2
+            more, more_points = self._evaluate(start + middle[:, None] * (end - start))
+            shares = np.insert(shares, open_ones + 1, middle)
+            slack = np.insert(slack, open_ones + 1, more)
+            points = np.insert(points, open_ones + 1, more_points, axis=0)

@@ -1,0 +1,114 @@
+"""`find_global_path`: a path past obstacles from the start of a motion to its end, from which the program starts.
+
+A nonlinear program that starts inside an obstacle, or on its wrong side, stays there. Where the usual guess exceeds a
+limit at rest (`need`), two trees of configurations grow from start and end (`tree`), over the platform's coordinates
+and the shape of its formation (`space`). A configuration is clear if tensions exist there at rest and all limits are
+kept by a reserve (`at_rest`). A straight piece between two is clear if no distance can be exceeded between the places
+that are checked (`clear_space`). Motion is left to the program.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...text import quantity
+from ..nlp.guess import guess_through
+from ..tasks.deviation import Deviation
+from ..tasks.paths.rest_to_rest import rest_to_rest
+from ..tasks.scenario import Scenario
+from .at_rest import AtRest
+from .clear_space import ClearSpace
+from .need import STILL, limit_name
+from .smoothing import rounded, shortened
+from .space import Space
+from .tree import connect
+
+__all__ = ["GlobalPath", "find_global_path"]
+
+RESERVES = (0.05, 0.0125, 0.002)  # of the robot's size, in the order in which they are tried
+MOST_RESERVE = 0.05  # [m]
+MOST = (8_000, 16_000, 16_000)  # configurations that are evaluated with each reserve
+PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
+
+
+@dataclass(frozen=True)
+class GlobalPath:
+    """Configurations from start to end of a motion, each to be reached straight from the one before."""
+
+    space: Space
+    corners: np.ndarray  # (k, count)
+
+    @cached_property
+    def _places(self) -> np.ndarray:
+        lengths = np.linalg.norm(np.diff(self.corners, axis=0) * self.space.scale, axis=1)
+        return np.concatenate([[0.0], np.cumsum(lengths)])
+
+    @property
+    def length(self) -> float:
+        """Return its length, where turns and changes of formation count as what they move [m]."""
+        return float(self._places[-1])
+
+    def at(self, shares: np.ndarray) -> np.ndarray:
+        """Return the configurations at shares of its length, (n, count)."""
+        return np.stack([np.interp(shares * self.length, self._places, column) for column in self.corners.T], axis=1)
+
+    def guess(self, scenario: Scenario) -> Deviation:
+        """Return the motion along it from rest to rest."""
+        seconds = self._seconds(scenario)
+        nodes = np.linspace(0.0, seconds, scenario.task.steps + 1)
+        configurations = self.at(rest_to_rest(nodes / seconds)[0])
+        return guess_through(scenario.lasting(seconds), self.space.poses(configurations), nodes)
+
+    def _seconds(self, scenario: Scenario) -> float:
+        """Return a duration of the task's range in which speeds and accelerations along it are moderate."""
+        span, task = scenario.duration_range, scenario.task
+        if span is None:
+            return scenario.duration
+        own = [carrier.motion_limits for carrier in scenario.robot.carriers]
+        speeds = [task.limits.platform_speed, task.limits.carrier_speed, *(limits.speed for limits in own)]
+        rates = [
+            task.limits.platform_acceleration,
+            task.limits.carrier_acceleration,
+            *(one.acceleration for one in own),
+        ]
+        by_speed = [PEAK_SPEED * self.length / speed for speed in speeds if speed]
+        by_rate = [np.sqrt(PEAK_ACCELERATION * self.length / rate) for rate in rates if rate]
+        return float(np.clip(max([scenario.duration, *by_speed, *by_rate]), span.min, span.max))
+
+
+def find_global_path(scenario: Scenario, seconds: float = np.inf, seed: int = 0) -> tuple[GlobalPath | None, str]:
+    """Return a path, or None, and a message: its length, or why there is none.
+
+    The same scenario and seed have the same path, unless the time of `seconds` ends first.
+    """
+    space, deadline = Space(scenario), time.perf_counter() + seconds
+
+    def in_time() -> bool:
+        return time.perf_counter() < deadline
+
+    rest = AtRest(scenario, space.size)
+    kept = rest(*space.poses(space.ends))
+    for end, slack, worst in zip(("start", "end"), kept.slack, kept.worst, strict=True):
+        if slack < -STILL:
+            return None, f"no path, since the {end} exceeds {limit_name(scenario, int(worst))} too"
+    for part, most in zip(RESERVES, MOST, strict=True):
+        rng = np.random.default_rng(seed)
+        clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE))
+
+        def go_on(clear: ClearSpace = clear, most: int = most) -> bool:
+            return clear.evaluated < most and in_time()
+
+        start, end = space.ends
+        path = connect(start, end, space.scale, space.groups[1:], clear.targets(rng), clear.advance, go_on)
+        if path is not None:
+            path = shortened(path, space.scale, space.groups, clear.advance, rng, in_time)
+            found = GlobalPath(space, rounded(path, clear.advance))
+            inside = f"all limits kept by {quantity(1e3 * clear.reserve, 'mm', 3)}"
+            return found, f"a path of {quantity(found.length, 'm', 3)}, {inside}"
+        if not in_time():
+            return None, "no path found in its share of the time limit"
+    return None, f"no path found among {sum(MOST)} configurations"

@@ -1,0 +1,161 @@
+"""Paths past obstacles before any program is solved: through holes, round walls; checked by distances of our own."""
+
+import numpy as np
+import pytest
+
+from towline.benchmarks.scenes import APART, GATE, LENGTH, QUADROTOR, window
+from towline.models import load
+from towline.ocp import plan
+from towline.ocp.global_path.global_path import find_global_path
+from towline.ocp.global_path.need import guess_exceeds, is_open
+from towline.ocp.global_path.space import Space
+from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.task import Task
+
+ROBOT = load("point-mass-3")
+LINE = {"kind": "line", "start": [-0.6, 0, 1], "end": [0.6, 0, 1]}
+KEPT = 0.05  # [m]
+FAR = 4.0  # [m]
+FINE = 4001  # places along a path of about 2 m: ten times finer than the trees check it
+
+
+def box(low, high, **more):
+    return {"kind": "box", "min": low, "max": high, "platform": KEPT, "cables": None, **more}
+
+
+def wall(x, hole_low, hole_high, thickness=0.02):
+    """Four boxes about a hole in (y, z)."""
+    (y, z), (y_high, z_high) = hole_low, hole_high
+    left, right = x - thickness / 2, x + thickness / 2
+    return [
+        box([left, -FAR, -FAR], [right, y, FAR]),
+        box([left, y_high, -FAR], [right, FAR, FAR]),
+        box([left, y, -FAR], [right, y_high, z]),
+        box([left, y, z_high], [right, y_high, FAR]),
+    ]
+
+
+WALL_WITH_A_HOLE = wall(0.0, (0.3, 1.2), (0.6, 1.5))
+MAZE = [
+    box([-0.2005, -FAR, -FAR], [-0.1995, 0.25, FAR]),  # a millimetre thick
+    box([0.1995, -0.25, -FAR], [0.2005, FAR, FAR]),
+]
+CLOSED = wall(0.3, (0, 0), (1e-3, 1e-3))
+
+
+def scenario_of(places, robot=ROBOT, **changes):
+    task = {"path": LINE, "duration": 4, "steps": 20, "tube": {"position": "free"}, "limits": {"keep_out": places}}
+    return lay_out(robot, Task.model_validate(task | changes))
+
+
+def outside(place, points):
+    """Euclidean distance of points (..., 3) from a box, zero inside."""
+    low, high = np.array(place["min"]), np.array(place["max"])
+    return np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=-1)
+
+
+@pytest.fixture(scope="module")
+def through_the_hole():
+    path, message = find_global_path(scenario_of(WALL_WITH_A_HOLE))
+    assert path is not None, message
+    return path
+
+
+@pytest.mark.parametrize("places", [WALL_WITH_A_HOLE, MAZE], ids=["wall", "maze"])
+def test_a_path_past_walls_is_clear_between_its_places_too(places, through_the_hole):
+    scenario = scenario_of(places)
+    assert is_open(scenario)
+    assert guess_exceeds(scenario) == "keep_out"
+    path = through_the_hole if places is WALL_WITH_A_HOLE else find_global_path(scenario)[0]
+    assert path is not None
+    platform, _ = path.space.poses(path.at(np.linspace(0, 1, FINE)))
+    assert min(outside(place, platform[:, :3]).min() for place in places) >= KEPT - 1e-6
+    np.testing.assert_array_equal(platform[[0, -1], :3], [LINE["start"], LINE["end"]])
+    directions = ROBOT.home_anchors - platform[:, None, :3]
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    tensions = np.linalg.solve(directions.swapaxes(1, 2), np.tile([0, 0, ROBOT.weight], (FINE, 1))[..., None])
+    assert tensions.min() >= ROBOT.t_min.min()
+    assert tensions.max() <= ROBOT.t_max.max()
+
+
+def test_the_same_task_has_the_same_path(through_the_hole):
+    again, _ = find_global_path(scenario_of(WALL_WITH_A_HOLE))
+    assert again is not None
+    np.testing.assert_array_equal(again.corners, through_the_hole.corners)
+
+
+def test_a_path_is_as_short_as_its_corners_permit(through_the_hole):
+    """Through the nearest corner of the hole; 15 % longer, since random shortcuts do not find the shortest path."""
+    corner = np.array([0.0, 0.3 + KEPT, 1.2 + KEPT])
+    shortest = sum(np.linalg.norm(corner - np.array(LINE[end])) for end in ("start", "end"))
+    assert shortest - 0.02 <= through_the_hole.length <= 1.15 * shortest
+
+
+def test_the_guess_is_checked_between_its_places():
+    """A sheet that is thinner than the steps of the check, and in the middle of one of them, is in the way."""
+    thin = [box([0.0102, -FAR, -FAR], [0.0103, FAR, FAR], platform=0.0)]
+    assert guess_exceeds(scenario_of(thin)) == "keep_out"
+    assert guess_exceeds(scenario_of([box([0.1, 1, -FAR], [0.2, FAR, FAR])])) == ""
+
+
+def test_no_way_through_ends_in_time():
+    path, message = find_global_path(scenario_of(CLOSED), seconds=0.3)
+    assert path is None
+    assert "share of the time limit" in message
+    planned = plan(ROBOT, scenario_of(CLOSED, time_limit=1.0, steps=10).task)
+    assert not planned.feasible
+    assert "no path found" in next(stage.message for stage in planned.stages if stage.name == "global path")
+
+
+def test_an_end_that_is_blocked_has_no_path():
+    path, message = find_global_path(scenario_of([box([0.5, -1, 0], [0.7, 1, 2])]))
+    assert path is None
+    assert "the end exceeds keep_out" in message
+
+
+def test_only_motions_that_may_go_anywhere_have_global_paths():
+    circle = {"kind": "circle", "centre": [0, 0, 1], "radius": 0.3, "rate": 1.0}
+    assert not is_open(scenario_of([], tube={"position": 0.5}))
+    assert not is_open(scenario_of([], tube={}))
+    assert not is_open(scenario_of([], path=circle))
+    assert not is_open(scenario_of([], tube={"position": "free", "ends": "free"}))
+
+
+def test_a_plan_goes_through_the_hole():
+    planned = plan(ROBOT, scenario_of(WALL_WITH_A_HOLE).task)
+    assert planned.feasible, planned.report()
+    positions = planned.audit.motion.pose[:, :3]
+    assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
+
+
+def test_two_quadrotors_turn_to_fit_between_two_blocks():
+    robot, task = window(2)
+    scenario = lay_out(robot, Task.model_validate(task))
+    path, message = find_global_path(scenario)
+    assert path is not None, message
+    platform, carriers = path.space.poses(path.at(np.linspace(0, 1, FINE)))
+    blocks = [
+        {"min": [x - size / 2, y - size / 2, -1.5], "max": [x + size / 2, y + size / 2, 1.5]} for x, y, size in GATE
+    ]
+    for place in blocks:
+        assert outside(place, carriers[..., :3]).min() >= QUADROTOR - 1e-6
+    cables = carriers[..., :3] - platform[:, None, :3]
+    np.testing.assert_allclose(np.linalg.norm(cables, axis=2), LENGTH, atol=1e-12)
+    assert np.linalg.norm(carriers[:, 0, :3] - carriers[:, 1, :3], axis=1).min() >= APART - 1e-6
+    assert np.abs(cables.sum(axis=1)[:, :2]).max() < 1e-3  # equal pulls: the load hangs still
+
+
+def test_formations_keep_the_balance_of_a_load():
+    """Any linear map of the horizontal offsets keeps the sum of the horizontal pulls at zero: six quadrotors."""
+    robot, task = window(6)
+    space = Space(lay_out(robot, Task.model_validate(task)))
+    rng = np.random.default_rng(1)
+    samples = np.array([space.sample(rng) for _ in range(200)])
+    platform, carriers = space.poses(samples)
+    cables = carriers[..., :3] - platform[:, None, :3]
+    np.testing.assert_allclose(np.linalg.norm(cables, axis=2), LENGTH, atol=1e-12)
+    flat = space.offsets[:, :2]
+    weights = np.linalg.lstsq(np.vstack([flat.T, np.ones(6)]), [0, 0, 1], rcond=None)[0]  # of balanced pulls
+    unclipped = np.linalg.norm(cables[..., :2], axis=2).max(axis=1) < 0.96 * LENGTH
+    assert unclipped.sum() > 50
+    np.testing.assert_allclose((weights @ cables[unclipped])[:, :2], 0, atol=1e-12)
