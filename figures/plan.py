@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PHASE_NAMES = 45.0  # points above a panel, for the names of its phases
+
 
 def path(trajectory: xr.Dataset) -> Figure:
     """Draw the paths of platform and carriers in {G}, with the lines between them at a few instants."""
@@ -55,7 +57,8 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
     ]
     for ax, (title, trajectory) in zip(panels, trajectories.items(), strict=True):
         notes = _draw_tensions(ax, trajectory)
-        ax.set_title("\n".join([*([title] if title else []), *notes]), fontsize=9)
+        above = PHASE_NAMES if "phase" in trajectory.coords else None
+        ax.set_title("\n".join([*([title] if title else []), *notes]), fontsize=9, pad=above)
     style.legend_below(canvas, panels[0])
     return canvas
 
@@ -87,11 +90,34 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
         look: dict[str, Any] = {"linestyle": style.line_style(index), "color": style.colour(index)}
         ax.plot(time, values[:, index], **look, label=f"cable {cable}")
         ax.plot(time, np.where(missing, unlimited[:, index], np.nan), **look, linewidth=0.8)
+    _draw_phases(ax, trajectory)
     if missing.any():
         ax.fill_between(time, 0, 1, where=missing, color="#eeeeee", transform=ax.get_xaxis_transform(), step="mid")
         shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N")
         notes.append(f"grey: no tensions inside the limits; shortfall up to {shortfall}")
     return notes + _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
+
+
+def _draw_phases(ax: Axes, trajectory: xr.Dataset) -> None:
+    """Draw where phases begin, with their names, and the force of the ground; nothing for a task without phases."""
+    if "phase" not in trajectory.coords:
+        return
+    starts, ends = trajectory["phase_start"].values, trajectory["phase_end"].values
+    for name, start, end in zip(trajectory["phase"].values, starts, ends, strict=True):
+        if start > 0:
+            ax.axvline(start, color="#999999", linewidth=0.8, linestyle=":")
+        ax.annotate(
+            str(name),
+            ((start + end) / 2, 1.0),
+            xycoords=ax.get_xaxis_transform(),
+            xytext=(0, 2),
+            textcoords="offset points",
+            rotation=45,
+            fontsize="small",
+        )
+    reaction = trajectory["ground_reaction"].values
+    if reaction.any():
+        ax.plot(trajectory["time"].values, np.where(reaction > 0, reaction, np.nan), color="#777777", label="ground")
 
 
 def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> list[str]:

@@ -150,6 +150,23 @@ class Dynamics:
         return self._in_wind("required_wrench", wind, **motion.arguments(self.robot.carrier_home))["w"]
 
     @one_array
+    def carried_wrench(self, pose: Array, velocity: Array, acceleration: Array, load: Array) -> Array:
+        """Return the wrench that a load fixed to the platform needs beside `required_wrench`, (..., 6), in {G}.
+
+        It is force [N] and moment about the platform's CoM [N m], weight included.
+
+        Parameters
+        ----------
+        pose, velocity, acceleration
+            As in `required_wrench`.
+        load
+            (..., 10): mass [kg], CoM in the platform frame (3) [m], and the inertia about that CoM in platform axes
+            (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
+        """
+        motion = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
+        return self._call("carried_wrench", load=load, **motion)["w"]
+
+    @one_array
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
         """Return W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`.
 

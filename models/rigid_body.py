@@ -5,6 +5,8 @@
 
 about the CoM, whose place in the platform frame is c. Source: paper F, Eqs. 24 and 29; paper C,
 Eq. 4, which omits the gyroscopic term, and Eq. 12, which takes ddTheta for the angular acceleration.
+
+A load that the platform carries needs the same about its own CoM, and the moment of its force about the platform's.
 """
 
 from __future__ import annotations
@@ -30,13 +32,44 @@ def inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, acceleration: 
     pose, velocity, acceleration
         (6, 1) each: (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its first two time derivatives.
     """
+    of_platform = robot.platform.mass, ca.DM(robot.platform.com), ca.DM(robot.inertia)
+    return _wrench(robot, *of_platform, pose, velocity, acceleration)
+
+
+def carried_wrench(robot: Robot, load: Matrix, pose: Matrix, velocity: Matrix, acceleration: Matrix) -> Matrix:
+    """Return the wrench, (6, 1), that a load fixed to the platform needs, in {G}: [N], [N m] about the platform's CoM.
+
+    Parameters
+    ----------
+    load
+        (10, 1): mass [kg], CoM in the platform frame (3) [m], inertia about it (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
+    pose, velocity, acceleration
+        As in `inertial_wrench`.
+    """
+    mass, com = load[0], load[1:4]
+    xx, yy, zz, xy, xz, yz = (load[i] for i in range(4, 10))
+    inertia = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+    own = _wrench(robot, mass, com, inertia, pose, velocity, acceleration)
+    arm = rotation(pose[3:6]) @ (com - ca.DM(robot.platform.com))
+    return ca.vertcat(own[0:3], own[3:6] + ca.cross(arm, own[0:3]))
+
+
+def _wrench(
+    robot: Robot,
+    mass: Matrix | float,
+    com: Matrix,
+    inertia: Matrix,
+    pose: Matrix,
+    velocity: Matrix,
+    acceleration: Matrix,
+) -> Matrix:
+    """Return the wrench that a body in the platform's motion needs about its CoM, both in the platform frame."""
     angles, rates = pose[3:6], velocity[3:6]
     R = rotation(angles)
     omega = R @ body_rate(angles, rates)
     alpha = R @ body_acceleration(angles, rates, acceleration[3:6])
-    offset = R @ ca.DM(robot.platform.com)
+    offset = R @ com
     a_com = acceleration[0:3] + ca.cross(alpha, offset) + ca.cross(omega, ca.cross(omega, offset))
-    inertia = R @ ca.DM(robot.inertia) @ R.T
-    force = robot.platform.mass * (a_com - ca.DM(robot.gravity))
-    moment = inertia @ alpha + ca.cross(omega, inertia @ omega)
-    return ca.vertcat(force, moment)
+    turned = R @ inertia @ R.T
+    force = mass * (a_com - ca.DM(robot.gravity))
+    return ca.vertcat(force, turned @ alpha + ca.cross(omega, turned @ omega))

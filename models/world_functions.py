@@ -52,7 +52,7 @@ class WorldFunctions(Mapping[str, ca.Function]):
     @cached_property
     def _symbols(self) -> dict[str, ca.SX]:
         count = len(self._robot.carriers)
-        others = {"tensions": (self._robot.m,), "wind": (3,), "thrust": (count,), "torque": (count, 3)}
+        others = {"tensions": (self._robot.m,), "wind": (3,), "thrust": (count,), "torque": (count, 3), "load": (10,)}
         return Motion.symbols(count, 6)._asdict() | {name: ca.SX.sym(name, *size) for name, size in others.items()}
 
     @cached_property
@@ -80,6 +80,11 @@ class WorldFunctions(Mapping[str, ca.Function]):
     def _w(self) -> Matrix:
         motion = (self._symbols[name] for name in ("pose", "velocity", "acceleration"))
         return rigid_body.inertial_wrench(self._robot, *motion)
+
+    @cached_property
+    def _w_load(self) -> Matrix:
+        motion = (self._symbols[name] for name in ("pose", "velocity", "acceleration"))
+        return rigid_body.carried_wrench(self._robot, self._symbols["load"], *motion)
 
     @cached_property
     def _W_e(self) -> Matrix:
@@ -131,6 +136,7 @@ _DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]
     "exits": (_PLACE, lambda of: {"exits": of._exit.points.T}),  # (m, 3)
     "required_wrench": (_MOTION, lambda of: {"w": of._w}),  # (6, 1)
     "required_wrench_in_wind": (f"{_MOTION} wind", lambda of: {"w": of._w - of._W_e}),  # (6, 1)
+    "carried_wrench": ("pose velocity acceleration load", lambda of: {"w": of._w_load}),  # (6, 1)
     "aerodynamic_wrench": ("pose velocity wind", lambda of: {"W_e": of._W_e}),  # (6, 1)
     "acceleration": (_STATE, lambda of: {"acceleration": of._acceleration(of._pull)}),  # (6, 1)
     "acceleration_in_wind": (

@@ -16,9 +16,9 @@ import numpy as np
 
 from ..solvers import Certificate
 from .audits.audit import Audit
+from .audits.by_phase import distribution
 from .audits.checks import LENGTH_TOLERANCE
 from .audits.excess import Excess
-from .audits.tensions import Distribution
 from .limits import Limit, Rate
 from .tasks.ends import AT_REST, fixed_values
 from .tasks.paths import Motion
@@ -225,10 +225,10 @@ def _without_tensions(
             continue
         one = slice(row, row + 1)
         A = scenario.dynamics.wrench_matrix(platform.pose[one], carriers.pose[one])
-        distribute = Distribution(scenario, A)
-        motion = [part[one] for part in (*platform, *carriers)]
+        distribute = distribution(scenario, times[one], A)
+        moving, bases = (Motion(*(part[one] for part in motion)) for motion in (platform, carriers))
         for wind in scenario.winds_at(platform.pose[row], platform.velocity[row]):
-            result = distribute(scenario.dynamics.required_wrench(*motion, wind=wind), None)
+            result = distribute(scenario.required_wrench(times[one], moving, bases, wind), None)
             found = result.certificate
             if found is None or max(float(result.violation[0]), result.beyond) <= distribute.tolerance:
                 continue

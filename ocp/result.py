@@ -17,6 +17,7 @@ from ..solvers import Certificate
 from ..writing import whole_file
 from .audits.audit import Audit
 from .audits.infeasible_spans import infeasible_spans
+from .phase_summary import PhaseSummary, summaries
 from .stage import Stage
 from .status import MotionStatus
 from .tasks.deviation import Deviation
@@ -92,8 +93,8 @@ class Plan:
     @property
     def margin(self) -> float | None:
         """Return the smallest distance of any tension from its limits [N]; None if at some time there are none."""
-        robot = self.scenario.robot
-        inside = np.minimum(self.audit.tensions - robot.t_min, robot.t_max - self.audit.tensions)
+        tensions, t_min = self.audit.tensions, self.scenario.t_min_at(self.audit.times)
+        inside = np.minimum(tensions - t_min, self.scenario.robot.t_max - tensions)
         return float(inside.min()) if np.isfinite(inside).all() else None
 
     @property
@@ -129,6 +130,11 @@ class Plan:
         """Return a certificate for each span of time without tensions inside their limits; see `infeasible_spans`."""
         return infeasible_spans(self.scenario, self.audit)
 
+    @cached_property
+    def phases(self) -> tuple[PhaseSummary, ...]:
+        """Return name, times, load, tensions and ground reaction of each phase; empty for a task without phases."""
+        return summaries(self.scenario, self.audit)
+
     def to_dict(self) -> dict[str, Any]:
         """Return what `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""
         return {
@@ -147,6 +153,7 @@ class Plan:
             "certificate": None if self.certificate is None else self.certificate.to_dict(),
             "infeasible_spans": [certificate.to_dict() for certificate in self.infeasible_spans],
             "relaxations": [relaxed.to_dict() for relaxed in self.relaxations],
+            "phases": [phase._asdict() for phase in self.phases],
             "stages": [stage._asdict() for stage in self.stages],
         }
 

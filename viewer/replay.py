@@ -7,15 +7,16 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from ..distribution import wrench_problem
 from ..errors import InputError
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
+from ..ocp.audits.by_phase import certified
 from ..ocp.reports.scene import outline
 from ..ocp.tasks.lay_out import lay_out
+from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
-from ..solvers import Certificate, certify
+from ..solvers import Certificate
 from .geometry import Extent, Geometry
 from .instant import Instant, least_distance
 
@@ -106,7 +107,7 @@ class Replay:
         """Return the `index`-th instant with its audited tensions, or with a certificate if there are none."""
         tensions = self._tensions[index]
         there = bool(np.isfinite(tensions).all())
-        margin, nearest = least_distance(tensions, self.robot.t_min, self.robot.t_max)
+        margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
         certificate = None if there else self._certificate(index)
         return Instant(
             pose=self._pose[index],
@@ -122,14 +123,22 @@ class Replay:
 
     def _certificate(self, index: int) -> Certificate | None:
         """Return the certificate with the largest shortfall of all winds in which tensions must exist."""
-        scenario, pose, velocity = self._scenario, self._pose[index], self._velocity[index]
-        t_min, t_max = scenario.bounds()
-        A = scenario.dynamics.wrench_matrix(pose, self._carriers[index])
+        scenario, time = self._scenario, self.times[index : index + 1]
+        pose, carriers = self._pose[index], self._carriers[index]
+        motion = Motion(*(part[index : index + 1] for part in (self._pose, self._velocity, self._acceleration)))
+        A = scenario.dynamics.wrench_matrix(pose, carriers)
         proofs = []
-        for wind in scenario.winds_at(pose, velocity):
-            w = scenario.dynamics.required_wrench(pose, velocity, self._acceleration[index], wind=wind)
-            proofs.append(certify(wrench_problem(scenario.robot, A, w, t_min, t_max)))
+        for wind in scenario.winds_at(pose, self._velocity[index]):
+            w = scenario.required_wrench(time, motion, wind=wind)[0]
+            proofs.append(certified(scenario, float(time[0]), A, w))
         return max((proof for proof in proofs if proof), key=lambda proof: proof.shortfall, default=None)
+
+    @cached_property
+    def _t_min(self) -> np.ndarray:
+        """Return the smallest tensions at each instant, (n, m) [N]: zero where a phase permits slack cables."""
+        if self._task.phases is None:
+            return np.tile(self.robot.t_min, (len(self.times), 1))
+        return self._scenario.t_min_at(self.times)
 
     @cached_property
     def _scenario(self) -> Scenario:

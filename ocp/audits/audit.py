@@ -16,11 +16,12 @@ from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
+from .by_phase import distribution, taken_up
 from .checks import AuditedMotion, excesses
 from .drift import Drift, drift
 from .excess import Excess
 from .jumps import jumped_over
-from .tensions import INDEPENDENT, TOLERANCE, Distribution, in_all_winds, scaled
+from .tensions import INDEPENDENT, TOLERANCE, in_all_winds, scaled
 
 __all__ = ["Audit", "audit", "other_tensions_exist", "other_tensions_may_pass"]
 
@@ -55,7 +56,10 @@ class Audit:
         there is none.
     drift
         Where the planned tensions alone would take the platform; None for robots that can follow any motion exactly,
-        and where there are no tensions.
+        for motions with loads or on the ground, and where there are no tensions.
+    supports
+        The forces of the ground on each support point, (n, s) [N], zero where the platform hangs; None for a task
+        without ground.
     """
 
     rate: float
@@ -72,6 +76,7 @@ class Audit:
     limited: list[np.ndarray] = field(default_factory=list)
     certificate: Certificate | None = None
     drift: Drift | None = None
+    supports: np.ndarray | None = None  # (n, s)
 
     @property
     def passed(self) -> bool:
@@ -120,13 +125,14 @@ def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | Non
     motion, carriers = scenario.motion(times, deviation)
     _check_lengths(scenario, times, motion, carriers)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
-    w = scenario.dynamics.required_wrench(*motion, *carriers, wind=scenario.wind)
-    distribute = Distribution(scenario, A)
+    w = scenario.required_wrench(times, motion, carriers, scenario.wind)
+    distribute = distribution(scenario, times, A)
     few, tolerance = distribute.few, distribute.tolerance
-    result = distribute(w, _planned_tensions(deviation, times, robot.m))
-    tensions, certificate = result.tensions, result.certificate
+    planned = _planned_tensions(deviation, times, robot.m)
+    result = distribute(w, taken_up(scenario, times) if planned is None else planned)
+    tensions, supports, certificate = result.tensions, result.supports, result.certificate
     if (box := scenario.wind_box) is not None:
-        result, certificate = in_all_winds(distribute, box, motion, result)
+        result, certificate = in_all_winds(distribute, box, motion, w, result)
     if certificate is not None and result.row is not None:
         certificate = replace(certificate, time=float(times[result.row]))
     off_path = scenario.off_path(times, motion, carriers)
@@ -138,7 +144,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | Non
         at = float(times[result.row])
         exceeded.append(Excess("tensions", "platform", at, result.beyond, 0.0, "N", "exactly", why))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
-    followed = few and np.isfinite(tensions).all()
+    followed = few and np.isfinite(tensions).all() and not (scenario.phases.carry or scenario.phases.rest)
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
         times=times,
@@ -148,6 +154,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | Non
         tensions_unlimited=distribute.unlimited(w),
         violation=result.violation,
         tolerance=tolerance,
+        supports=supports,
         tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
         excess=[excess for excess in exceeded if excess.limit not in soft],
         soft_excess=[excess for excess in exceeded if excess.limit in soft],
@@ -167,6 +174,8 @@ def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:
 
 def other_tensions_exist(scenario: Scenario, audit: Audit) -> bool:
     """Return whether the cables can give a motion's wrenches by tensions other than the audited ones."""
+    if scenario.phases.jumps and scenario.scheme.continuous:
+        return False  # none that a program with this scheme has: they jump where the load changes
     A = scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
     values = np.linalg.svd(scaled(scenario, A), compute_uv=False)
     return scenario.robot.m > values.shape[1] or bool((values[:, -1] < INDEPENDENT * values[:, 0]).any())

@@ -57,7 +57,7 @@ class AuditedMotion:
 
 def excesses(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
     """Return all limits that are exceeded, hard and soft; `limited` is that of the motion."""
-    checks = (_still, _lengths, _initial, _tube_ends, _waypoints, _base_ends, _locked, _duration, _jumps)
+    checks = (_still, _lengths, _initial, _tube_ends, _waypoints, _base_ends, _grounded, _locked, _duration, _jumps)
     exceeded = _limits(audited, limited)
     return exceeded + [excess for check in checks for excess in check(audited)]
 
@@ -236,6 +236,17 @@ def _base_ends(audited: AuditedMotion) -> list[Excess]:
                 Excess("base.ends", about, float(audited.times[end]), float(value), 0.0, unit, "exactly", why)
             )
     return exceeded
+
+
+def _grounded(audited: AuditedMotion) -> list[Excess]:
+    """Check that the platform rests on its path where it is on the ground."""
+    resting = audited.scenario.phases.resting(audited.times)
+    if not resting.any():
+        return []
+    values = np.hstack([audited.off_path, audited.motion.velocity, audited.motion.acceleration])
+    off = np.where(resting, np.abs(values).max(axis=1), 0.0)
+    why = "on the ground it rests on its path"
+    return _above(audited, "phases.ground", "platform", off, END_TOLERANCE, "m, m/s, m/s^2", why)
 
 
 def _locked(audited: AuditedMotion) -> list[Excess]:

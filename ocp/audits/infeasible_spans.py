@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...distribution import wrench_problem
 from ...models.part import Vector3
-from ...solvers import Certificate, certify
+from ...solvers import Certificate
+from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .audit import Audit
+from .by_phase import certified
 
 __all__ = ["certificate_at", "infeasible_spans"]
 
@@ -38,15 +39,17 @@ def infeasible_spans(scenario: Scenario, audit: Audit) -> tuple[Certificate, ...
 
 def certificate_at(scenario: Scenario, audit: Audit, row: int) -> Certificate | None:
     """Return the certificate of one audited instant, of the worst wind of a box; None if tensions exist there."""
-    motions = [part[row] for part in (*audit.motion, *audit.carriers)]
-    A = scenario.dynamics.wrench_matrix(motions[0], motions[3])
     proofs: list[tuple[Certificate, Vector3 | None]] = []
-    for wind in scenario.winds_at(*motions[:2]):
-        w = scenario.dynamics.required_wrench(*motions, wind=wind)
-        certificate = certify(wrench_problem(scenario.robot, A, w, *scenario.bounds()))
+    one = slice(row, row + 1)
+    time = audit.times[one]
+    platform, carriers = (Motion(*(part[one] for part in motion)) for motion in (audit.motion, audit.carriers))
+    A = scenario.dynamics.wrench_matrix(platform.pose[0], carriers.pose[0])
+    for wind in scenario.winds_at(platform.pose[0], platform.velocity[0]):
+        w = scenario.required_wrench(time, platform, carriers, wind)[0]
+        certificate = certified(scenario, float(time[0]), A, w)
         if certificate is not None:
             proofs.append((certificate, None if scenario.wind_box is None else wind))
     if not proofs:
         return None
     certificate, wind = max(proofs, key=lambda proof: proof[0].shortfall)
-    return replace(certificate, time=float(audit.times[row]), wind=wind)
+    return replace(certificate, time=float(time[0]), wind=wind)

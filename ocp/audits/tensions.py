@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
 from .checks import UNDERACTUATED_TOLERANCE
 from .distance import distances
 
-__all__ = ["INDEPENDENT", "TOLERANCE", "AuditedTensions", "Distribution", "in_all_winds", "scaled"]
+__all__ = ["INDEPENDENT", "TOLERANCE", "AuditedTensions", "Distribute", "Distribution", "in_all_winds", "scaled"]
 
 TOLERANCE = 1e-6  # [N]
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
@@ -39,6 +39,7 @@ class AuditedTensions(NamedTuple):
     certificate: Certificate | None  # that with the largest shortfall; without time
     row: int | None  # of the certificate
     beyond: float  # [N] beyond the limits within the range of few cables, whose other errors are tolerated
+    supports: np.ndarray | None = None  # (n, s) [N], forces of the ground
 
 
 def scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
@@ -46,6 +47,22 @@ def scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
     robot = scenario.robot
     scale = robot.dof_mask * robot.wrench_scale
     return wrenches * scale.reshape(6, *[1] * (wrenches.ndim - 2))
+
+
+class Distribute(Protocol):
+    """Tensions of all instants of a motion, whose wrench matrices it knows, for any required wrenches."""
+
+    scenario: Scenario
+    few: bool
+    tolerance: float
+
+    def unlimited(self, w: np.ndarray) -> np.ndarray:
+        """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""
+        ...
+
+    def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
+        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
+        ...
 
 
 class Distribution:
@@ -60,9 +77,10 @@ class Distribution:
     little. Inside the span nothing may be missed: there the limits count as for any robot.
     """
 
-    def __init__(self, scenario: Scenario, A: np.ndarray):
+    def __init__(self, scenario: Scenario, A: np.ndarray, bounds: tuple[np.ndarray, np.ndarray] | None = None):
         robot, dof = scenario.robot, len(scenario.robot.platform.dof)
         self.scenario, self.A = scenario, A
+        self._bounds = scenario.bounds() if bounds is None else bounds
         self._scaled_A = scaled(scenario, A)
         self.few, self._inverse = _few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
         self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if self.few and scenario.count else TOLERANCE
@@ -74,9 +92,9 @@ class Distribution:
     def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
         """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
         scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
-        robot, (low, high) = scenario.robot, scenario.bounds()
+        robot, (low, high) = scenario.robot, self._bounds
         scaled_A, scaled_w = self._scaled_A, scaled(scenario, w)
-        near = np.zeros((len(w), robot.m)) if preferred is None else preferred
+        near = np.zeros((len(w), A.shape[2])) if preferred is None else preferred
         open_wrench = scaled_w - np.einsum("nij,nj->ni", scaled_A, near)
         tensions = near + (self._inverse @ open_wrench[..., None])[..., 0]
         violation = np.linalg.norm(scaled_w - np.einsum("nij,nj->ni", scaled_A, tensions), axis=1)
@@ -149,15 +167,16 @@ def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
 
 
 def in_all_winds(
-    distribute: Distribution, box: WindBox, motion: Motion, middle: AuditedTensions
+    distribute: Distribute, box: WindBox, motion: Motion, w: np.ndarray, middle: AuditedTensions
 ) -> tuple[AuditedTensions, Certificate | None]:
     """Return the result of the worst wind of a box at each instant, and its certificate with its wind.
 
-    `middle` is the result of the planned tensions. At no wind is the wrench farther from the available ones than at
-    those that decide: if these pass, others in the box are tried only to check that.
+    `middle` is the result of the planned tensions for w (n, 6), the wrench in the box's middle. At no wind is the
+    wrench farther from the available ones than at those that decide: if these pass, others in the box are tried only to
+    check that.
     """
     scenario = distribute.scenario
-    without_air = scenario.dynamics.required_wrench(*motion)
+    without_air = w + scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, np.array(box.middle))
     planned, n = np.nan_to_num(middle.tensions), len(motion.pose)
     worst, certificate = middle, middle.certificate and replace(middle.certificate, wind=box.middle)
 

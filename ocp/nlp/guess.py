@@ -91,7 +91,7 @@ def _pulled(scenario: Scenario, guess: Deviation) -> Deviation:
     """Return the same motion with the tensions of least norm, cut to their limits."""
     A, w = _balance(scenario, guess)
     least = (np.linalg.pinv(A, rcond=1e-6) @ w[..., None])[..., 0]
-    return replace(guess, tensions=np.clip(least, *scenario.bounds()))
+    return replace(guess, tensions=np.clip(least, *scenario.bounds_at(guess.nodes)))
 
 
 def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
@@ -117,4 +117,4 @@ def _balance(scenario: Scenario, guess: Deviation) -> tuple[np.ndarray, np.ndarr
     """Return A (n, 6, m) and w (n, 6) of a motion."""
     platform, carriers = scenario.motion(guess.nodes, guess)
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose)
-    return A, scenario.dynamics.required_wrench(*platform, wind=scenario.wind)
+    return A, scenario.required_wrench(guess.nodes, platform, wind=scenario.wind)

@@ -28,6 +28,7 @@ from .rows import (
     stretch,
 )
 
+TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
 JUMP = 0.05  # of an interval: how long a jump of the acceleration counts
 
 __all__ = ["Interval", "Points", "interval_of", "points"]
@@ -48,10 +49,11 @@ class Interval:
     Attributes
     ----------
     function
-        (x, x_end, p, p_end) -> (cost, values), with the reference motions p at the same points.
+        (x, x_end, p, p_end, grid) -> (cost, values), with the reference motions p at the same points, and `Grid`'s
+        numbers of the interval.
     flow
-        (x, x_end) -> the end's motion that integration gives, from what is free at the end: its acceleration, or its
-        snap; and what all nodes share.
+        (x, x_end, grid) -> the end's motion that integration gives, from what is free at the end: its acceleration, or
+        its snap; and what all nodes share.
     rows
         Names and bounds of `values`. The first are `gaps` equations: the end is what `flow` gives.
     """
@@ -71,10 +73,10 @@ def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, column
     return Points(bernstein.integral(h, first[layout.q], speed), speed, acceleration)
 
 
-def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray) -> Interval:
+def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, grid: np.ndarray) -> Interval:
     """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points.
 
-    The functions are for the nodes of these `references`, (18 (1 + c), nodes).
+    The functions are for the nodes of these `references`, (18 (1 + c), nodes), and the intervals of `grid`, (2, n).
     """
     robot, scheme = scenario.robot, scenario.scheme
     wide = 18 * (1 + len(robot.carriers))
@@ -83,8 +85,9 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     parameters_end, given_end = reference_symbols("p_end", references)
     columns = [*ca.vertsplit(x, layout.width), x_end]
     referred = [*ca.vertsplit(given_references, wide), given_end]
+    numbers, (step, take_up) = _numbers(grid)
     given = scenario.duration / mesh.steps
-    h = given * stretch(layout, x)
+    h = step * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
     values: list[ca.SX] = []
     rows: list[Row] = []
@@ -92,12 +95,12 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     _chain_rows(layout, h, given, columns, own, values, rows)
     values.append(x_end[layout.shared] - x[layout.shared])
     rows += [("shared", 0.0, 0.0)] * len(layout.carried)
-    flow = ca.Function("flow", [x, x_end], [_end(layout, h, given, columns, own)])
+    flow = ca.Function("flow", [x, x_end, numbers], [_end(layout, h, given, columns, own)])
     gaps = len(rows)
 
     _inner_rows(scenario, layout, h, columns, own, values, rows)
     cost = _jerk_cost(scenario, h, own, x_end[layout.a])
-    cost += _rate_cost(scenario, layout, h, columns)
+    cost += _rate_cost(scenario, layout, h, columns, take_up)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
     _rate_rows(scenario, mesh, layout, h, columns, moving, values, rows)
@@ -114,9 +117,15 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
 
     _hull_rows(scenario, mesh, points_of, values, rows)
-    inputs = [x, x_end, parameters, parameters_end]
-    function = ca.Function("interval", inputs, [cost, ca.vertcat(*values)], differentiated(4, 2))
+    inputs = [x, x_end, parameters, parameters_end, numbers]
+    function = ca.Function("interval", inputs, [cost, ca.vertcat(*values)], differentiated(5, 2))
     return Interval(function, flow, rows, gaps)
+
+
+def _numbers(grid: np.ndarray) -> tuple[ca.SX, list[ca.SX]]:
+    """Return symbols for one column of a grid, and the same with what is constant as numbers."""
+    symbols, values = reference_symbols("grid", grid)
+    return symbols, ca.vertsplit(values)
 
 
 def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX]) -> tuple[ca.SX, ca.SX]:
@@ -198,15 +207,22 @@ def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points, a_end: ca.SX) 
     return cost
 
 
-def _rate_cost(scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX]) -> ca.SX | float:
-    """Return what the rates of the tensions from point to point cost."""
-    costing = scenario.task.objective.tension_rate
-    if costing is None:
+def _rate_cost(
+    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], take_up: ca.SX
+) -> ca.SX | float:
+    """Return what the rates of the tensions from point to point cost.
+
+    On the ground they cost by default, so that the load is taken up over the whole phase.
+    """
+    objective, costing = scenario.task.objective, scenario.task.objective.tension_rate
+    if costing is None and not scenario.phases.rest:
         return 0.0
+    gentle = TAKE_UP * take_up / (objective.tension or scenario.robot.force_scale)
+    per_second = gentle if costing is None else 1.0 / costing
     cost: ca.SX | float = 0.0
     for share, first, second in _pieces(scenario, columns):
         rise = second[layout.tensions] - first[layout.tensions]
-        cost += share * ca.sumsqr(scenario.robot.force_scale * rise / (h * share) / costing)
+        cost += share * ca.sumsqr(scenario.robot.force_scale * rise / (h * share) * per_second)
     return cost
 
 

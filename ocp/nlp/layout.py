@@ -18,9 +18,10 @@ DURATION, MARGIN = "duration", "margin"
 class Layout:
     """The column of a point.
 
-    It has q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), missing wrenches (6 each or
-    0), one slack for each soft limit, and `carried`. A smooth scheme's column has jerk and snap after a, times the
-    first and second power of an interval's length at the scenario's duration: so they are of the size of a.
+    It has q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), forces of the ground, missing
+    wrenches (6 each or 0), one slack for each soft limit, and `carried`. A smooth scheme's column has jerk and snap
+    after a, times the first and second power of an interval's length at the scenario's duration: so they are of the
+    size of a.
 
     Each node carries a copy of what all nodes share, the duration and the margin, equal to the copy of the next node,
     so that the program stays banded.
@@ -30,6 +31,7 @@ class Layout:
     m: int
     derivatives: int
     winds: int
+    grounds: int
     elastic: bool
     soft: tuple[str, ...]
     carried: tuple[str, ...]
@@ -41,7 +43,8 @@ class Layout:
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
         soft = tuple(dict.fromkeys(limit.name for limit in scenario.limits if limit.soft is not None))
         n, m, derivatives = scenario.count, scenario.robot.m, scenario.scheme.derivatives
-        return Layout(n, m, derivatives, scenario.decisive_winds, elastic, soft, tuple(carried))
+        counts = n, m, derivatives, scenario.decisive_winds, scenario.phases.supports
+        return Layout(*counts, elastic, soft, tuple(carried))
 
     @property
     def q(self) -> slice:
@@ -85,9 +88,15 @@ class Layout:
         return slice(start, start + self.winds * self.m)
 
     @property
+    def supports(self) -> slice:
+        """Return the place of the forces of the ground, in the same unit; zero where the platform hangs."""
+        start = self.wind_tensions.stop
+        return slice(start, start + self.grounds)
+
+    @property
     def missing(self) -> slice:
         """Return the place of an elastic program's missing wrenches: as planned, then in each decisive wind."""
-        start = self.wind_tensions.stop
+        start = self.supports.stop
         return slice(start, start + 6 * (1 + self.winds) * self.elastic)
 
     @property

@@ -17,19 +17,22 @@ __all__ = ["node_function"]
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
+SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to choose among those of spare points
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
 
 def node_function(
-    scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray
+    scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, carried: np.ndarray
 ) -> tuple[ca.Function, list[Row]]:
     """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
 
-    The function is for the nodes of these `references`, (18 (1 + c), nodes).
+    The function is for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
+    ground of each, `carried` (10 + 6 s, nodes), or nothing (0, nodes).
     """
     robot, dynamics = scenario.robot, scenario.dynamics
     x = ca.SX.sym("x", layout.width)
     parameters, reference = reference_symbols("p", references)
+    parameters_carried, load = reference_symbols("carried", carried)
     platform, *carriers = motions(scenario, layout, x, reference)
     tensions = robot.force_scale * x[layout.tensions]
     wind = scenario.wind
@@ -40,10 +43,14 @@ def node_function(
     else:
         A = dynamics.wrench_matrix(platform[0], pose_rows[0])
         w = dynamics.required_wrench(*platform, *pose_rows, wind=wind)
+    bodies = [in_world(scenario, platform, carriers), *carriers]
+    if scenario.phases.carry:
+        w += _in_frame(scenario, dynamics.carried_wrench(*bodies[0], load=load[:10]), carriers)
+    if layout.grounds:
+        w -= ca.reshape(load[10:], 6, layout.grounds) @ (robot.force_scale * x[layout.supports])
     scale = robot.force_scale / robot.wrench_scale
     moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
     balance = ((A @ tensions - w) / ca.DM(scale))[moving]
-    bodies = [in_world(scenario, platform, carriers), *carriers]
     balances = [balance]
     for others, push in _in_decisive_winds(scenario, layout, x, bodies[0], carriers):
         balances.append(((A @ others - w + push) / ca.DM(scale))[moving])
@@ -68,7 +75,17 @@ def node_function(
     cost += _slack_cost(scenario, mesh, layout, x)
     off_path = spread(scenario, None) @ x[layout.q]
     _limit_rows(scenario, mesh, layout, x, [*(ca.vertcat(*body) for body in bodies), tensions, off_path], values, rows)
-    return ca.Function("node", [x, parameters], [cost, ca.vertcat(*values)], differentiated(2, 1)), rows
+    return ca.Function(
+        "node", [x, parameters, parameters_carried], [cost, ca.vertcat(*values)], differentiated(3, 1)
+    ), rows
+
+
+def _in_frame(scenario: Scenario, wrench: ca.SX, carriers: list[list[ca.SX]]) -> ca.SX:
+    """Return a wrench (6, 1) of {G} in the axes in which the balance is written."""
+    if not scenario.relative:
+        return wrench
+    R_A = rotation(carriers[0][0][3:6])
+    return ca.vertcat(R_A.T @ wrench[0:3], R_A.T @ wrench[3:6])
 
 
 def _in_decisive_winds(
@@ -81,11 +98,8 @@ def _in_decisive_winds(
     pose, velocity, _ = platform
     pairs = []
     middle = aerodynamic_wrench(robot, pose, velocity, ca.DM(box.middle))
-    R_A = rotation(carriers[0][0][3:6])
     for i, wind in enumerate(decisive_winds(box, robot, pose, velocity)):
-        push = aerodynamic_wrench(robot, pose, velocity, wind) - middle
-        if scenario.relative:
-            push = ca.vertcat(R_A.T @ push[0:3], R_A.T @ push[3:6])
+        push = _in_frame(scenario, aerodynamic_wrench(robot, pose, velocity, wind) - middle, carriers)
         start = layout.wind_tensions.start + i * robot.m
         pairs.append((robot.force_scale * x[start : start + robot.m], push))
     return pairs
@@ -123,6 +137,7 @@ def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:
     if layout.winds:
         # Enough to choose among those that spare cables leave open.
         cost += WIND_COST / layout.winds * ca.sumsqr(robot.force_scale * x[layout.wind_tensions] / tension_scale)
+    cost += SUPPORT_COST * ca.sumsqr(x[layout.supports])
     q, a = x[layout.q], x[layout.a]
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         if owner is None:

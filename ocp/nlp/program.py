@@ -4,10 +4,11 @@ Unknown at each point k are the free coordinates q_k, their rates v_k and accele
 duration T too where the task leaves it open:
 
     min   mean over time of sum |quantity / what costs one|^2  (+ T / time - margin)   (`task.Objective`)
-    s.t.  A(q_k) t_k = w(q_k, v_k, a_k)                                 at every point that the scheme selects
+    s.t.  A(q_k) t_k + S n_k = w(q_k, v_k, a_k)                         at every point that the scheme selects
           (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
           t_min + margin <= t_k <= t_max - margin
           the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
+          n_k >= 0, platform at rest on its path                        on the ground, else n_k = 0 (`tasks.phases`)
           the limits of `limits`                                        at every point that the scheme selects
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
 
@@ -27,7 +28,9 @@ from ..tasks import bernstein
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths import WaypointPath
+from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, Scenario
+from .grid import Grid
 from .interval import Points, interval_of, points
 from .layout import DURATION, MARGIN, Layout
 from .node import node_function
@@ -116,6 +119,7 @@ class Program:
             columns[:, layout.snap] = self._step**2 * np.gradient(jerk, nodes, axis=0)
         columns[:, layout.tensions] = deviation.tensions / self.scenario.robot.force_scale
         columns[:, layout.wind_tensions] = np.tile(columns[:, layout.tensions], layout.winds)
+        columns[:, layout.supports] = self.scenario.phases.resting(deviation.nodes)[:, None] / max(layout.grounds, 1)
         if (place := layout.at(DURATION)) is not None:
             columns[:, place] = deviation.nodes[-1] / self.scenario.duration
         return columns.ravel()[self.order]
@@ -124,28 +128,30 @@ class Program:
 def build(scenario: Scenario, mesh: Mesh) -> Program:
     """Build the nonlinear program of `scenario` on `mesh`."""
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
-    shares, at_nodes = scheme.shares(steps), scheme.balance_points(steps)
-    times = shares * scenario.duration
-    references = _parameters(scenario, times)
-    parameters = ca.DM(references)
-    node, node_rows = node_function(scenario, mesh, layout, references)
-    interval = interval_of(scenario, mesh, layout, references)
+    grid, at_nodes = Grid.of(scenario, steps), scheme.balance_points(steps)
+    times = grid.shares * scenario.duration
+    references, carried = _parameters(scenario, times), _carried(scenario, times[at_nodes])
+    parameters, intervals = ca.DM(references), ca.DM(grid.intervals)
+    node, node_rows = node_function(scenario, mesh, layout, references, carried)
+    interval = interval_of(scenario, mesh, layout, references, grid.intervals)
     arrange = stage_by_stage if scenario.task.solver == "fatrop" else all_at_once
-    unknowns = arrange(scenario, layout, steps, interval.flow)
+    unknowns = arrange(scenario, layout, grid, interval.flow)
     X, X_end = unknowns.columns, unknowns.ends
 
-    cost, node_values = node.map(len(at_nodes))(_picked(X, at_nodes), parameters[:, at_nodes.tolist()])
-    weights = ca.DM(scheme.quadrature(steps)[at_nodes]).T
+    of_nodes = _picked(X, at_nodes), parameters[:, at_nodes.tolist()], ca.DM(carried)
+    cost, node_values = node.map(len(at_nodes))(*of_nodes)
+    weights = ca.DM(grid.weights[at_nodes]).T
     groups, given = _groups(X, scheme.size), _groups(parameters, scheme.size)
     given_end = parameters[:, scheme.size :: scheme.size]
-    interval_cost, interval_values = interval.function.map(steps)(groups, X_end, given, given_end)
-    objective = ca.dot(cost, weights) + ca.sum2(interval_cost) / steps + _shared_cost(scenario, layout, X[:, 0])
+    interval_cost, interval_values = interval.function.map(steps)(groups, X_end, given, given_end, intervals)
+    lengths = ca.DM(grid.steps / scenario.duration).T
+    objective = ca.dot(cost, weights) + ca.dot(interval_cost, lengths) + _shared_cost(scenario, layout, X[:, 0])
 
     first = interval.gaps if unknowns.gaps is not None else 0  # a program in stages has those as its gaps
     blocks = [
         Block(node_values, node_rows, at_nodes // scheme.size),
         Block(interval_values[first:, :], interval.rows[first:], np.arange(steps)),
-        *_single_rows(scenario, layout, X, X_end, steps),
+        *_single_rows(scenario, layout, X, X_end, grid.steps),
     ]
     g, rows, stages = put_in_order(unknowns, blocks)
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
@@ -153,7 +159,7 @@ def build(scenario: Scenario, mesh: Mesh) -> Program:
         scenario=scenario,
         mesh=mesh,
         layout=layout,
-        shares=shares,
+        shares=grid.shares,
         problem={"x": unknowns.x, "f": objective, "g": g},
         lower=np.where(unknowns.copies, -np.inf, lower[unknowns.order]),
         upper=np.where(unknowns.copies, np.inf, upper[unknowns.order]),
@@ -179,6 +185,15 @@ def _parameters(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
     return np.hstack([part for motion in (platform, *carriers) for part in motion]).T
 
 
+def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
+    """Return loads and columns of the ground, (10 + 6 s, nodes); (0, nodes) for a task without."""
+    phases = scenario.phases
+    if not (phases.carry or phases.rest):
+        return np.zeros((0, len(nodes)))
+    columns = phases.columns_at(nodes).swapaxes(1, 2).reshape(len(nodes), -1)
+    return np.hstack([phases.loads_at(nodes), columns]).T
+
+
 def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
     """Return the cost of the duration less the value of the margin."""
     objective, cost = scenario.task.objective, 0.0
@@ -189,9 +204,10 @@ def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
     return cost
 
 
-def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
+def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray) -> list[Block]:
     """Return the rows that occur once: periodic ends, waypoints, start and end of the acceleration."""
-    blocks = _waypoint_rows(scenario, layout, X, X_end, steps)
+    steps = len(lengths)
+    blocks = _waypoint_rows(scenario, layout, X, X_end, lengths)
     carriers: list[int] = []
     if carrier_ends(scenario.task) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
@@ -200,7 +216,7 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, ste
         blocks.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
     if not scenario.scheme.continuous and layout.n:
         k = steps - 1
-        left = _polynomials(scenario, layout, X, X_end, steps, k).acceleration[-1]
+        left = _polynomials(scenario, layout, X, X_end, lengths, k).acceleration[-1]
         rows = [("acceleration", 0.0, 0.0)] * layout.n
         blocks.append(Block(X_end[layout.a, k] - left, rows, np.array([k])))
     if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
@@ -212,26 +228,26 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, ste
     return blocks
 
 
-def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int, k: int) -> Points:
+def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray, k: int) -> Points:
     """Return the Bernstein points of interval k."""
     size = scenario.scheme.size
-    given = scenario.duration / steps
+    given = scenario.duration / len(lengths)
     columns = [*(X[:, k * size + i] for i in range(size)), X_end[:, k]]
-    return points(scenario, layout, given * stretch(layout, columns[0]), given, columns)
+    return points(scenario, layout, float(lengths[k]) * stretch(layout, columns[0]), given, columns)
 
 
-def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, steps: int) -> list[Block]:
+def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray) -> list[Block]:
     """Return rows that lead the platform through the waypoints, by the polynomial of the interval of each."""
     path = scenario.task.path
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
         return []
-    blocks = []
+    blocks, steps = [], len(lengths)  # of equal lengths: phases have no exact waypoints
     coordinates = [coordinate for owner, coordinate in scenario.owners() if owner is None]
     shares, missed = path.knots(scenario.duration) / scenario.duration, path.missed(scenario.duration)[:, coordinates]
     for share, off in zip(shares[1:-1], missed[1:-1], strict=True):
         k = min(int(share * steps), steps - 1)
-        position = _polynomials(scenario, layout, X, X_end, steps, k).position
+        position = _polynomials(scenario, layout, X, X_end, lengths, k).position
         rows: list[Row] = [("waypoint", float(value), float(value)) for value in off]
         blocks.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
     return blocks
@@ -241,7 +257,7 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
     """Return the bounds of the unknowns: of tensions, attitude in the tube, fixed ends, and what is shared."""
     n = layout.n
     lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
-    low, high = scenario.bounds()
+    low, high = scenario.bounds_at(nodes)
     reserve = np.minimum(mesh.reserve, (high - low) / 4)
     for part, count in ((layout.tensions, 1), (layout.wind_tensions, layout.winds)):
         lower[:, part] = np.tile((low + reserve) / scenario.robot.force_scale, count)
@@ -257,4 +273,27 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
             lower[:, column], upper[:, column] = -turn, turn
     for end, column, order, value in fixed_values(scenario):
         lower[end, order * n + column] = upper[end, order * n + column] = value
+    _on_ground(scenario, layout, nodes, lower, upper)
     return lower.ravel(), upper.ravel()
+
+
+def _on_ground(scenario: Scenario, layout: Layout, nodes: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+    """Bound the forces of the ground, and keep the platform at rest on its path where it is on the ground.
+
+    Place and speed are fixed where it comes to rest: the acceleration, which is zero then, keeps them.
+    """
+    phases, scale = scenario.phases, scenario.robot.force_scale
+    if not phases.rest:
+        return
+    lower[:, layout.supports], upper[:, layout.supports] = phases.support_bounds(nodes) / scale
+    resting = phases.resting(nodes)
+    starts = np.flatnonzero(resting & ~np.append(False, resting[:-1]))
+    for column, (owner, _) in enumerate(scenario.owners()):
+        if owner is None:
+            for bound in (lower, upper):
+                bound[resting, layout.a.start + column] = 0.0
+                bound[starts, column] = bound[starts, layout.v.start + column] = 0.0
+    for end, phase in ((0, phases.all[0]), (-1, phases.all[-1])):
+        known = known_tensions(scenario, phase, end) if phase.rests else None
+        if known is not None:
+            lower[end, layout.tensions] = upper[end, layout.tensions] = known / scale

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..limits import Rate
 from ..tasks.scenario import Scenario
+from .grid import Grid
 from .layout import Layout
 from .rows import Row
 
@@ -83,8 +84,9 @@ def _gathered(x: ca.MX, where: np.ndarray) -> ca.MX:
     return ca.reshape(ca.vertcat(x, 0.0)[places.tolist()], where.shape[1], -1)
 
 
-def all_at_once(scenario: Scenario, layout: Layout, steps: int, flow: ca.Function) -> Unknowns:
+def all_at_once(scenario: Scenario, layout: Layout, grid: Grid, flow: ca.Function) -> Unknowns:
     """Return the unknowns point after point, each of them once."""
+    steps = len(grid.steps)
     there = _exists(scenario, layout, steps)
     order = np.flatnonzero(there)
     where = np.full(there.size, -1)
@@ -95,8 +97,9 @@ def all_at_once(scenario: Scenario, layout: Layout, steps: int, flow: ca.Functio
     return Unknowns(x, columns, columns[:, size::size], order, np.zeros(len(order), dtype=bool), None, [])
 
 
-def stage_by_stage(scenario: Scenario, layout: Layout, steps: int, flow: ca.Function) -> Unknowns:
+def stage_by_stage(scenario: Scenario, layout: Layout, grid: Grid, flow: ca.Function) -> Unknowns:
     """Return the unknowns stage after stage: the state, then the controls."""
+    steps = len(grid.steps)
     there, width, size = _exists(scenario, layout, steps), layout.width, scenario.scheme.size
     state, free = _parts(scenario, layout)
     order: list[int] = []
@@ -124,7 +127,7 @@ def stage_by_stage(scenario: Scenario, layout: Layout, steps: int, flow: ca.Func
     # A smooth scheme's acceleration follows from its snap first, then the rest from its acceleration.
     end = _gathered(x, ends)
     for _ in range(1 + scenario.scheme.smooth):
-        end = flow.map(steps)(groups, end)
+        end = flow.map(steps)(groups, end, ca.DM(grid.intervals))
     gaps = columns[state.tolist(), size::size] - end[state.tolist(), :]
     return Unknowns(x, columns, end, places, copied, gaps, controls)
 

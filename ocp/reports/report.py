@@ -11,6 +11,7 @@ from ...solvers import Certificate
 from ...text import quantity, quantity_row
 from ..result import Plan, Relaxed
 from ..tasks.paths import WaypointPath
+from ..tasks.phases import SAME_TIME
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
@@ -80,6 +81,28 @@ def spans_table(plan: Plan) -> Table | None:
     return Table("Time spans with no feasible tensions", columns, rows) if len(rows) > 1 else None
 
 
+def phases_table(plan: Plan) -> Table | None:
+    """Return the table of the phases; None for a task without."""
+    rows = [
+        (
+            phase.name,
+            f"{phase.start:.3f}",
+            f"{phase.end:.3f}",
+            quantity(phase.load),
+            _or_none(phase.tension_min),
+            _or_none(phase.tension_max),
+            "hangs" if phase.reaction_max is None else quantity(phase.reaction_max),
+        )
+        for phase in plan.phases
+    ]
+    columns = ("phase", "from [s]", "to [s]", "load [kg]", "smallest tension [N]", "largest tension [N]")
+    return Table("Phases", (*columns, "largest ground reaction [N]"), rows) if rows else None
+
+
+def _or_none(value: float | None) -> str:
+    return "none" if value is None else quantity(value)
+
+
 def stages_table(plan: Plan) -> Table | None:
     """Return the table of the planner's stages; None if there is none. A stage without a message is left out."""
     rows = [
@@ -99,8 +122,9 @@ def as_text(plan: Plan) -> str:
         table = spans_table(plan) if index == 0 else None
         if table is not None:
             lines += _in_columns(table)
-    stages = stages_table(plan)
-    return "\n".join(lines if stages is None else lines + _in_columns(stages))
+    for table in (phases_table(plan), stages_table(plan)):
+        lines += [] if table is None else _in_columns(table)
+    return "\n".join(lines)
 
 
 def _in_columns(table: Table) -> list[str]:
@@ -123,13 +147,20 @@ def _of_the_motion(plan: Plan) -> str:
         return f"every tension at least {quantity(plan.margin, 'N')} inside its limits"
     certificate, excess = plan.certificate, plan.audit.excess
     if certificate is None and excess:
-        return f"{excess[0]}{_more(len(excess) - 1)}"
+        return f"{excess[0]}{_in_phase(plan, excess[0].time)}{_more(len(excess) - 1)}"
     if certificate is None:
         return "see the stages"
     short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
+    short += _in_phase(plan, certificate.time)
     if certificate.wind is not None:
         short += f" in wind {_wind(certificate.wind)}"
     return f"{short}{_more(len(excess))}"
+
+
+def _in_phase(plan: Plan, time: float | None) -> str:
+    """Return the phase of a time, to follow it; empty for a task without phases."""
+    phase = None if time is None else plan.scenario.phases.at(time)
+    return "" if phase is None else f" in phase {phase.name!r}"
 
 
 def _more(count: int) -> str:
@@ -142,9 +173,9 @@ def _reasons(plan: Plan) -> list[Fact]:
         return []
     facts: list[Fact] = []
     if (certificate := plan.certificate) is not None:
-        text = certificate.text(_up(plan))
+        text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
         facts += [
-            ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}"),
+            ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}{phase}"),
             *([("wind", _wind(certificate.wind))] if certificate.wind is not None else []),
             ("direction", text.along),
             ("needed", text.needed),
@@ -152,7 +183,7 @@ def _reasons(plan: Plan) -> list[Fact]:
             ("short by", text.short_by),
             ("limits", _bounds(plan, certificate) or text.limits),
         ]
-    facts += [("limit exceeded", str(excess)) for excess in plan.audit.excess]
+    facts += [("limit exceeded", f"{excess}{_in_phase(plan, excess.time)}") for excess in plan.audit.excess]
     return facts + [_relaxation(plan, relaxed) for relaxed in plan.relaxations]
 
 
@@ -189,14 +220,15 @@ def _tensions(plan: Plan) -> list[Fact]:
         facts.append(("no feasible tensions", f"{share}, first at {without[0]:.3f} s, last at {without[-1]:.3f} s"))
     if exist.any():
         times, values = audit.times[exist], audit.tensions[exist]
-        inside = np.minimum(values - robot.t_min, robot.t_max - values)
+        t_min = plan.scenario.t_min_at(times)
+        inside = np.minimum(values - t_min, robot.t_max - values)
 
         def located(index: int, which: np.ndarray, side: str = "") -> str:
             row, cable = np.unravel_index(index, which.shape)
             return f"{quantity(which[row, cable], 'N')}{side} in cable {cable + 1} at t = {times[row]:.3f} s"
 
         nearest = np.unravel_index(int(inside.argmin()), inside.shape)
-        above = values[nearest] - robot.t_min[nearest[1]] == inside[nearest]
+        above = values[nearest] - t_min[nearest] == inside[nearest]
         side = " above t_min" if above else " below t_max"
         required = plan.scenario.task.margin
         also = f" ({quantity(required, 'N')} required)" * (required > 0)
@@ -207,7 +239,19 @@ def _tensions(plan: Plan) -> list[Fact]:
         ]
     limits = zip(robot.t_min, robot.t_max, strict=True)
     pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
-    facts.append(("limits", pairs[0] if len(pairs) == 1 else f"{pairs[0]}, and {len(pairs) - 1} more (by cable)"))
+    slack = "; at least 0 N where cables may be slack" * any(phase.slack for phase in plan.scenario.phases.all)
+    more = f", and {len(pairs) - 1} more (by cable)" * (len(pairs) > 1)
+    return [*facts, ("limits", f"{pairs[0]}{more}{slack}"), *_jumps(plan)]
+
+
+def _jumps(plan: Plan) -> list[Fact]:
+    """Return where the tensions jump, because the load changes in the air."""
+    facts = []
+    for time in plan.scenario.phases.jumps:
+        after = int(np.searchsorted(plan.audit.times, time * (1 - SAME_TIME)))
+        rise = np.abs(plan.audit.tensions[after] - plan.audit.tensions[after - 1]).max()
+        why = "the load changes with no phase on the ground beside it"
+        facts.append(("jump", f"by up to {quantity(rise, 'N')} at t = {time:.3f} s, where {why}"))
     return facts
 
 
@@ -220,10 +264,11 @@ def _motion(plan: Plan) -> list[Fact]:
     speed, acceleration = (
         np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )
+    kind = f"{len(plan.phases)} phases" if plan.phases else task.path.kind
     law = "" if plan.scenario.path is task.path else ", with the fastest time law"
     return [
         ("duration", quantity(plan.scenario.duration, "s", digits=6)),
-        ("path", f"{task.path.kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
+        ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
         *_outside(task),
         ("tracking error", error),
         ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),

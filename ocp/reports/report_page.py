@@ -9,7 +9,7 @@ from ...figures import style
 from ...models.parsing import to_yaml
 from ..result import Plan
 from .drawings import drawings
-from .report import headline, sections, spans_table, stages_table
+from .report import headline, phases_table, sections, spans_table, stages_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +33,7 @@ def page(plan: Plan, trajectory: xr.Dataset) -> str:
 
 def _tables(plan: Plan) -> list[str]:
     """Return the sections, with the spans without tensions after the first, which states why there is no plan."""
-    tables, spans, stages = [html.facts(*section) for section in sections(plan)], spans_table(plan), stages_table(plan)
+    tables, spans = [html.facts(*section) for section in sections(plan)], spans_table(plan)
     after_first = [] if spans is None else [html.columns(*spans)]
-    return [tables[0], *after_first, *tables[1:], *([] if stages is None else [html.columns(*stages)])]
+    last = [html.columns(*table) for table in (phases_table(plan), stages_table(plan)) if table is not None]
+    return [tables[0], *after_first, *tables[1:], *last]

@@ -17,7 +17,7 @@ __all__ = ["output_rows", "trajectory"]
 def trajectory(plan: Plan) -> Contents:
     """Return the motion and the audited tensions at the task's output rate.
 
-    Dimensions: time, coordinate, carrier, cable.
+    Dimensions: time, coordinate, carrier, cable; of a task in phases also phase.
     """
     robot, task = plan.scenario.robot, plan.scenario.task
     rows = output_rows(plan)
@@ -41,6 +41,14 @@ def trajectory(plan: Plan) -> Contents:
     variables["tracking_error"] = over(("time",), audit.tracking_error[rows], "m", "distance from the path")
     variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
     variables["t_max"] = over(("cable",), robot.t_max, "N", "largest tension allowed")
+    coordinates = {}
+    if phases := plan.phases:
+        total = np.zeros(len(rows)) if audit.supports is None else audit.supports[rows].sum(axis=1)
+        variables["ground_reaction"] = over(("time",), total, "N", "sum of the forces of the ground")
+        for name, unit, about in (("start", "s", "start"), ("end", "s", "end"), ("load", "kg", "mass of the load")):
+            values = np.array([getattr(phase, name) for phase in phases])
+            variables[f"phase_{name}"] = over(("phase",), values, unit, f"{about} of each phase")
+        coordinates["phase"] = Variable(("phase",), np.array([phase.name for phase in phases]))
     attributes = {
         "title": f"towline plan of {robot.name}: {task.name}",
         "status": plan.status.value,
@@ -48,7 +56,7 @@ def trajectory(plan: Plan) -> Contents:
         "task": to_yaml(task.in_file()),
         "report": json.dumps(plan.to_dict()),
     }
-    coordinates = {
+    coordinates |= {
         "time": Variable(("time",), audit.times[rows], {"units": "s"}),
         "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
         "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),

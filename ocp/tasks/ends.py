@@ -61,6 +61,7 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
     task = scenario.task
     platform, carriers = scenario.references(np.array([0.0, scenario.duration]))
     words = platform_ends(task), carrier_ends(task)
+    rests = [phase.rests for phase in scenario.phases.all]
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         word, reference = (words[0], platform) if owner is None else (words[1], carriers[owner])
         orders = [0] * (word == "exact" or (word == "rest" and owner is None and coordinate in POSITION))
@@ -72,6 +73,8 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
             turns = order == 0 and coordinate not in POSITION
             yield FixedValue(0, column, order, remainder(off, 2 * np.pi) if turns else off)
         for end in (-1,) if measured else (0, -1):
+            if owner is None and rests and rests[end]:
+                continue  # on the ground, where the platform rests on its path from node to node
             for order in orders:
                 # The deviation of what rests undoes the motion of its reference.
                 undone = word == "rest" and order > 0

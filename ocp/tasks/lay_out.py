@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import remainder
 
 import casadi as ca
@@ -17,6 +18,7 @@ from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
 from .ends import carrier_ends
 from .initial import check_initial
+from .lay_out_phases import lay_out_phases
 from .limit_list import limit_list
 from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
@@ -68,7 +70,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     _check_times(task, where)
     _check_waypoints(task, where)
     _check_transcription(task, limits, where)
-    return scenario
+    return replace(scenario, phases=lay_out_phases(scenario))
 
 
 def _feels_no_tensions(robot: Robot, where: str) -> None:
@@ -202,12 +204,12 @@ def _check_times(task: Task, where: str) -> None:
                     "times of its own; paths of kind rest, line, and waypoints without times and dwell take a range"
                 )
     for name, path in paths.items():
-        end = path.natural_duration if path.kind in ("waypoints", "samples") else None
+        end = path.natural_duration if path.kind in ("waypoints", "samples", "sequence") else None
         if end is not None and task.seconds > end * (1 + 1e-9):
             raise InputError(
                 f"{where}: duration must be at most {end:g} s, where the times of {name} end, got {task.seconds:g} s"
             )
-    end = task.path.natural_duration if task.path.kind in ("waypoints", "samples") else None
+    end = task.path.natural_duration if task.path.kind in ("waypoints", "samples", "sequence") else None
     if end is not None and task.seconds < end * (1 - 1e-9):
         raise InputError(
             f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"

@@ -17,6 +17,7 @@ from ..limits.limit import Hull
 from ..limits.limits import Limits
 from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath
+from .phases import LaidPhase, Phases
 from .scheme import SCHEMES, Scheme
 from .task import Task
 from .wind_set import WindBox, as_wind, choices, decisive_winds_at
@@ -43,6 +44,8 @@ class Scenario:
         Coordinates of the platform that may leave the path.
     carrier_free
         (carrier, coordinate) pairs that the planner chooses.
+    phases
+        Those of the task, if it has some.
     """
 
     robot: Robot
@@ -55,6 +58,7 @@ class Scenario:
     limits: Limits
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it open: where the planner starts, then what it chose
+    phases: Phases = field(default_factory=Phases, repr=False)
 
     @property
     def scheme(self) -> Scheme:
@@ -118,6 +122,34 @@ class Scenario:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the tension limits less the task's margin if that is hard, (m,) each [N]."""
         return self.robot.t_min + self.hard_margin, self.robot.t_max - self.hard_margin
+
+    def bounds_in(self, phase: LaidPhase | None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tension limits in a phase, less the margin: of cables that may be slack the lower one is 0."""
+        low, high = self.bounds()
+        return (np.zeros_like(low), high) if phase is not None and phase.slack else (low, high)
+
+    def bounds_at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tension limits at `times`, less the margin, (n, m) each [N]: at a joint those of both phases."""
+        low, high = self.bounds()
+        return self._where_taut(times, low), np.tile(high, (len(times), 1))
+
+    def t_min_at(self, times: np.ndarray) -> np.ndarray:
+        """Return the smallest tensions at `times`, (n, m) [N]: zero where cables may be slack."""
+        return self._where_taut(times, self.robot.t_min)
+
+    def _where_taut(self, times: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """Return a lower limit (m,) at `times`, (n, m), and zero where all phases permit slack cables."""
+        slack = np.ones(len(times), bool) if self.phases.all else np.zeros(len(times), bool)
+        for phase in self.phases.all:
+            slack &= phase.slack | ~self.phases.within(phase, times)
+        return np.where(slack[:, None], 0.0, low)
+
+    def required_wrench(
+        self, times: np.ndarray, platform: Motion, carriers: Motion | None = None, wind: Vector3 | None = None
+    ) -> np.ndarray:
+        """Return the wrench that platform and load need at `times` for a motion in {G}, (n, 6) [N, N m]."""
+        w = self.dynamics.required_wrench(*platform, *(carriers or ()), wind=wind)
+        return w + self.dynamics.carried_wrench(*platform, self.phases.loads_at(times)) if self.phases.carry else w
 
     @property
     def hard_margin(self) -> float:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import Field
+from pydantic import ConfigDict, Field, model_validator
 from typing_extensions import override
 
 from ...errors import InputError
@@ -16,6 +16,7 @@ from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
 from ...models.ranges import PositiveRange
 from .initial import Initial
 from .paths import AnyPath
+from .phase import Phase, path_of
 from .scheme import SchemeName
 from .task_limits import TaskLimits
 from .wind_set import WindBox
@@ -130,11 +131,24 @@ class Objective(Part):
     )
 
 
+def _or_phases(schema: dict[str, Any]) -> None:
+    """Require one of path and phases."""
+    schema["oneOf"] = [{"required": ["path"]}, {"required": ["phases"]}]
+    del schema["properties"]["path"]["default"]
+
+
 class Task(Part):
     """A planning task. In a file: YAML with these keys."""
 
+    model_config = ConfigDict(json_schema_extra=_or_phases)
+
     name: Name = "task"
-    path: AnyPath = Field(description="path of the platform")
+    path: AnyPath = Field(
+        default=cast(Any, None), description="path of the platform; of a task with phases: that of its phases"
+    )
+    phases: tuple[Phase, ...] | None = Field(
+        default=None, min_length=1, description="instead of path and duration: parts of the motion, with their loads"
+    )
     duration: Positive | PositiveRange | None = Field(
         default=None, description="[s], or a range from which the planner chooses; default: the path's own"
     )
@@ -173,9 +187,22 @@ class Task(Part):
         default=100.0, description="samples per second of the saved trajectory, all of them audited [1/s]"
     )
 
+    @model_validator(mode="after")
+    def _one_path(self) -> Self:
+        given: AnyPath | None = self.path
+        if self.phases is None:
+            if given is None:
+                raise ValueError("path is missing: path of the platform (or phases)")
+            return self
+        for key in ("path", "duration"):
+            if key in self.model_fields_set and getattr(self, key) is not None:
+                raise ValueError(f"{key} must be left out with phases, which have theirs")
+        object.__setattr__(self, "path", path_of(self.phases))
+        return self
+
     @override
     def model_dump(self, **options: Any) -> dict[str, Any]:
-        """Return the fields, by `options` of pydantic.
+        """Return the fields, by `options` of pydantic; without `path` if that follows from `phases`.
 
         Raises
         ------
@@ -187,7 +214,10 @@ class Task(Part):
             raise InputError(
                 f"task {self.name!r}: limits.own must be empty to be saved, since a file holds no Python, got {names}"
             )
-        return super().model_dump(**options)
+        fields = super().model_dump(**options)
+        if self.phases is not None:
+            fields.pop("path", None)
+        return fields
 
     def in_file(self) -> Task:
         """Return the task without the limits that only Python can hold."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from ..tasks.paths import AnyPath, Curve, LinePath, SamplePath, TimedPath, WaypointPath
+from ..tasks.paths import AnyPath, Curve, LinePath, SamplePath, SequencePath, TimedPath, WaypointPath
 
 __all__ = ["geometry"]
 
@@ -20,8 +20,10 @@ def geometry(path: AnyPath, *, alone: bool) -> Curve:
     Raises
     ------
     InputError
-        If a spline or samples turn so sharply that they must rest, or move nowhere.
+        If a spline or samples turn so sharply that they must rest, or move nowhere, or for a sequence.
     """
+    if isinstance(path, SequencePath):
+        raise InputError("path.kind must be that of one path to be timed, got sequence; time its parts one by one")
     if isinstance(path, TimedPath):
         return path.along
     if isinstance(path, LinePath):

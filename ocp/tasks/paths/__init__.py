@@ -11,6 +11,7 @@ from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
 from .samples import SamplePath
+from .sequence import SequencePath, SinglePath
 from .timed import TimedPath
 from .waypoints import WaypointPath
 
@@ -24,10 +25,13 @@ __all__ = [
     "PoseOrPosition",
     "RestPath",
     "SamplePath",
+    "SequencePath",
+    "SinglePath",
     "TimedPath",
     "WaypointPath",
 ]
 
 AnyPath: TypeAlias = Annotated[
-    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath, Field(discriminator="kind")
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath | SequencePath,
+    Field(discriminator="kind"),
 ]

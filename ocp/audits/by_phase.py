@@ -1,0 +1,105 @@
+"""`distribution`: the tensions of a motion in phases, of which each has limits and a ground of its own.
+
+On the ground the support forces are further unknowns of each instant: columns beside those of the cables, with the
+lower limit 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...distribution import wrench_problem
+from ...solvers import Certificate, certify
+from ..tasks.phases import LaidPhase
+from ..tasks.resting import end_tensions, largest_support, support_forces
+from ..tasks.scenario import Scenario
+from .tensions import AuditedTensions, Distribute, Distribution
+
+__all__ = ["certified", "distribution", "taken_up"]
+
+
+def distribution(scenario: Scenario, times: np.ndarray, A: np.ndarray) -> Distribute:
+    """Return the distribution of the tensions at `times` (n,) with wrench matrices A (n, 6, m)."""
+    return _ByPhase(scenario, times, A) if scenario.phases.all else Distribution(scenario, A)
+
+
+class _ByPhase:
+    """Distribute the tensions of each phase on its own."""
+
+    def __init__(self, scenario: Scenario, times: np.ndarray, A: np.ndarray):
+        self.scenario, self._parts = scenario, scenario.phases.rows(times)
+        self._A = A
+        self._hanging = Distribution(scenario, A)
+        self.few, self.tolerance = self._hanging.few, self._hanging.tolerance
+
+    def unlimited(self, w: np.ndarray) -> np.ndarray:
+        """Return the tensions of least norm for the wrenches w (n, 6), whatever limits and ground, (n, m) [N]."""
+        return self._hanging.unlimited(w)
+
+    def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
+        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
+        scenario, m, count = self.scenario, self.scenario.robot.m, len(w)
+        tensions, violation = np.empty((count, m)), np.empty(count)
+        supports = np.zeros((count, scenario.phases.supports))
+        worst, row, beyond = None, None, 0.0
+        for phase, rows in self._parts:
+            near = np.zeros((len(rows), m)) if preferred is None else preferred[rows]
+            A, limits, near = _extended(scenario, phase, self._A[rows], w[rows], near)
+            result = Distribution(scenario, A, limits)(w[rows], near)
+            tensions[rows], violation[rows] = result.tensions[:, :m], result.violation
+            supports[rows, : A.shape[2] - m] = result.tensions[:, m:]
+            beyond = max(beyond, result.beyond)
+            found = result.certificate
+            if found is not None and result.row is not None and (worst is None or found.shortfall > worst.shortfall):
+                worst, row = _of_cables(found, m), int(rows[result.row])
+        return AuditedTensions(tensions, violation, worst, row, beyond, supports if scenario.phases.rest else None)
+
+
+def certified(scenario: Scenario, time: float, A: np.ndarray, w: np.ndarray) -> Certificate | None:
+    """Return the proof that no tensions at a time give a wrench w (6,), A being (6, m); None if some do."""
+    phase = scenario.phases.at(time)
+    if phase is None:
+        return certify(wrench_problem(scenario.robot, A, w, *scenario.bounds()))
+    extended, limits, _ = _extended(scenario, phase, A[None], w[None], np.zeros((1, scenario.robot.m)))
+    found = certify(wrench_problem(scenario.robot, extended[0], w, *limits))
+    return None if found is None else _of_cables(found, scenario.robot.m)
+
+
+def taken_up(scenario: Scenario, times: np.ndarray) -> np.ndarray | None:
+    """Return tensions (n, m) [N] to prefer in a motion that is given: linear in time on the ground, else zero.
+
+    Where a phase on the ground has no tensions at one end, those of the other stay. None for a task without ground.
+    """
+    if not scenario.phases.rest:
+        return None
+    preferred = np.zeros((len(times), scenario.robot.m))
+    for phase, rows in scenario.phases.rows(times):
+        ends = [end_tensions(scenario, phase, end) for end in (0, 1)] if phase.rests else []
+        known = [tensions for tensions in ends if tensions is not None]
+        if known:
+            share = ((times[rows] - phase.start) / (phase.end - phase.start))[:, None]
+            preferred[rows] = (1 - share) * known[0] + share * known[-1]
+    return preferred
+
+
+def _extended(
+    scenario: Scenario, phase: LaidPhase, A: np.ndarray, w: np.ndarray, near: np.ndarray
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Return A, limits and preferred tensions of k instants of a phase, with those of its support forces at the end."""
+    low, high = scenario.bounds_in(phase)
+    if not phase.rests:
+        return A, (low, high), near
+    S = phase.columns
+    forces, _ = support_forces(scenario, S, w - np.einsum("nij,nj->ni", A, near))
+    columns = np.broadcast_to(S, (len(A), *S.shape))
+    most = np.full(S.shape[1], largest_support(scenario, w, high))
+    limits = np.append(low, np.zeros(len(most))), np.append(high, most)
+    return np.concatenate([A, columns], axis=2), limits, np.hstack([near, forces])
+
+
+def _of_cables(certificate: Certificate, m: int) -> Certificate:
+    """Return a certificate with its cables alone: it is known that the ground only pushes."""
+    at_max, at_min = (indices[indices < m] for indices in (certificate.at_max, certificate.at_min))
+    return replace(certificate, at_max=at_max, at_min=at_min, closest=certificate.closest[:m])

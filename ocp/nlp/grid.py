@@ -1,0 +1,68 @@
+"""`Grid`: the points of a program in time. Phases begin and end at nodes, and share the steps by their durations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..tasks.scenario import Scenario
+
+__all__ = ["Grid"]
+
+LEAST = 4  # steps of a phase, where there are enough
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The points of a program.
+
+    Attributes
+    ----------
+    shares
+        Where all points are, inner ones too, (k,), from 0 to 1 of the duration.
+    weights
+        Of the mean over the duration, at the points, (k,).
+    steps
+        The length of each interval at the scenario's duration, (n,) [s].
+    take_up
+        The duration of the phase on the ground of which an interval is a part, (n,) [s]; 0: it is of none.
+    """
+
+    shares: np.ndarray
+    weights: np.ndarray
+    steps: np.ndarray
+    take_up: np.ndarray
+
+    @staticmethod
+    def of(scenario: Scenario, steps: int) -> Grid:
+        """Return the grid of so many steps."""
+        scheme, phases = scenario.scheme, scenario.phases
+        even = scheme.shares(steps)
+        if not phases.all:
+            lengths = np.full(steps, scenario.duration / steps)
+            return Grid(even, scheme.quadrature(steps), lengths, np.zeros(steps))
+        counts = _counts(np.diff(phases.joints), steps)
+        joints = np.append(0.0, np.cumsum(counts)) / steps
+        shares = np.interp(even, joints, phases.joints / phases.joints[-1])
+        shares[np.round(joints * steps).astype(int) * scheme.size] = phases.joints / phases.joints[-1]
+        lengths = np.diff(shares[:: scheme.size])
+        weights = np.zeros(len(shares))
+        for k in range(steps):
+            weights[k * scheme.size : (k + 1) * scheme.size + 1] += np.array(scheme.weights) * lengths[k]
+        take_up = np.repeat([(phase.end - phase.start) * phase.rests for phase in phases.all], counts)
+        return Grid(shares, weights, lengths * scenario.duration, take_up)
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """Return what an interval's rows need to know of it: its length and `take_up`, (2, n) [s]."""
+        return np.stack([self.steps, self.take_up])
+
+
+def _counts(durations: np.ndarray, steps: int) -> np.ndarray:
+    """Return how many of the steps each phase has, in proportion to its duration but not too few."""
+    least = max(min(LEAST, steps // len(durations)), 1)
+    counts = np.full(len(durations), least)
+    for _ in range(steps - counts.sum()):
+        counts[int((durations / counts).argmax())] += 1
+    return counts

@@ -1,0 +1,160 @@
+"""`lay_out_phases`: check that the phases of a task fit its robot, and lay them out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError
+from ...models import Robot
+from ...models.points import rotations
+from .paths import SequencePath
+from .phase import Ground
+from .phases import LaidPhase, Phases
+from .resting import support_forces
+from .scenario import Scenario
+from .scheme import SCHEMES
+from .task import Task
+from .wind_set import WindBox
+
+__all__ = ["LEAST_STEPS", "lay_out_phases"]
+
+LEAST_STEPS = 4  # of a phase
+BALANCED = 1e-9  # of the wrench: what supports miss of it
+
+
+def lay_out_phases(scenario: Scenario) -> Phases:
+    """Check that the phases of a scenario's task fit its robot, and lay them out.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the task that does not fit, its value and what would.
+    """
+    robot, task, where = scenario.robot, scenario.task, f"task {scenario.task.name!r}"
+    if task.phases is None or not isinstance(task.path, SequencePath):
+        return Phases()
+    joints = task.path.joints
+    poses = [task.path.at(joints[:-1][[index]], joints[-1]).pose[0] for index in range(len(task.phases))]
+    grounds = [phase.ground for phase in task.phases]
+    if any(grounds):
+        _check_ground(robot, task, where)
+    loads = [np.zeros(10) if phase.load is None else phase.load.numbers for phase in task.phases]
+    columns = [_columns(robot, ground, pose) for ground, pose in zip(grounds, poses, strict=True)]
+    laid = []
+    for index, phase in enumerate(task.phases):
+        free = np.stack([np.zeros(columns[index].shape[1]), np.full(columns[index].shape[1], np.inf)])
+        ends = [free, free]
+        for side, other in enumerate((index - 1, index + 1)):
+            if not 0 <= other < len(loads) or phase.ground is None:
+                continue
+            named = f"{where}: phases[{index}]", f"phases[{other}]"
+            if grounds[other] is None:
+                needed = _at_rest(scenario, poses[index], loads[index]) - _at_rest(scenario, poses[index], loads[other])
+                ends[side] = np.tile(_supported(scenario, columns[index], needed, named), (2, 1))
+                continue
+            if not np.array_equal(columns[index], columns[other]):
+                raise InputError(f"{named[0]}.ground.support must be that of {named[1]}, which is on the ground too")
+            own, its = (
+                _supported(scenario, columns[index], _at_rest(scenario, poses[index], load), named)
+                for load in (loads[index], loads[other])
+            )
+            ends[side] = np.stack([np.maximum(own - its, 0.0), free[1]])
+        slack = phase.ground is not None and phase.ground.slack
+        times = float(joints[index]), float(joints[index + 1])
+        laid.append(LaidPhase(phase.name, *times, loads[index], columns[index], slack, *ends))
+    phases = Phases(tuple(laid))
+    _check_program(scenario, phases, where)
+    _check_jumps(scenario, phases, where)
+    return phases
+
+
+def _check_ground(robot: Robot, task: Task, where: str) -> None:
+    """Refuse ground where there is no down, where wind is not one wind, and where the platform's frame moves."""
+    if not np.linalg.norm(robot.gravity) > 0:
+        raise InputError(f"{where}: phases.ground must be left out for robot {robot.name!r}, which has no gravity")
+    if task.path.frame != "world":
+        raise InputError(f"{where}: phases.path.frame must be 'world' on the ground, got {task.path.frame!r}")
+    if isinstance(task.wind, WindBox):
+        raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with a phase on the ground, got a box")
+
+
+def _columns(robot: Robot, ground: Ground | None, pose: np.ndarray) -> np.ndarray:
+    """Return the wrenches of unit forces against gravity at the support points of a platform at `pose`, (6, s)."""
+    if ground is None:
+        return np.zeros((6, 0))
+    if ground.support is None:
+        attachments = robot.attachments
+        points = np.unique(np.column_stack([attachments[:, :2], np.full(robot.m, attachments[:, 2].min())]), axis=0)
+    else:
+        points = np.array(ground.support)
+    up = -np.array(robot.gravity) / np.linalg.norm(robot.gravity)
+    arms = (points - np.array(robot.platform.com)) @ rotations(pose[3:]).T
+    return np.vstack([np.tile(up[:, None], len(points)), np.cross(arms, up).T])
+
+
+def _at_rest(scenario: Scenario, pose: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Return the wrench that a load needs while it rests at `pose`, (6,)."""
+    return scenario.dynamics.carried_wrench(pose, np.zeros(6), np.zeros(6), load)
+
+
+def _supported(scenario: Scenario, columns: np.ndarray, needed: np.ndarray, named: tuple[str, str]) -> np.ndarray:
+    """Return support forces (s,) [N] that give a wrench (6,), or raise InputError if none do.
+
+    `named` are the phase on the ground and its neighbour, for the error.
+    """
+    robot = scenario.robot
+    forces, missed = support_forces(scenario, columns, needed[None])
+    size = float(np.linalg.norm(needed * robot.dof_mask * robot.wrench_scale))
+    if missed[0] <= BALANCED * max(size, robot.force_scale):
+        return forces[0]
+    up = -np.array(robot.gravity) / np.linalg.norm(robot.gravity)
+    if up @ needed[:3] < 0:
+        raise InputError(
+            f"{named[0]}.load must weigh at least as much as that of {named[1]}, so that the ground can bear the "
+            f"difference, got {-up @ needed[:3]:.6g} N less"
+        )
+    raise InputError(
+        f"{named[0]}.ground.support must have points about the centre of mass of the load that it bears where "
+        f"{named[1]} begins or ends, got points whose forces miss {missed[0]:.3g} N of {size:.3g} N, with moments"
+    )
+
+
+def _check_program(scenario: Scenario, phases: Phases, where: str) -> None:
+    """Refuse what a program with phases cannot do."""
+    task = scenario.task
+    least = LEAST_STEPS * len(phases.all)
+    if task.steps < least:
+        raise InputError(f"{where}: steps must be at least {LEAST_STEPS} for each phase, {least}, got {task.steps}")
+    if task.tube.waypoints == "exact":
+        raise InputError(f"{where}: tube.waypoints must be free with phases, got exact")
+    if task.solver == "fatrop":
+        raise InputError(f"{where}: solver must be ipopt with phases, got fatrop")
+    if scenario.count and SCHEMES[task.scheme].smooth:
+        raise InputError(f"{where}: scheme must be another than {task.scheme} with phases")
+    if not phases.rest:
+        return
+    if not SCHEMES[task.scheme].continuous:
+        accepted = ", ".join(s.name for s in SCHEMES.values() if s.continuous and not s.smooth)
+        raise InputError(
+            f"{where}: scheme must be one of {accepted} with a phase on the ground, where tensions rise without jumps, "
+            f"got {task.scheme}"
+        )
+    if any(phase.slack for phase in phases.all) and (task.objective.margin is not None or "margin" in task.limits.soft):
+        raise InputError(f"{where}: phases.ground.slack must be false with a margin to choose, got true")
+    if task.initial is not None and phases.all[0].rests:
+        raise InputError(f"{where}: initial must be left out if the first phase is on the ground, where it is given")
+
+
+def _check_jumps(scenario: Scenario, phases: Phases, where: str) -> None:
+    """Refuse a load that changes in the air where the tensions must not jump."""
+    task = scenario.task
+    if not phases.jumps:
+        return
+    change = f"since the load changes at {phases.jumps[0]:g} s with no phase on the ground beside it: tensions jump"
+    if task.limits.tension_rate is not None:
+        raise InputError(
+            f"{where}: limits.tension_rate must be left out {change}, got {task.limits.tension_rate:g} N/s"
+        )
+    if scenario.count and SCHEMES[task.scheme].continuous:
+        accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if not scheme.continuous)
+        raise InputError(f"{where}: scheme must be one of {accepted} {change}, got {task.scheme}")

@@ -1,0 +1,129 @@
+"""`SequencePath`: paths one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import Annotated, Literal, Self, TypeAlias
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import override
+
+from ....models.part import Part, Positive
+from .base import PathBase
+from .circle import CirclePath
+from .line import LinePath
+from .motion import Motion
+from .rest import RestPath
+from .samples import SamplePath
+from .timed import TimedPath
+from .waypoints import WaypointPath
+
+__all__ = ["Piece", "SequencePath", "SinglePath", "check_joints", "lasting"]
+
+JOINED = 1e-7  # [m, rad, and per second and second squared]: a smaller gap is rounding
+
+SinglePath: TypeAlias = Annotated[
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath, Field(discriminator="kind")
+]
+
+
+class Piece(Part):
+    """One path of a sequence."""
+
+    path: SinglePath
+    duration: Positive | None = Field(default=None, description="[s]; default: the path's own")
+
+    @property
+    def seconds(self) -> float:
+        """Return the duration [s]."""
+        return lasting(self.path, self.duration)
+
+    @model_validator(mode="after")
+    def _lasts(self) -> Self:
+        lasting(self.path, self.duration)
+        return self
+
+
+class SequencePath(PathBase):
+    """Paths one after the other: each begins with the pose, speed and acceleration with which the one before ends."""
+
+    kind: Literal["sequence"]
+    parts: tuple[Piece, ...] = Field(min_length=1, description="paths in the frame of the sequence, with durations")
+
+    @model_validator(mode="after")
+    def _joins(self) -> Self:
+        for index, part in enumerate(self.parts):
+            if part.path.frame != self.frame:
+                raise ValueError(
+                    f"parts[{index}].path.frame must be {self.frame!r}, the frame of the sequence, "
+                    f"got {part.path.frame!r}"
+                )
+        check_joints([(part.path, part.seconds) for part in self.parts], "parts")
+        return self
+
+    @cached_property
+    def joints(self) -> np.ndarray:
+        """Return the times at which the parts begin, and the end, (n + 1,) [s]."""
+        return np.append(0.0, np.cumsum([part.seconds for part in self.parts]))
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return float(self.joints[-1])
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        motion = Motion(*(np.empty((len(times), 6)) for _ in range(3)))
+        which = np.searchsorted(self.joints[1:-1], times, side="right")
+        for index, part in enumerate(self.parts):
+            rows = which == index
+            if rows.any():
+                piece = part.path.at(times[rows] - self.joints[index], part.seconds)
+                for whole, its in zip(motion, piece, strict=True):
+                    whole[rows] = its
+        return motion
+
+
+def lasting(path: SinglePath, duration: float | None) -> float:
+    """Return how long a path of a sequence lasts [s].
+
+    Raises
+    ------
+    ValueError
+        Naming `duration`, if that is missing or does not fit the path.
+    """
+    own = path.natural_duration
+    if duration is None:
+        if own is None:
+            raise ValueError(f"duration must be a number > 0 [s] for a path of kind {path.kind}, got nothing")
+        return own
+    if path.kind in ("waypoints", "samples") and own is not None and abs(duration - own) > 1e-9 * own:
+        raise ValueError(f"duration must be {own:g} s, where the times of path end, got {duration:g} s")
+    if duration <= path.resting:
+        raise ValueError(f"duration must be more than the {path.resting:g} s for which path dwells, got {duration:g} s")
+    return duration
+
+
+def check_joints(paths: Sequence[tuple[SinglePath, float]], key: str) -> None:
+    """Check that each of the paths, with their durations [s], begins where and as the one before ends.
+
+    Raises
+    ------
+    ValueError
+        Naming the first one that does not, as an item of `key`, and the gap.
+    """
+    for index, ((before, lasts), (after, seconds)) in enumerate(pairwise(paths)):
+        end, start = before.at(np.array([lasts]), lasts), after.at(np.zeros(1), seconds)
+        words = (("where", "", ("m", "rad")), ("with the speed with which", "of speed ", ("m/s", "rad/s")))
+        words += (("with the acceleration with which", "of acceleration ", ("m/s^2", "rad/s^2")),)
+        for there, here, (how, what, units) in zip(end, start, words, strict=True):
+            gap = here[0] - there[0]
+            if np.abs(gap).max() > JOINED:
+                far, turned = np.linalg.norm(gap[:3]), np.abs(gap[3:]).max()
+                raise ValueError(
+                    f"{key}[{index + 1}] must begin {how} {key}[{index}] ends, got a gap {what}of "
+                    f"{far:.4g} {units[0]} and {turned:.4g} {units[1]}"
+                )

@@ -1,0 +1,99 @@
+"""`Phase`: a part of a task with a path, a load, and perhaps the ground under it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from ...models.part import AT_ORIGIN, Inertia, Name, Part, Pose, Positive, Vector3, inertia_matrix
+from .paths import RestPath, SequencePath, SinglePath
+from .paths.sequence import Piece, check_joints, lasting
+
+__all__ = ["Ground", "Load", "Phase", "path_of"]
+
+ROUNDING = 1e-12  # of the largest moment of inertia
+
+
+def _check_positive_semidefinite(inertia: Inertia) -> Inertia:
+    moments = np.linalg.eigvalsh(inertia_matrix(inertia))
+    if moments[0] < -ROUNDING * max(moments[-1], 0.0):
+        raise ValueError(f"must have principal moments >= 0 kg m^2; the smallest moment is {moments[0]:g}")
+    return inertia
+
+
+class Load(Part):
+    """A rigid body that is fixed to the platform, in addition to the platform of the robot's file."""
+
+    mass: Positive = Field(description="[kg]")
+    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM of the load in the platform frame [m]")
+    inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = Field(
+        default=AT_ORIGIN,
+        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs [kg m^2]",
+    )
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Return mass, CoM and inertia, (10,), as `Dynamics.carried_wrench` takes them."""
+        return np.array([self.mass, *self.com, *self.inertia])
+
+
+class Ground(Part):
+    """Ground under the platform, or under what it carries: vertical forces that only push, without friction."""
+
+    support: tuple[Vector3, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="points at which the ground pushes, in the platform frame [m]; default: one below each attachment, "
+        "level with the lowest",
+    )
+    slack: bool = Field(
+        default=False, description="whether cables may be slack: their tensions then have the lower limit 0"
+    )
+
+
+class Phase(Part):
+    """A part of a task: a path, what the platform carries along it, and whether that rests on the ground."""
+
+    name: Name
+    path: SinglePath | None = Field(default=None, description="default: rest where the phase before ends")
+    duration: Positive | None = Field(default=None, description="[s]; default: the path's own")
+    load: Load | None = Field(default=None, description="carried beside the platform; default: nothing")
+    ground: Ground | None = Field(
+        default=None, description="the platform rests on the ground, or what it carries does; default: it hangs"
+    )
+
+
+def path_of(phases: Sequence[Phase]) -> SequencePath:
+    """Return the paths of phases one after the other.
+
+    Raises
+    ------
+    ValueError
+        If a path is missing, does not begin where the one before ends, or has no duration; one line that names it.
+    """
+    joined: list[tuple[SinglePath, float]] = []
+    for index, phase in enumerate(phases):
+        key, path = f"phases[{index}]", phase.path
+        if phase.name in (other.name for other in phases[:index]):
+            raise ValueError(f"{key}.name must be unique, got {phase.name!r} twice")
+        if path is None:
+            if not joined:
+                raise ValueError(f"{key}.path must be a path, since no phase comes before, got nothing")
+            before, seconds = joined[-1]
+            x, y, z, roll, pitch, yaw = before.at(np.array([seconds]), seconds).pose[0].tolist()
+            pose: Pose = (x, y, z, roll, pitch, yaw)
+            path = RestPath(kind="rest", frame=before.frame, pose=pose)
+        if joined and path.frame != joined[0][0].frame:
+            raise ValueError(f"{key}.path.frame must be {joined[0][0].frame!r}, as before, got {path.frame!r}")
+        if phase.ground is not None and not isinstance(path, RestPath):
+            raise ValueError(f"{key}.path must be of kind rest on the ground, got {path.kind}")
+        try:
+            joined.append((path, lasting(path, phase.duration)))
+        except ValueError as error:
+            raise ValueError(f"{key}.{error}") from None
+    check_joints(joined, "phases")
+    parts = tuple(Piece(path=path, duration=seconds) for path, seconds in joined)
+    return SequencePath(kind="sequence", frame=joined[0][0].frame, parts=parts)

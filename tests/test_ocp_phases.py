@@ -1,0 +1,350 @@
+"""Phases: loads that change, ground that bears them, and tensions that rise and fall without jumps between them."""
+
+import copy
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+from towline import time_along
+from towline.errors import InputError
+from towline.figures.plan import tensions
+from towline.models import Dynamics, Robot, load
+from towline.models.parsing import parse_yaml
+from towline.ocp import MotionStatus, Task, plan
+from towline.ocp.tasks.lay_out import lay_out
+from towline.viewer.replay import Replay
+
+COGIRO = load("cogiro")
+MASS = 50.0
+LOAD = {"mass": MASS, "com": [0.1, 0.05, -0.4], "inertia": [2, 3, 4, 0.1, -0.2, 0.3]}
+HIGH, LOW, AWAY, DOWN = [0, 0, 2], [0, 0, 1], [1, 0, 2], [1, 0, 1]
+
+
+def line(start, end, **more):
+    return {"path": {"kind": "line", "start": start, "end": end}, "duration": 2, **more}
+
+
+PICK_AND_PLACE = [
+    line(HIGH, LOW, name="approach"),
+    {"name": "pick-up", "duration": 0.5, "load": LOAD, "ground": {}},
+    line(LOW, AWAY, name="lift", load=LOAD),
+    line(AWAY, DOWN, name="lower", load=LOAD),
+    {"name": "set-down", "duration": 0.5, "load": LOAD, "ground": {}},
+    line(DOWN, AWAY, name="leave"),
+]
+
+
+def with_load(robot, carried):
+    """The robot whose platform is one rigid body with the load, by Steiner's theorem."""
+    mass, com = robot.platform.mass + carried["mass"], np.zeros(3)
+    bodies = [(robot.platform.mass, np.array(robot.platform.com), robot.inertia)]
+    xx, yy, zz, xy, xz, yz = carried["inertia"]
+    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=float)
+    bodies.append((carried["mass"], np.array(carried["com"], dtype=float), own))
+    com = sum(m * at for m, at, _ in bodies) / mass
+    inertia = np.zeros((3, 3))
+    for m, at, about in bodies:
+        arm = at - com
+        inertia += about + m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    data = robot.model_dump()
+    six = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    data["platform"] |= {"mass": mass, "com": com.tolist(), "inertia": [float(value) for value in six]}
+    return Robot.model_validate(data)
+
+
+def balance(planned):
+    """What the cables pull and the ground pushes on the platform at each audited instant, (n, 3) [N], from the file."""
+    robot, audit = planned.scenario.robot, planned.audit
+    turned = Rotation.from_euler("ZYX", audit.motion.pose[:, 5:2:-1]).as_matrix()
+    attachments = audit.motion.pose[:, None, :3] + np.einsum("nij,mj->nmi", turned, robot.attachments)
+    cables = robot.home_anchors - attachments
+    cables /= np.linalg.norm(cables, axis=2, keepdims=True)
+    pulled = np.einsum("nm,nmi->ni", audit.tensions, cables)
+    return pulled + audit.supports.sum(axis=1)[:, None] * [0, 0, 1]
+
+
+def carried_at(planned):
+    """The load's mass at each audited instant, from the task."""
+    times, mass = planned.audit.times, np.zeros(len(planned.audit.times))
+    start = 0.0
+    for phase in planned.scenario.task.phases:
+        mass[times >= start - 1e-9] = 0.0 if phase.load is None else phase.load.mass
+        start += phase.duration
+    return mass
+
+
+@pytest.fixture(scope="module")
+def placed():
+    return plan(COGIRO, {"name": "place", "phases": PICK_AND_PLACE})
+
+
+def test_platform_and_load_need_what_one_rigid_body_of_both_needs():
+    """Forces are equal; moments about the two centres of mass differ by the moment of the force."""
+    rng = np.random.default_rng(3)
+    motion = rng.uniform(-1, 1, (3, 40, 6))
+    numbers = np.array([LOAD["mass"], *LOAD["com"], *LOAD["inertia"]])
+    ours = Dynamics(COGIRO)
+    w = ours.required_wrench(*motion) + ours.carried_wrench(*motion, numbers)
+    whole = with_load(COGIRO, LOAD)
+    other = Dynamics(whole).required_wrench(*motion)
+    turned = Rotation.from_euler("ZYX", motion[0][:, 5:2:-1])
+    arm = turned.apply(np.array(whole.platform.com) - np.array(COGIRO.platform.com))
+    assert w[:, :3] == pytest.approx(other[:, :3], abs=1e-10)
+    assert w[:, 3:] == pytest.approx(other[:, 3:] + np.cross(arm, other[:, :3]), abs=1e-10)
+
+
+@pytest.mark.parametrize("tube", [{}, {"position": 0.05, "attitude": 0.05}])
+def test_a_load_all_the_way_is_a_heavier_platform(tube):
+    """The same tensions as of a robot whose file has the load, along the same path."""
+    path, common = {"kind": "line", "start": HIGH, "end": [1, 0.5, 1.5, 0, 0, 0.2]}, {"steps": 20, "tube": tube}
+    common["objective"] = {"tension": 1000}
+    ours = plan(COGIRO, {"phases": [{"name": "carry", "path": path, "duration": 3, "load": LOAD}], **common})
+    theirs = plan(with_load(COGIRO, LOAD), {"path": path, "duration": 3, **common})
+    assert ours.feasible
+    assert theirs.feasible
+    assert ours.audit.tensions == pytest.approx(theirs.audit.tensions, abs=1e-6 if not tube else 0.1)
+
+
+def test_cables_and_ground_carry_what_there_is_at_every_instant(placed):
+    assert placed.feasible
+    mass = COGIRO.platform.mass + carried_at(placed)
+    acceleration = placed.audit.motion.acceleration[:, :3]
+    assert balance(placed) == pytest.approx(mass[:, None] * (acceleration - COGIRO.gravity), abs=1e-6)
+    assert (placed.audit.supports >= 0).all()
+
+
+def test_the_ground_bears_the_load_alone_until_the_cables_take_it_over(placed):
+    audit = placed.audit
+    reaction = audit.supports.sum(axis=1)
+    on_ground = ((audit.times >= 2) & (audit.times <= 2.5)) | ((audit.times >= 6.5) & (audit.times <= 7))
+    assert not reaction[~on_ground].any()
+    for first, last, sign in ((2.0, 2.499, -1), (6.501, 6.999, 1)):
+        rows = slice(*np.searchsorted(audit.times, [first, last]))
+        rates = np.diff(reaction[rows]) * audit.rate
+        assert rates == pytest.approx(sign * MASS * 9.81 / 0.5, rel=1e-6)
+    assert reaction[np.searchsorted(audit.times, 2.0)] == pytest.approx(MASS * 9.81)
+
+
+def test_tensions_are_continuous_from_phase_to_phase(placed):
+    """Across a joint a tension changes in 1 ms no more than it does at the constant rates of the ground."""
+    steps = np.abs(np.diff(placed.audit.tensions, axis=0))
+    joints = np.searchsorted(placed.audit.times, [2, 2.5, 4.5, 6.5, 7])
+    taken_up = steps[np.searchsorted(placed.audit.times, 2.25)].max()
+    assert steps[joints - 1].max() < 2 * taken_up
+    assert steps[joints].max() < 2 * taken_up
+
+
+def test_reports_files_and_viewer_know_the_phases(placed, tmp_path):
+    summary = {row["name"]: row for row in placed.to_dict()["phases"]}
+    assert list(summary) == [phase["name"] for phase in PICK_AND_PLACE]
+    assert summary["pick-up"]["reaction_max"] == pytest.approx(MASS * 9.81)
+    assert summary["lift"]["reaction_max"] is None
+    assert summary["lift"]["load"] == MASS
+    assert "largest ground reaction [N]" in placed.report()
+    saved = xr.load_dataset(placed.save(tmp_path / "place.nc"))
+    assert saved["phase_end"].values == pytest.approx([2, 2.5, 4.5, 6.5, 7, 9])
+    assert saved["ground_reaction"].max() == pytest.approx(MASS * 9.81)
+    again = parse_yaml(saved.attrs["task"], Task, "task")
+    assert again == placed.scenario.task
+    assert plan(COGIRO, again).tension_max == placed.tension_max
+    assert Replay(saved, "place.nc").at(0).margin == pytest.approx(placed.audit.tensions[0].min() - 100)
+    figure = tensions(saved)
+    assert "lift" in [text.get_text() for text in figure.axes[0].texts]
+
+
+def test_an_impossible_load_is_proven_in_its_phase(tmp_path):
+    phases = copy.deepcopy(PICK_AND_PLACE)
+    for phase in phases[1:5]:
+        phase["load"] = {**LOAD, "mass": 5000.0}
+    planned = plan(COGIRO, {"phases": phases})
+    assert planned.status is MotionStatus.INFEASIBLE
+    assert "in phase 'lift'" in planned.report().splitlines()[0] or "'lower'" in planned.report().splitlines()[0]
+    certificate = planned.certificate
+    assert certificate.direction[2] > 0.9
+    assert 2.5 <= certificate.time <= 6.5
+    assert certificate.at_max.max() < COGIRO.m
+    spans = planned.infeasible_spans
+    assert [span.span for span in spans] == [pytest.approx((2.5, 6.5), abs=0.01)]
+    replay = Replay(xr.load_dataset(planned.save(tmp_path / "heavy.nc")), "heavy.nc")
+    assert replay.at(replay.index_at(4)).certificate.shortfall > 1000
+
+
+TAKE_OFF = [
+    {"name": "take-off", "path": {"kind": "rest", "pose": LOW}, "duration": 1, "ground": {"slack": True}},
+    line(LOW, HIGH, name="climb"),
+    line(HIGH, LOW, name="sink"),
+    {"name": "touch-down", "duration": 1, "ground": {"slack": True}},
+]
+
+
+def test_a_platform_takes_off_from_slack_cables_and_lands_on_them():
+    planned = plan(COGIRO, {"phases": TAKE_OFF})
+    assert planned.feasible
+    audit = planned.audit
+    assert np.abs(audit.tensions[[0, -1]]).max() < 1e-9
+    assert audit.supports[[0, -1]].sum(axis=1) == pytest.approx(COGIRO.weight)
+    climbing = (audit.times >= 1) & (audit.times <= 5)
+    assert (audit.tensions[climbing] >= 100).all()
+    assert planned.margin == pytest.approx(0, abs=1e-9)
+    # Rest, the same way up and down, rest: the motion backwards in time is the motion.
+    assert audit.tensions == pytest.approx(audit.tensions[::-1], abs=1e-6)
+    assert balance(planned)[audit.times < 1, 2] == pytest.approx(COGIRO.weight)
+
+
+def test_without_slack_cables_keep_their_least_tension_on_the_ground():
+    phases = [{**phase, "ground": {}} if "ground" in phase else phase for phase in TAKE_OFF]
+    planned = plan(COGIRO, {"phases": phases})
+    assert planned.feasible
+    assert planned.audit.tensions.min() == pytest.approx(100)
+
+
+@pytest.mark.parametrize("scheme", ["linear", "hermite"])
+def test_a_motion_in_a_tube_keeps_a_limit_of_rates_through_all_phases(scheme):
+    """And it is at rest, on its path, wherever it is on the ground."""
+    limits, tube = {"tension_rate": 600}, {"position": 0.05, "attitude": 0.05}
+    task = {"phases": PICK_AND_PLACE, "tube": tube, "limits": limits, "steps": 36, "scheme": scheme}
+    planned = plan(COGIRO, task)
+    assert planned.feasible
+    audit = planned.audit
+    assert np.abs(np.diff(audit.tensions, axis=0)).max() * audit.rate <= 601
+    resting = ((audit.times >= 2) & (audit.times <= 2.5)) | ((audit.times >= 6.5) & (audit.times <= 7))
+    for value, expected in zip(audit.motion, (None, 0.0, 0.0), strict=True):
+        if expected is not None:
+            assert np.abs(value[resting]).max() < 1e-6
+    assert audit.motion.pose[audit.times < 2.4][-1, :3] == pytest.approx(LOW, abs=1e-7)
+    on_ground = balance(planned)[resting, 2]
+    assert on_ground == pytest.approx((COGIRO.platform.mass + carried_at(planned)[resting]) * 9.81, abs=1e-5)
+
+
+def test_one_phase_without_a_load_is_the_task_without_phases():
+    """The grid of one phase is the even one; so all numbers are the same."""
+    path, common = {"kind": "line", "start": HIGH, "end": LOW}, {"tube": {"position": 0.05}, "steps": 12}
+    ours = plan(COGIRO, {"phases": [{"name": "sink", "path": path, "duration": 3}], **common})
+    theirs = plan(COGIRO, {"path": path, "duration": 3, **common})
+    assert ours.objective == pytest.approx(theirs.objective, rel=1e-9)
+    assert ours.audit.tensions == pytest.approx(theirs.audit.tensions, abs=1e-6)
+
+
+def test_quadrotors_lift_a_load_whose_cables_were_slack():
+    robot = load("multi-quadrotor-3")
+    ground, high = [0, 0, 0], [0, 0, 0.2]
+    phases = [
+        {"name": "take-off", "path": {"kind": "rest", "pose": ground}, "duration": 1, "ground": {"slack": True}},
+        line(ground, high, name="lift"),
+    ]
+    task = {"phases": phases, "base": {"kind": "free"}, "tube": {"position": 0.1, "attitude": 0.2}, "steps": 40}
+    planned = plan(robot, task)
+    assert planned.feasible
+    audit = planned.audit
+    assert np.abs(audit.tensions[0]).max() < 1e-6
+    assert audit.supports[0].sum() == pytest.approx(robot.weight)
+    lengths = np.linalg.norm(
+        Dynamics(robot).points(audit.motion.pose, audit.carriers.pose)[0]
+        - Dynamics(robot).points(audit.motion.pose, audit.carriers.pose)[1],
+        axis=2,
+    )
+    assert lengths == pytest.approx(np.tile(robot.fixed_lengths, (len(lengths), 1)), abs=1e-4)
+    assert np.abs(np.diff(audit.tensions, axis=0)).max() * audit.rate < 5 * robot.weight  # taken up over the second
+    assert audit.drift is None
+
+
+def test_a_flying_robot_picks_up_a_load_in_its_own_frame_or_in_the_world():
+    """A quadrotor that holds: its frame is the world's but for a shift, and the tensions are the same."""
+    robot, carried = load("wang-flying"), {"mass": 0.5, "com": [0, 0, -0.1]}
+    hold = {"kind": "hold", "poses": {"quad": [0, 0, 3, 0, 0, 0.4]}}
+    pulls = []
+    for frame, height in (("world", 2.0), ("quad", -1.0)):
+        path = {"kind": "line", "frame": frame, "start": [0, 0, height], "end": [0, 0, height + 0.2]}
+        path["start"], path["end"] = ([*p, 0, 0, 0.4 * (frame == "world")] for p in (path["start"], path["end"]))
+        task = {"phases": [{"name": "lift", "path": path, "duration": 2, "load": carried}], "base": hold}
+        planned = plan(robot, task)
+        assert planned.feasible
+        pulls.append(planned.audit.tensions)
+    assert pulls[0] == pytest.approx(pulls[1], abs=1e-9)
+    free = {"phases": task["phases"], "tube": {"position": 0.05, "attitude": 0.05}, "base": hold, "steps": 20}
+    assert plan(robot, free).feasible
+
+
+IN_THE_AIR = [line(HIGH, LOW, name="empty"), line(LOW, HIGH, name="loaded", load=LOAD)]
+
+
+def test_a_load_that_changes_in_the_air_makes_tensions_jump():
+    planned = plan(COGIRO, {"phases": IN_THE_AIR})
+    assert planned.feasible
+    row = np.searchsorted(planned.audit.times, 2.0)
+    jump = np.abs(planned.audit.tensions[row] - planned.audit.tensions[row - 1]).max()
+    assert jump > 50
+    assert f"by up to {jump:.1f} N at t = 2.000 s" in planned.report()
+    free = plan(COGIRO, {"phases": IN_THE_AIR, "tube": {"position": 0.05}, "scheme": "gauss", "steps": 12})
+    assert free.feasible
+
+
+def changed(**fields):
+    return {"phases": PICK_AND_PLACE, **fields}
+
+
+def phase(index, **fields):
+    phases = copy.deepcopy(PICK_AND_PLACE)
+    phases[index] |= fields
+    return {"phases": phases}
+
+
+@pytest.mark.parametrize(
+    ("task", "message"),
+    [
+        (
+            phase(2, **line([0, 0, 1.1], AWAY)),
+            r"phases\[2\] must begin where phases\[1\] ends, got a gap of 0.1 m and 0",
+        ),
+        (phase(2, **line([*LOW, 0, 0, 0.2], AWAY)), "a gap of 0 m and 0.2 rad"),
+        (phase(2, path={"kind": "line", "timing": "uniform", "start": LOW, "end": AWAY}), "begin with the speed with"),
+        (phase(0, duration=None), r"phases\[0\].duration must be a number > 0 \[s\] for a path of kind line"),
+        (phase(0, path=None), r"phases\[0\].path must be a path, since no phase comes before"),
+        (phase(3, name="lift"), r"phases\[3\].name must be unique, got 'lift' twice"),
+        (phase(0, ground={}), r"phases\[0\].path must be of kind rest on the ground, got line"),
+        (phase(1, load=None), r"phases\[1\].load must weigh at least as much as that of phases\[2\]"),
+        (phase(1, ground={"support": [[2, 0, 0], [2, 1, 0]]}), r"phases\[1\].ground.support must have points about"),
+        (phase(1, ground={"suport": []}), "suport is not a known key, did you mean 'support'"),
+        (changed(duration=5), "duration must be left out with phases"),
+        (changed(path={"kind": "rest", "pose": LOW}), "path must be left out with phases"),
+        (changed(steps=20), "steps must be at least 4 for each phase, 24, got 20"),
+        (changed(solver="fatrop"), "solver must be ipopt with phases, got fatrop"),
+        (changed(tube={"position": 0.1}, scheme="spline"), "scheme must be another than spline with phases"),
+        (changed(tube={"position": 0.1}, scheme="gauss"), "scheme must be one of linear, hermite with a phase on the"),
+        (changed(tube={"position": 0.1, "waypoints": "exact"}), "tube.waypoints must be free with phases"),
+        ({"phases": TAKE_OFF, "objective": {"margin": 5}}, "phases.ground.slack must be false with a margin to choose"),
+        ({"phases": TAKE_OFF, "initial": {"pose": [0, 0, 1, 0, 0, 0]}}, "initial must be left out if the first phase"),
+        (
+            {"phases": IN_THE_AIR, "limits": {"tension_rate": 500}},
+            "limits.tension_rate must be left out since the",
+        ),
+        ({"phases": IN_THE_AIR, "tube": {"position": 0.1}}, "scheme must be one of constant, gauss since the load"),
+        ({}, "path is missing"),
+    ],
+)
+def test_what_phases_cannot_be_is_refused_in_one_line(task, message):
+    with pytest.raises(InputError, match=message) as raised:
+        plan(COGIRO, task)
+    assert "\n" not in str(raised.value)
+
+
+def test_time_laws_are_of_one_path():
+    with pytest.raises(InputError, match="phases must be left out to time a path"):
+        time_along(COGIRO, {"phases": PICK_AND_PLACE})
+
+
+def test_a_carrier_can_move_wait_and_move():
+    """A sequence of paths is a path: here of the quadrotor that carries paper F's robot."""
+    there, back = ([0, 0, 3, 0, 0, 0], [0.3, 0, 3, 0, 0, 0])
+    moves = [{"kind": "line", "start": there, "end": back}, {"kind": "rest", "pose": back}]
+    parts = [{"path": path, "duration": 2} for path in moves]
+    base = {"kind": "given", "paths": {"quad": {"kind": "sequence", "parts": parts}}}
+    path = {"kind": "rest", "frame": "quad", "pose": [0, 0, -1]}
+    scenario = lay_out(load("wang-flying"), Task.model_validate({"path": path, "duration": 4, "base": base}))
+    _, carriers = scenario.motion(np.array([0.0, 1.0, 2.0, 3.0, 4.0]), None)
+    assert carriers.pose[:, 0, 0] == pytest.approx([0, 0.15, 0.3, 0.3, 0.3])
+    parts[1]["path"] = {"kind": "rest", "pose": [0.4, 0, 3, 0, 0, 0]}
+    with pytest.raises(InputError, match=r"parts\[1\] must begin where parts\[0\] ends, got a gap of 0.1 m"):
+        Task.model_validate({"path": path, "duration": 4, "base": base})
