@@ -24,7 +24,7 @@ from ..models import Robot
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..text import quantity
-from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
+from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
 from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
@@ -55,7 +55,8 @@ COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 1
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 GLOBAL_SHARE = 0.2  # of the time limit
-SHRINK = 2e-3  # of the carriers' speed and acceleration limits
+SHRINK = 2e-3  # of limits beside those of the tensions
+LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
 NO_SLACK = 1e-6  # of the weight: a motion with less missing at its nodes is a start for another try
 
 
@@ -324,19 +325,36 @@ def _refine(search: Search, outcome: Outcome) -> str:
     """Audit a solution, and solve again with more nodes as long as the audit reports violations; return why it ends."""
     scenario, steps = search.scenario, search.scenario.task.steps
     audit = search.audit(outcome)
-    reserve, shrink = 0.0, 0.0
+    reserve, shrink, further = 0.0, 0.0, ()
     for attempt in range(1, REFINEMENTS + 1):
-        if audit.passed or not outcome.success or search.seconds_left <= 0:
+        if audit.passed or not (outcome.success or further) or search.seconds_left <= 0:
             break
         # Between finer nodes less can happen; a little distance from the limits takes care of what still does.
         steps = min(2 * steps, MOST_STEPS)
         missed = float(audit.violation.max()) / scenario.robot.force_scale
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if audit.excess else shrink
-        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink)
+        further = _missed(scenario, audit, further) if outcome.success else ()  # not again what had no solution
+        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
         outcome = search.solve("nonlinear program", mesh, outcome.deviation)
         audit = search.audit(outcome)
     if outcome.success:
         return f"the audit reports violations up to the finest mesh, {steps} steps"
     ended = ENDS.get(outcome.message, f"stopped ({outcome.message})")
     return f"nonlinear program of {steps} steps: {ended}"
+
+
+def _missed(
+    scenario: Scenario, audit: Audit, before: tuple[tuple[str, str, float], ...]
+) -> tuple[tuple[str, str, float], ...]:
+    """Return the share by which each limit is reduced on a mesh twice as fine as that which the audit objects to.
+
+    What happens between nodes falls at least as their distance does, and with it half of what was reduced before.
+    """
+    shares = {(name, about): share / 2 for name, about, share in before}
+    for excess in audit.excess:
+        for limit in scenario.limits:
+            if limit.name == excess.limit and excess.about in limit.labels:
+                share = shares.get((excess.limit, excess.about), 0.0) + limit.share_beyond(excess.value)
+                shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
+    return tuple((*key, share) for key, share in shares.items())

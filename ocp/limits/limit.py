@@ -123,6 +123,10 @@ class Limit(ABC):
         """Return what is between the bounds at `times` (n,) [s], (n, k), from the values at these times."""
         return values
 
+    def share_beyond(self, value: float) -> float:
+        """Return how far a value is beyond the bounds, as `rows` counts `shrink`."""
+        return max(self.low - value, value - self.high, 0.0) / self.scale
+
     def about(self, index: int) -> str:
         """Return what value `index` is about, for the sentence of a violation."""
         return self.labels[index]
@@ -215,6 +219,10 @@ class Angle(Limit):
     @override
     def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
         return np.arccos(np.clip(values, -1, 1))
+
+    @override
+    def share_beyond(self, value: float) -> float:
+        return max(self._least - float(np.cos(value)), 0.0) / self._change
 
     @property
     @override

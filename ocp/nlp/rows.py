@@ -42,6 +42,8 @@ class Mesh:
         Further distance from the tension limits [N], for what happens between the nodes.
     shrink
         Share by which the limits of the task and of the carriers are reduced, for the same reason (`Limit.rows`).
+    further
+        Name of a limit, what it is about, and the share by which it is reduced beside, as an audit missed it.
     elastic
         Whether A t = w + s with a high cost on the slack s, so that there is always a solution.
     """
@@ -49,12 +51,18 @@ class Mesh:
     steps: int
     reserve: float = 0.0
     shrink: float = 0.0
+    further: tuple[tuple[str, str, float], ...] = ()
     elastic: bool = False
+
+    def shrink_of(self, limit: Limit) -> float:
+        """Return the share by which a limit is reduced."""
+        of_it = [share for name, about, share in self.further if limit.name == name and about in limit.labels]
+        return self.shrink + max(of_it, default=0.0)
 
 
 def bounded(limit: Limit, values: ca.SX, mesh: Mesh, slack: ca.SX | None) -> tuple[list[ca.SX], list[Row]]:
     """Return values and rows of a limit; if it is soft with its slack, in units of its scale."""
-    value, low, high = limit.rows(values, mesh.shrink)
+    value, low, high = limit.rows(values, mesh.shrink_of(limit))
     if slack is None:
         return [value], [(limit.name, low, high)] * value.numel()
     sides = [(sign, bound) for sign, bound in ((1.0, low), (-1.0, -high)) if np.isfinite(bound)]
