@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
@@ -67,11 +68,28 @@ def tracks(found):
     assert found.tensions.min() > 100e3
 
 
+def takes_off(found):
+    """Newton's second law of the load with the force of the ground, from cable directions that are computed here."""
+    load = found.pose.values
+    turned = Rotation.from_euler("ZYX", load[:, 5:2:-1]).as_matrix()
+    corners = np.array([[0.3, 0, 0.05], [-0.15, 0.259807621135, 0.05], [-0.15, -0.259807621135, 0.05]])
+    along = found.carrier_pose.values[:, :, :3] - load[:, None, :3] - np.einsum("nij,mj->nmi", turned, corners)
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    force = np.einsum("nm,nmi->ni", found.tensions.values, along)
+    force += found.ground_reaction.values[:, None] * [0, 0, 1]
+    np.testing.assert_allclose(force, 2.4 * (found.acceleration.values[:, :3] + [0, 0, 9.81]), atol=0.1)
+    np.testing.assert_allclose(found.tensions.values[[0, -1]], 0, atol=1e-6)
+    np.testing.assert_allclose(found.ground_reaction.values[[0, -1]], 2.4 * 9.81, rtol=1e-6)
+    np.testing.assert_allclose(load[[0, -1], :3], [[0, 0, 0], [1, 0, 0]], atol=1e-9)
+    assert (found.tensions.values[101:700] > 0.5).all()
+
+
 SHOWN = {
     "cogiro_pick_and_place": picks_and_places,
     "fast_tracks_a_source": tracks,
     "flying_circle": circles,
     "four_quadrotors_slot": passes,
+    "three_quadrotors_take_off": takes_off,
     "three_robots_carry": carries,
 }
 

@@ -19,6 +19,7 @@ from towline.viewer.replay import Replay
 COGIRO = load("cogiro")
 MASS = 50.0
 LOAD = {"mass": MASS, "com": [0.1, 0.05, -0.4], "inertia": [2, 3, 4, 0.1, -0.2, 0.3]}
+CORNERS = [[0.5, 0.5, -0.6], [-0.5, 0.5, -0.6], [-0.5, -0.5, -0.6], [0.5, -0.5, -0.6]]
 HIGH, LOW, AWAY, DOWN = [0, 0, 2], [0, 0, 1], [1, 0, 2], [1, 0, 1]
 
 
@@ -28,7 +29,7 @@ def line(start, end, **more):
 
 PICK_AND_PLACE = [
     line(HIGH, LOW, name="approach"),
-    {"name": "pick-up", "duration": 0.5, "load": LOAD, "ground": {}},
+    {"name": "pick-up", "duration": 0.5, "load": LOAD, "ground": {"support": CORNERS}},
     line(LOW, AWAY, name="lift", load=LOAD),
     line(AWAY, DOWN, name="lower", load=LOAD),
     {"name": "set-down", "duration": 0.5, "load": LOAD, "ground": {}},
@@ -113,6 +114,19 @@ def test_cables_and_ground_carry_what_there_is_at_every_instant(placed):
     acceleration = placed.audit.motion.acceleration[:, :3]
     assert balance(placed) == pytest.approx(mass[:, None] * (acceleration - COGIRO.gravity), abs=1e-6)
     assert (placed.audit.supports >= 0).all()
+
+
+def test_moments_balance_on_the_ground(placed):
+    """About the origin of the level platform: of cables, corners and both weights."""
+    audit, robot = placed.audit, COGIRO
+    rows = (audit.times >= 2) & (audit.times < 2.5)
+    cables = robot.home_anchors - (robot.attachments + np.array(LOW))
+    cables /= np.linalg.norm(cables, axis=1, keepdims=True)
+    moment = audit.tensions[rows] @ np.cross(robot.attachments, cables)
+    moment += audit.supports[rows, :4] @ np.cross(CORNERS, [0, 0, 1.0])
+    for mass, com in ((robot.platform.mass, robot.platform.com), (MASS, LOAD["com"])):
+        moment += np.cross(com, mass * np.array(robot.gravity))
+    assert np.abs(moment).max() < 1e-6
 
 
 def test_the_ground_bears_the_load_alone_until_the_cables_take_it_over(placed):
