@@ -341,3 +341,32 @@ def test_what_a_motion_passes_by_is_not_reported(kind):
     task = {"path": {"kind": "line", "start": low.tolist(), "end": high.tolist()}, "duration": 0.3}
     scenario = lay_out(robot, read_task(task | {"limits": {"keep_out": [place]}}))
     assert [excess for excess in audit(scenario, None).excess if excess.limit == "keep_out"] == []
+
+
+@pytest.mark.parametrize("kind", ["box", "mesh"])
+def test_the_planner_does_not_jump_over_a_thin_wall(kind):
+    """It starts on the side of a sheet of a millimetre and stays there, on a mesh that would step over it."""
+    low, high = np.array([0.2995, -0.3, 0.0]), np.array([0.3005, 0.3, 1.6])
+    shape = {
+        "box": {"min": low.tolist(), "max": high.tolist()},
+        "mesh": {"vertices": (low + CUBE * (high - low)).tolist()},
+    }
+    wall = {"kind": kind, "name": "wall", **shape[kind], "cables": None}
+    task = {
+        "path": {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.1, 1.1]},
+        "duration": 3,
+        "steps": 24,
+        "tube": {"position": "free"},
+        "limits": {"keep_out": [wall]},
+    }
+    around = {"kind": "waypoints", "points": [[0, 0, 1], [0.3, 0.45, 1.05], [0.6, 0.1, 1.1]]}
+    robot = load("ipanema-1")
+    found = plan(robot, task, start=around)
+    assert found.feasible, found.report()
+    assert sum(stage.name.startswith("nonlinear program") for stage in found.stages) <= 2
+    places = found.scenario.dynamics.points(found.audit.motion.pose)[1]
+    before, after = places[:-1], places[1:]
+    crossing = (before[..., 0] - 0.3) * (after[..., 0] - 0.3) <= 0
+    assert crossing.any()
+    for place in before[crossing]:
+        assert not (low[1:] < place[1:] - 1e-4).all() or not (place[1:] + 1e-4 < high[1:]).all()

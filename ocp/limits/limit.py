@@ -106,6 +106,13 @@ class Limit(ABC):
     def values(self, state: State) -> ca.SX:
         """Return the values at one instant, (k, 1), as an expression of its symbols."""
 
+    def on_the_way(self, first: State, second: State) -> ca.SX | None:
+        """Return the least values that there are if all points move straight from one instant to another, (k, 1).
+
+        The program keeps these instead of those at its nodes where a step may jump over a place; None if not known.
+        """
+        return None
+
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
         """Return the limit as rows of a program, in parts of `scale`.
 

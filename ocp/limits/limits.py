@@ -104,6 +104,22 @@ class Limits:
             raise InputError(f"limit {limit.name!r} must depend only on what its hull names, got {hull}")
         return ca.Function("hull", [part], [values])
 
+    def on_the_way(self, limit: Limit) -> ca.Function | None:
+        """Return the function of a limit's values on the straight way from one instant to another; None if not known.
+
+        Its inputs are the motions of platform and carriers (18 each) at the first, then at the second.
+        """
+        count = 1 + len(self.robot.carriers)
+        whole = [ca.SX.sym(f"body{i}", 18) for i in range(2 * count)]
+        bodies = [Body(*ca.vertsplit(body, 6)) for body in whole]
+        other = self._state
+        first, second = (
+            State(self.robot, part[0], tuple(part[1:]), other.tensions, other.off_path)
+            for part in (bodies[:count], bodies[count:])
+        )
+        values = limit.on_the_way(first, second)
+        return None if values is None else ca.Function("on_the_way", whole, [values])
+
     def along(
         self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None
     ) -> list[np.ndarray]:

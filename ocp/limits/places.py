@@ -60,6 +60,11 @@ class _Outside(Limit):
         """Return the distances of points (3, k) of the place's frame, (k, 1) [m]."""
         return ca.vertcat(*(point_outside(self._place, point) for point in ca.horzsplit(points)))
 
+    def _way_outside(self, points: ca.SX, later: ca.SX) -> ca.SX:
+        """Return the distances of the lines from points (3, k) to others (3, k) of the place's frame, (k, 1) [m]."""
+        ways = zip(ca.horzsplit(points), ca.horzsplit(later), strict=True)
+        return ca.vertcat(*(cable_outside(self._place, *way) for way in ways))
+
 
 class PlatformOutside(_Outside):
     """Keep the platform's CoM and its attachments out of a place that is fixed in {G}."""
@@ -72,7 +77,14 @@ class PlatformOutside(_Outside):
 
     @override
     def values(self, state: State) -> ca.SX:
-        return self._outside(ca.horzcat(state.com, state.attachments))
+        return self._outside(self._points_of(state))
+
+    @override
+    def on_the_way(self, first: State, second: State) -> ca.SX:
+        return self._way_outside(self._points_of(first), self._points_of(second))
+
+    def _points_of(self, state: State) -> ca.SX:
+        return ca.horzcat(state.com, state.attachments)
 
 
 class CarriersOutside(_Outside):
@@ -86,9 +98,14 @@ class CarriersOutside(_Outside):
 
     @override
     def values(self, state: State) -> ca.SX:
-        return self._outside(
-            self._points(state, ca.horzcat(*(state.carriers[index].position for index in self._which)))
-        )
+        return self._outside(self._points_of(state))
+
+    @override
+    def on_the_way(self, first: State, second: State) -> ca.SX:
+        return self._way_outside(self._points_of(first), self._points_of(second))
+
+    def _points_of(self, state: State) -> ca.SX:
+        return self._points(state, ca.horzcat(*(state.carriers[index].position for index in self._which)))
 
 
 class CablesOutside(_Outside):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import casadi as ca
@@ -27,6 +28,7 @@ from .rows import (
     spread,
     stretch,
 )
+from .thin import swept
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
 JUMP = 0.05  # of an interval: how long a jump of the acceleration counts
@@ -104,6 +106,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
     _rate_rows(scenario, mesh, layout, h, columns, moving, values, rows)
+    _way_rows(scenario, mesh, layout, columns, moving, values, rows)
 
     @cache
     def points_of(carrier: int | None) -> Points:
@@ -259,6 +262,26 @@ def _rate_rows(
                 more, named = bounded(limit, rate, mesh, layout.slack(columns[0], limit))
                 values += more
                 rows += named
+
+
+def _way_rows(
+    scenario: Scenario,
+    mesh: Mesh,
+    layout: Layout,
+    columns: list[ca.SX],
+    moving: list[list[list[ca.SX]]],
+    values: list[ca.SX],
+    rows: list[Row],
+) -> None:
+    """Add the distances from thin places on the straight way from point to point."""
+    at_points = []
+    for platform, *carriers in moving:
+        at_points.append([ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)])
+    for limit, on_the_way in swept(scenario, mesh).items():
+        for first, second in pairwise(at_points):
+            more, named = bounded(limit, on_the_way(*first, *second), mesh, layout.slack(columns[0], limit))
+            values += more
+            rows += named
 
 
 def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: list[ca.SX]) -> list[ca.SX]:

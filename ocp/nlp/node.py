@@ -12,6 +12,7 @@ from ..tasks.scenario import POSITION, Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
 from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread
+from .thin import swept
 
 __all__ = ["node_function"]
 
@@ -119,10 +120,11 @@ def _limit_rows(
     limits = scenario.limits
     if not limits.all:
         return
-    evaluated = limits.function(*state)
+    evaluated, on_the_way = limits.function(*state), swept(scenario, mesh)
     for limit, place in zip(limits, limits.places, strict=True):
         hull = limit.hull if limit.is_convex else None
-        if isinstance(limit, Rate) or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
+        elsewhere = isinstance(limit, Rate) or limit in on_the_way
+        if elsewhere or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
         more, named = bounded(limit, evaluated[place], mesh, layout.slack(x, limit))
         values += more

@@ -14,6 +14,7 @@ from ..tasks.scenario import Scenario
 from .layout import DURATION, Layout
 
 __all__ = [
+    "MANY",
     "OTHER_COSTS",
     "Mesh",
     "Row",
@@ -27,6 +28,7 @@ __all__ = [
 ]
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
+MANY = 12  # free coordinates: robots with more are teams
 Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
 
 

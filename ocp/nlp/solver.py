@@ -16,6 +16,7 @@ from ...errors import SolverError
 from ..tasks.deviation import Deviation
 from .guess import initial_guess
 from .program import Program
+from .rows import MANY
 from .waiting import Errands, wait_for
 
 __all__ = ["Outcome", "Progress", "Solver"]
@@ -23,7 +24,6 @@ __all__ = ["Outcome", "Progress", "Solver"]
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
 PATIENCE = 30  # iterations without a better one
-MANY = 12  # free coordinates: robots with more are teams
 # Of the pivot tolerances of MUMPS the larger one refactorises less where thrust directions are equations: teams of
 # quadrotors then take half of the time. Of other robots each iteration takes 10 % longer.
 TEAM = {"mumps_pivtol": 1e-4}

@@ -1,0 +1,34 @@
+"""Decide which places are so thin that a motion may jump over them between two nodes: `swept`."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from ..limits import Limit
+from ..tasks.scenario import POSITION, Scenario
+from .rows import MANY, Mesh
+
+__all__ = ["swept"]
+
+STEPS = 4  # a motion is rarely that many times as fast as its reference
+
+
+def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
+    """Return the limits that the program keeps between nodes rather than at them, and their functions.
+
+    They are distances from places that are thinner than a few steps of the reference motion. Teams have none, since four
+    quadrotors took four times as long through a slot; nor has fatrop, whose iterations hardly advance with them.
+    """
+    if scenario.count > MANY or scenario.task.solver == "fatrop":
+        return {}
+    thin = [limit for limit in scenario.limits if limit.thickness < STEPS * _step(scenario, mesh)]
+    functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
+    return {limit: function for limit, function in functions.items() if function is not None}
+
+
+def _step(scenario: Scenario, mesh: Mesh) -> float:
+    """Return the longest distance of platform or carriers from node to node of the reference motion [m]."""
+    platform, carriers = scenario.references(scenario.scheme.shares(mesh.steps) * scenario.duration)
+    ways = [np.diff(motion.pose[:, POSITION], axis=0) for motion in (platform, *carriers)]
+    return max(float(np.linalg.norm(way, axis=1).max()) for way in ways)
