@@ -166,6 +166,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "wind": lambda: np.ones(3),
     "thrust": lambda: np.ones(1),
     "torque": lambda: np.zeros((1, 3)),
+    "Dynamics.carried_wrench.load": lambda: np.ones(10),
     "elastic": lambda: False,
     "method": lambda: "active-set",
     "sample.method": lambda: "random",
