@@ -235,7 +235,7 @@ def _blocked(search: Search) -> Plan | None:
         return None
     start = time.perf_counter()
     motion = between_fixed_values(slowest)
-    audited = audit(slowest, motion, per_output=1)
+    audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
     offers = partial(near_motion, search, slowest, motion, audited)
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)

@@ -106,20 +106,20 @@ def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | None = None) -> Audit:
+def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False) -> Audit:
     """Audit the motion of `deviation`, or that of the references alone.
 
     Parameters
     ----------
-    per_output
-        How many instants each sample of the output stands for; default: as many as `AUDIT_RATE` requires, or more.
+    to_show
+        Whether the motion is known to be impossible, and only shown: at the samples of the output, without its drift.
 
     Raises
     ------
     InputError
         If somewhere a cable has no length.
     """
-    intervals = scenario.output_samples * (per_output or _audits_per_output(scenario))
+    intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
     times = np.linspace(0.0, scenario.duration, intervals + 1)
     robot = scenario.robot
     motion, carriers = scenario.motion(times, deviation)
@@ -144,7 +144,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, per_output: int | Non
         at = float(times[result.row])
         exceeded.append(Excess("tensions", "platform", at, result.beyond, 0.0, "N", "exactly", why))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
-    followed = few and np.isfinite(tensions).all() and not (scenario.phases.carry or scenario.phases.rest)
+    followed = not to_show and few and np.isfinite(tensions).all() and not (scenario.phases.carry or scenario.phases.rest)
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
         times=times,
