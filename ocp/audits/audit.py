@@ -144,7 +144,8 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
         at = float(times[result.row])
         exceeded.append(Excess("tensions", "platform", at, result.beyond, 0.0, "N", "exactly", why))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
-    followed = not to_show and few and np.isfinite(tensions).all() and not (scenario.phases.carry or scenario.phases.rest)
+    hangs = not (scenario.phases.carry or scenario.phases.rest)
+    followed = not to_show and few and hangs and np.isfinite(tensions).all()
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
         times=times,
