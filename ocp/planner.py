@@ -354,7 +354,7 @@ def _missed(
     shares = {(name, about): share / 2 for name, about, share in before}
     for excess in audit.excess:
         for limit in scenario.limits:
-            if limit.name == excess.limit and excess.about in limit.labels:
+            if limit.name == excess.limit and limit.is_about(excess.about):
                 share = shares.get((excess.limit, excess.about), 0.0) + limit.share_beyond(excess.value)
                 shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
     return tuple((*key, share) for key, share in shares.items())

@@ -138,6 +138,10 @@ class Limit(ABC):
         """Return what value `index` is about, for the sentence of a violation."""
         return self.labels[index]
 
+    def is_about(self, about: str) -> bool:
+        """Return whether one of its values is about that."""
+        return any(self.about(index) == about for index in range(len(self.labels)))
+
     @property
     def title(self) -> str:
         """Return the name of its curves in a figure."""

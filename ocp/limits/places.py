@@ -19,6 +19,8 @@ from .state import State
 
 __all__ = ["CablesOutside", "CarriersOutside", "PlatformOutside"]
 
+CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it between nodes does not cut a corner
+
 
 class _Outside(Limit):
     """Keep out of a place.
@@ -51,6 +53,11 @@ class _Outside(Limit):
     @override
     def title(self) -> str:
         return f"{self.name}, {self._called}"
+
+    @override
+    def share_beyond(self, value: float) -> float:
+        beyond = super().share_beyond(value)
+        return beyond if beyond < CORNER * self.thickness else 0.0  # more distance keeps nothing from passing through
 
     def _points(self, state: State, points: ca.SX) -> ca.SX:
         """Return points (3, k) of {G} in the frame of the place."""

@@ -58,7 +58,7 @@ class Mesh:
 
     def shrink_of(self, limit: Limit) -> float:
         """Return the share by which a limit is reduced."""
-        of_it = [share for name, about, share in self.further if limit.name == name and about in limit.labels]
+        of_it = [share for name, about, share in self.further if limit.name == name and limit.is_about(about)]
         return self.shrink + max(of_it, default=0.0)
 
 
