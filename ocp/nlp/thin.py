@@ -17,8 +17,9 @@ STEPS = 4  # a motion is rarely that many times as fast as its reference
 def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     """Return the limits that the program keeps between nodes rather than at them, and their functions.
 
-    They are distances from places that are thinner than a few steps of the reference motion. Teams have none: four
-    quadrotors took four times as long through a slot. Nor has fatrop, whose iterations hardly advance with them.
+    They are distances from places that are thinner than a few steps of the reference motion. The result is
+    empty for teams, since four quadrotors took four times as long through a slot, and for fatrop, whose iterations
+    hardly advance with them.
     """
     if scenario.count > MANY or scenario.task.solver == "fatrop":
         return {}
