@@ -13,6 +13,8 @@ from towline.figures.plan import tensions
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml
 from towline.ocp import MotionStatus, Task, plan
+from towline.ocp.sweeps.axis import read_axes
+from towline.ocp.sweeps.cases import Cases
 from towline.ocp.tasks.lay_out import lay_out
 from towline.viewer.replay import Replay
 
@@ -142,12 +144,12 @@ def test_the_ground_bears_the_load_alone_until_the_cables_take_it_over(placed):
 
 
 def test_tensions_are_continuous_from_phase_to_phase(placed):
-    """Across a joint a tension changes in 1 ms no more than it does at the constant rates of the ground."""
+    """Across a boundary a tension changes in 1 ms no more than it does at the constant rates of the ground."""
     steps = np.abs(np.diff(placed.audit.tensions, axis=0))
-    joints = np.searchsorted(placed.audit.times, [2, 2.5, 4.5, 6.5, 7])
+    boundaries = np.searchsorted(placed.audit.times, [2, 2.5, 4.5, 6.5, 7])
     taken_up = steps[np.searchsorted(placed.audit.times, 2.25)].max()
-    assert steps[joints - 1].max() < 2 * taken_up
-    assert steps[joints].max() < 2 * taken_up
+    assert steps[boundaries - 1].max() < 2 * taken_up
+    assert steps[boundaries].max() < 2 * taken_up
 
 
 def test_reports_files_and_viewer_know_the_phases(placed, tmp_path):
@@ -362,3 +364,12 @@ def test_a_carrier_can_move_wait_and_move():
     parts[1]["path"] = {"kind": "rest", "pose": [0.4, 0, 3, 0, 0, 0]}
     with pytest.raises(InputError, match=r"parts\[1\] must begin where parts\[0\] ends, got a gap of 0.1 m"):
         Task.model_validate({"path": path, "duration": 4, "base": base})
+
+
+def test_a_sweep_varies_a_phase_by_its_number():
+    cases = Cases(
+        COGIRO, Task.model_validate({"phases": PICK_AND_PLACE}), read_axes({"phases[2].duration": [1.0, 3.0]})
+    )
+    cases.check()
+    assert [cases.case(number)[1].seconds for number in range(2)] == [8.0, 10.0]
+    assert cases.units() == ("s",)

@@ -42,10 +42,10 @@ class Grid:
         if not phases.all:
             lengths = np.full(steps, scenario.duration / steps)
             return Grid(even, scheme.quadrature(steps), lengths, np.zeros(steps))
-        counts = _counts(np.diff(phases.joints), steps)
-        joints = np.append(0.0, np.cumsum(counts)) / steps
-        shares = np.interp(even, joints, phases.joints / phases.joints[-1])
-        shares[np.round(joints * steps).astype(int) * scheme.size] = phases.joints / phases.joints[-1]
+        counts = _counts(np.diff(phases.boundaries), steps)
+        boundaries = np.append(0.0, np.cumsum(counts)) / steps
+        shares = np.interp(even, boundaries, phases.boundaries / phases.boundaries[-1])
+        shares[np.round(boundaries * steps).astype(int) * scheme.size] = phases.boundaries / phases.boundaries[-1]
         lengths = np.diff(shares[:: scheme.size])
         weights = np.zeros(len(shares))
         for k in range(steps):

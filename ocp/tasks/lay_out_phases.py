@@ -33,8 +33,8 @@ def lay_out_phases(scenario: Scenario) -> Phases:
     robot, task, where = scenario.robot, scenario.task, f"task {scenario.task.name!r}"
     if task.phases is None or not isinstance(task.path, SequencePath):
         return Phases()
-    joints = task.path.joints
-    poses = [task.path.at(joints[:-1][[index]], joints[-1]).pose[0] for index in range(len(task.phases))]
+    boundaries = task.path.boundaries
+    poses = [task.path.at(boundaries[:-1][[index]], boundaries[-1]).pose[0] for index in range(len(task.phases))]
     grounds = [phase.ground for phase in task.phases]
     if any(grounds):
         _check_ground(robot, task, where)
@@ -60,7 +60,7 @@ def lay_out_phases(scenario: Scenario) -> Phases:
             )
             ends[side] = np.stack([np.maximum(own - its, 0.0), free[1]])
         slack = phase.ground is not None and phase.ground.slack
-        times = float(joints[index]), float(joints[index + 1])
+        times = float(boundaries[index]), float(boundaries[index + 1])
         laid.append(LaidPhase(phase.name, *times, loads[index], columns[index], slack, *ends))
     phases = Phases(tuple(laid))
     _check_program(scenario, phases, where)

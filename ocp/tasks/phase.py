@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 
 from ...models.part import AT_ORIGIN, Inertia, Name, Part, Pose, Positive, Vector3, inertia_matrix
 from .paths import RestPath, SequencePath, SinglePath
-from .paths.sequence import Piece, check_joints, lasting
+from .paths.sequence import Piece, check_continuity, lasting
 
 __all__ = ["Ground", "Load", "Phase", "path_of"]
 
@@ -94,6 +94,6 @@ def path_of(phases: Sequence[Phase]) -> SequencePath:
             joined.append((path, lasting(path, phase.duration)))
         except ValueError as error:
             raise ValueError(f"{key}.{error}") from None
-    check_joints(joined, "phases")
+    check_continuity(joined, "phases")
     parts = tuple(Piece(path=path, duration=seconds) for path, seconds in joined)
     return SequencePath(kind="sequence", frame=joined[0][0].frame, parts=parts)

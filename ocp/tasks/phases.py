@@ -72,7 +72,7 @@ class Phases:
     all: tuple[LaidPhase, ...] = ()
 
     @cached_property
-    def joints(self) -> np.ndarray:
+    def boundaries(self) -> np.ndarray:
         """Return the times at which the phases begin, and the end, (k + 1,) [s]; empty without phases."""
         return np.array([phase.start for phase in self.all] + [phase.end for phase in self.all[-1:]])
 
@@ -101,9 +101,9 @@ class Phases:
         ]
 
     def index_at(self, times: np.ndarray) -> np.ndarray:
-        """Return the index of the phase to which each of `times` belongs, (n,): at a joint the later one."""
-        joints = self.joints
-        return np.searchsorted(joints[1:-1] - SAME_TIME * joints[-1], times, side="right")
+        """Return the index of the phase to which each of `times` belongs, (n,): at a boundary the later one."""
+        boundaries = self.boundaries
+        return np.searchsorted(boundaries[1:-1] - SAME_TIME * boundaries[-1], times, side="right")
 
     def at(self, time: float) -> LaidPhase | None:
         """Return the phase to which a time belongs; None for a task without phases."""
@@ -126,7 +126,7 @@ class Phases:
         return columns[self.index_at(times)]
 
     def resting(self, times: np.ndarray) -> np.ndarray:
-        """Return at which of `times` the platform is on the ground, joints included, (n,)."""
+        """Return at which of `times` the platform is on the ground, boundaries included, (n,)."""
         resting = np.zeros(len(times), bool)
         for phase in self.all:
             if phase.rests:
@@ -134,14 +134,14 @@ class Phases:
         return resting
 
     def within(self, phase: LaidPhase, times: np.ndarray) -> np.ndarray:
-        """Return which of `times` are within a phase, its joints included, (n,)."""
-        reach = SAME_TIME * self.joints[-1]
+        """Return which of `times` are within a phase, its boundaries included, (n,)."""
+        reach = SAME_TIME * self.boundaries[-1]
         return (times >= phase.start - reach) & (times <= phase.end + reach)
 
     def support_bounds(self, times: np.ndarray) -> np.ndarray:
         """Return lower and upper bounds of the support forces at `times`, (2, n, supports) [N]."""
         bounds = np.zeros((2, len(times), self.supports))
-        reach = SAME_TIME * self.joints[-1] if self.all else 0.0
+        reach = SAME_TIME * self.boundaries[-1] if self.all else 0.0
         for phase, rows in self.rows(times):
             count = phase.columns.shape[1]
             bounds[1, rows, :count] = np.inf

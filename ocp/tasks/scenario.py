@@ -129,7 +129,7 @@ class Scenario:
         return (np.zeros_like(low), high) if phase is not None and phase.slack else (low, high)
 
     def bounds_at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the tension limits at `times`, less the margin, (n, m) each [N]: at a joint those of both phases."""
+        """Return the tension limits at `times` less the margin, (n, m) each [N]: of both phases at a boundary."""
         low, high = self.bounds()
         return self._where_taut(times, low), np.tile(high, (len(times), 1))
 

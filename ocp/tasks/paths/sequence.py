@@ -21,7 +21,7 @@ from .samples import SamplePath
 from .timed import TimedPath
 from .waypoints import WaypointPath
 
-__all__ = ["Piece", "SequencePath", "SinglePath", "check_joints", "lasting"]
+__all__ = ["Piece", "SequencePath", "SinglePath", "check_continuity", "lasting"]
 
 JOINED = 1e-7  # [m, rad, and per second and second squared]: a smaller gap is rounding
 
@@ -61,27 +61,27 @@ class SequencePath(PathBase):
                     f"parts[{index}].path.frame must be {self.frame!r}, the frame of the sequence, "
                     f"got {part.path.frame!r}"
                 )
-        check_joints([(part.path, part.seconds) for part in self.parts], "parts")
+        check_continuity([(part.path, part.seconds) for part in self.parts], "parts")
         return self
 
     @cached_property
-    def joints(self) -> np.ndarray:
+    def boundaries(self) -> np.ndarray:
         """Return the times at which the parts begin, and the end, (n + 1,) [s]."""
         return np.append(0.0, np.cumsum([part.seconds for part in self.parts]))
 
     @property
     @override
     def natural_duration(self) -> float | None:
-        return float(self.joints[-1])
+        return float(self.boundaries[-1])
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
         motion = Motion(*(np.empty((len(times), 6)) for _ in range(3)))
-        which = np.searchsorted(self.joints[1:-1], times, side="right")
+        which = np.searchsorted(self.boundaries[1:-1], times, side="right")
         for index, part in enumerate(self.parts):
             rows = which == index
             if rows.any():
-                piece = part.path.at(times[rows] - self.joints[index], part.seconds)
+                piece = part.path.at(times[rows] - self.boundaries[index], part.seconds)
                 for whole, its in zip(motion, piece, strict=True):
                     whole[rows] = its
         return motion
@@ -107,7 +107,7 @@ def lasting(path: SinglePath, duration: float | None) -> float:
     return duration
 
 
-def check_joints(paths: Sequence[tuple[SinglePath, float]], key: str) -> None:
+def check_continuity(paths: Sequence[tuple[SinglePath, float]], key: str) -> None:
     """Check that each of the paths, with their durations [s], begins where and as the one before ends.
 
     Raises
