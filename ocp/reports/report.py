@@ -239,7 +239,8 @@ def _tensions(plan: Plan) -> list[Fact]:
         ]
     limits = zip(robot.t_min, robot.t_max, strict=True)
     pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
-    slack = "; at least 0 N where cables may be slack" * any(phase.slack for phase in plan.scenario.phases.all)
+    relaxed = robot.t_min.any() and any(phase.slack for phase in plan.scenario.phases.all)
+    slack = "; at least 0 N where cables may be slack" if relaxed else ""
     more = f", and {len(pairs) - 1} more (by cable)" * (len(pairs) > 1)
     return [*facts, ("limits", f"{pairs[0]}{more}{slack}"), *_jumps(plan)]
 
