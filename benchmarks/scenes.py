@@ -272,7 +272,11 @@ def hatch() -> Scene:
         "steps": 40,
         "tube": {"position": "free", "attitude": "free"},
         "base": {"kind": "free"},
-        "limits": {"keep_out": places, "carrier_separation": 0.6},
+        "limits": {
+            "keep_out": places,
+            "carrier_separation": 0.6,
+            "platform_box": {"min": [-4, -4, -2], "max": [4, 4, 5]},
+        },
     }
     return load("multi-quadrotor-3"), task
 

@@ -46,11 +46,19 @@ class ClearSpace:
         needed = np.minimum(self.reserve, (self._at_ends + RISE * away).min(axis=1))
         return kept.slack - needed, kept.points
 
-    def targets(self, rng: Generator) -> Iterator[np.ndarray]:
-        """Yield random configurations that are clear, those that are barely so first of all: they lie in gaps."""
+    def targets(self, rng: Generator, longest: float = np.inf) -> Iterator[np.ndarray]:
+        """Yield random configurations that are clear, those that are barely so first of all: they lie in gaps.
+
+        Paths from start to end through them may be as short as `longest` [m].
+        """
         while True:
             tried = np.array([self.space.sample(rng) for _ in range(TRIED)])
-            yield tried[rng.integers(TRIED)]
+            away = np.linalg.norm((tried[:, None] - self.space.ends) * self.space.scale, axis=2)
+            tried = tried[away.sum(axis=1) < longest]
+            if not len(tried):
+                yield self.space.ends.mean(axis=0)
+                continue
+            yield tried[rng.integers(len(tried))]
             slack, _ = self._evaluate(tried)
             clear = np.flatnonzero(slack >= 0.0)
             if clear.size:
