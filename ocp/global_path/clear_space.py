@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from numpy.random import Generator
@@ -15,8 +16,13 @@ __all__ = ["ClearSpace"]
 OF_END = 0.9  # of the slack at an end: what is kept there, if that is less than the reserve
 RISE = 0.3  # of the distance from such an end: how fast the reserve returns
 STEP = 0.25  # of the robot's size: the longest step between places that are checked for tensions
-BATCH = 16  # places at a time
+FEW, BATCH = 4, 16  # places at a time, first and then
 TRIED, CHOSEN = 64, 6  # random configurations, and how many of those that are clear the trees grow to
+PLACES = 61  # along the direct motion
+ANYWHERE = 0.3  # share of the formations that are to fit elsewhere than in its way
+FORMATIONS = 32  # in each generation of a formation that fits
+SPREADS = (0.4, 0.28, 0.2, 0.14, 0.1, 0.07, 0.05, 0.03)  # of their changes, a generation each
+MOVED = 0.2  # of the robot's size: how far the platform moves for a change of one
 NARROW = 0.03  # of the robot's size: gaps much narrower do not count for more
 
 
@@ -59,6 +65,11 @@ class ClearSpace:
                 yield self.space.ends.mean(axis=0)
                 continue
             yield tried[rng.integers(len(tried))]
+            if self.space.shaped:
+                elsewhere = not len(self._in_the_way) or rng.random() < ANYWHERE
+                fitting = self._fitting(tried[0] if elsewhere else rng.choice(self._in_the_way), rng)
+                if fitting is not None:
+                    yield fitting
             slack, _ = self._evaluate(tried)
             clear = np.flatnonzero(slack >= 0.0)
             if clear.size:
@@ -66,22 +77,51 @@ class ClearSpace:
                 count = min(CHOSEN, clear.size)
                 yield from tried[rng.choice(clear, count, replace=False, p=weight / weight.sum())]
 
+    @cached_property
+    def _in_the_way(self) -> np.ndarray:
+        """Return the configurations of the direct motion that are not clear, (k, count)."""
+        start, end = self.space.ends
+        direct = start + np.linspace(0.0, 1.0, PLACES)[:, None] * (end - start)
+        return direct[self._evaluate(direct)[0] < 0.0]
+
+    def _fitting(self, about: np.ndarray, rng: Generator) -> np.ndarray | None:
+        """Return the configuration near `about` whose formation has the most space; None if even it is not clear.
+
+        In a gap hardly any random formation is clear, but good ones grow out of bad ones by selection.
+        """
+        space = self.space
+        shape = space.groups[-1]
+        tried = np.repeat(about[None], FORMATIONS, axis=0)
+        tried[:, shape] = [space.sample_shape(rng) for _ in range(FORMATIONS)]
+        slack = self._evaluate(tried)[0]
+        step = np.where(shape, 1.0, MOVED * space.size / space.scale)
+        for spread in SPREADS:
+            best = np.argsort(-slack)[: FORMATIONS // 4]
+            more = np.repeat(tried[best], 4, axis=0)
+            more += rng.normal(0.0, spread, more.shape) * step
+            new = np.where(space.is_mirrored(more), -np.inf, self._evaluate(more)[0])
+            tried, slack = np.vstack([tried[best], more]), np.concatenate([slack[best], new])
+        found = int(slack.argmax())
+        return tried[found] if slack[found] >= 0.0 else None
+
     def advance(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return the farthest configuration on the straight way from `start`, which is clear, to `end`."""
+        """Return the farthest configuration on the straight line from `start`, which is clear, to `end`."""
         length = float(np.linalg.norm((end - start) * self.space.scale))
         if length == 0.0:
             return end
         shares = np.linspace(0.0, 1.0, int(np.ceil(length / self._longest)) + 1)
         last = 0.0
-        for first in range(0, len(shares) - 1, BATCH):
-            chunk = shares[first : first + BATCH + 1]
+        first, batch = 0, FEW  # most pieces that are not clear end soon
+        while first < len(shares) - 1:
+            chunk = shares[first : first + batch + 1]
             last = self._clear_until(start, end, chunk)
             if last < chunk[-1]:
                 break
+            first, batch = first + batch, BATCH
         return end if last == 1.0 else start + last * (end - start) if last > 0.0 else start
 
     def _clear_until(self, start: np.ndarray, end: np.ndarray, shares: np.ndarray) -> float:
-        """Return the largest of `shares` of a straight way, or one between, up to which it is clear from the first."""
+        """Return the largest of `shares` of a straight line, or one between, up to which it is clear from the first."""
         slack, points = self._evaluate(start + shares[:, None] * (end - start))
         slack[0] = max(slack[0], 0.0)
         while True:

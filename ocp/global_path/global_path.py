@@ -30,9 +30,9 @@ from .tree import connect
 
 __all__ = ["GlobalPath", "find_global_path"]
 
-RESERVES = (0.05, 0.0125, 0.002)  # of the robot's size, in the order in which they are tried
+RESERVES = (0.02, 0.004)  # of the robot's size, in the order in which they are tried
 MOST_RESERVE = 0.05  # [m]
-MOST = (8_000, 16_000, 16_000)  # configurations that are evaluated with each reserve
+MOST = (20_000, 30_000)  # configurations that are evaluated with each reserve
 AGAIN = 1.0  # of what the first path took: what is spent on a shorter one, past other sides of obstacles
 PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
 
@@ -125,7 +125,15 @@ def _connected(
     """Return a path that is made shorter and smoother, from configurations which one of this length may pass."""
     space = clear.space
     start, end = space.ends
-    path = connect(start, end, space.scale, space.groups[1:], clear.targets(rng, longest), clear.advance, go_on)
+    path = connect(
+        start,
+        end,
+        space.scale,
+        space.groups[-1:] if space.shaped else [],
+        clear.targets(rng, longest),
+        clear.advance,
+        go_on,
+    )
     if path is None:
         return None
     path = shortened(path, space.scale, space.groups, clear.advance, rng, in_time)

@@ -167,16 +167,21 @@ class Space:
             most = self.scenario.task.tube.turn
             value[angles] += np.clip(rng.normal(0.0, most / 2, len(angles)), -most, most)
         if self.shaped and rng.random() > AS_USUAL:
-            value[len(free) :] = self._sample_shape(rng)
+            value[len(free) :] = self.sample_shape(rng)
         return value
 
-    def _sample_shape(self, rng: Generator) -> np.ndarray:
+    def sample_shape(self, rng: Generator) -> np.ndarray:
         """Return a formation of two random factors along random axes, turned at random."""
         first, second = rng.uniform(SMALLEST, self.largest_shape, 2)
         axis = rng.uniform(0.0, np.pi)
         c, s = np.cos(axis), np.sin(axis)
         shape = [first * c**2 + second * s**2, (first - second) * c * s, first * s**2 + second * c**2]
         return np.array([*shape, *[rng.uniform(-np.pi, np.pi)] * self.turns])
+
+    def is_mirrored(self, configurations: np.ndarray) -> np.ndarray:
+        """Return where the formation is turned inside out, (n,): a continuous change leads there only through a line."""
+        xx, xy, yy = configurations[:, self.groups[-1]].T[:3]
+        return xx * yy - xy**2 <= 0.0
 
     def poses(self, configurations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the poses of the platform (n, 6) and of the carriers (n, c, 6)."""

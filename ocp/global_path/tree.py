@@ -72,7 +72,7 @@ def connect(
     scale
         (count,) what the unit of each coordinate counts in distances.
     groups
-        Masks (count,) of coordinates that a tree also tries to change first, before all others.
+        Masks (count,) of coordinates that a tree also tries to change before all others.
     targets
         Configurations to grow to.
     go_on
