@@ -179,7 +179,7 @@ class Space:
         return np.array([*shape, *[rng.uniform(-np.pi, np.pi)] * self.turns])
 
     def is_mirrored(self, configurations: np.ndarray) -> np.ndarray:
-        """Return where the formation is turned inside out, (n,): a continuous change leads there only through a line."""
+        """Return where the formation is turned inside out, (n,): changes lead there only through a line."""
         xx, xy, yy = configurations[:, self.groups[-1]].T[:3]
         return xx * yy - xy**2 <= 0.0
 
