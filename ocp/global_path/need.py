@@ -24,6 +24,8 @@ def is_open(scenario: Scenario) -> bool:
         return False
     if isinstance(task.path, WaypointPath) and task.tube.waypoints == "exact":
         return False
+    if scenario.phases.all:  # loads and limits depend on the time
+        return False
     if scenario.phases.rest or scenario.phases.carry:
         return False  # it has places on its way, and tensions at rest change with the load
     if not {i for i in POSITION if scenario.robot.dof_mask[i]} <= set(scenario.platform_free):
