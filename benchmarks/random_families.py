@@ -157,16 +157,13 @@ def _rack(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
     size = _size(robot)
-    start, end, middle = _apart(rng, robot, 0.3 * size)
-    half = 0.05 * size
-    box = {
-        "kind": "box",
-        "name": "rack",
-        "min": [middle[0] - half, middle[1] - 3 * half, middle[2] - size],
-        "max": [middle[0] + half, middle[1] + 3 * half, middle[2] + half],
-        **_distances(rng, robot),
-    }
-    return name, _past(rng, robot, start, end, [box])
+
+    def places(start: np.ndarray, end: np.ndarray) -> list[dict[str, Any]]:
+        half, middle = 0.05 * size, 0.5 * (start + end)[:3]
+        low, high = middle - [half, 3 * half, size], middle + np.array([half, 3 * half, half])
+        return [{"kind": "box", "name": "rack", "min": low.tolist(), "max": high.tolist()}]
+
+    return name, _past(rng, robot, places, _distances(rng))
 
 
 def _window(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
@@ -174,8 +171,7 @@ def _window(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
     size = _size(robot)
-    start, end, middle = _apart(rng, robot, 0.3 * size)
-    hole = middle + rng.uniform(-0.1, 0.1, 3) * size
+    off = rng.uniform(-0.1, 0.1, 3) * size
     half = 0.5 * float(np.ptp(robot.attachments, axis=0).max()) + 0.1 * size
     far, thick = 3 * size, 0.02 * size
     sides = {
@@ -184,45 +180,56 @@ def _window(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
         "below": ([-half, half], [-far, -half]),
         "above": ([-half, half], [half, far]),
     }
-    across = _across(start, end)  # the axis of the wall's normal, and the other horizontal one
-    walls = []
-    for side, (along, up) in sides.items():
-        low, high = np.zeros(3), np.zeros(3)
-        low[across[0]], high[across[0]] = middle[across[0]] - thick, middle[across[0]] + thick
-        low[across[1]], high[across[1]] = hole[across[1]] + along[0], hole[across[1]] + along[1]
-        low[2], high[2] = hole[2] + up[0], hole[2] + up[1]
-        wall = {"kind": "box", "name": side, "min": low.tolist(), "max": high.tolist()}
-        walls.append({**wall, "cables": None, "carriers": None})
-    return name, _past(rng, robot, start, end, walls)
+
+    def places(start: np.ndarray, end: np.ndarray) -> list[dict[str, Any]]:
+        middle = 0.5 * (start + end)[:3]
+        hole = middle + off
+        normal = int(np.abs(end - start)[:2].argmax())  # of the wall: along this axis the line goes farthest
+        walls = []
+        for side, (along, up) in sides.items():
+            low, high = middle - thick, middle + thick
+            low[1 - normal], high[1 - normal] = hole[1 - normal] + along[0], hole[1 - normal] + along[1]
+            low[2], high[2] = hole[2] + up[0], hole[2] + up[1]
+            walls.append({"kind": "box", "name": side, "min": low.tolist(), "max": high.tolist()})
+        return walls
+
+    return name, _past(rng, robot, places, {"cables": None, "carriers": None})
 
 
-def _apart(rng: np.random.Generator, robot: Robot, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return two places at which the platform can rest, far from each other, and the position between them."""
-    start = _place(rng, robot, reach)
-    others = [_place(rng, robot, reach) for _ in range(20)]
-    end = max(others, key=lambda pose: float(np.linalg.norm((pose - start)[:2])))
-    return start, end, 0.5 * (start + end)[:3]
-
-
-def _across(start: np.ndarray, end: np.ndarray) -> tuple[int, int]:
-    """Return the horizontal axis along which a line goes farthest, then the other one."""
-    first = int(np.abs(end - start)[:2].argmax())
-    return first, 1 - first
-
-
-def _distances(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """Return how far platform, cables and carriers stay from a place."""
+def _distances(rng: np.random.Generator) -> dict[str, Any]:
+    """Return how far platform and cables stay from a place."""
     return {"platform": float(rng.choice([0.0, 0.05])), "cables": None if rng.random() < 0.7 else 0.01}
 
 
 def _past(
-    rng: np.random.Generator, robot: Robot, start: np.ndarray, end: np.ndarray, places: list[dict[str, Any]]
+    rng: np.random.Generator,
+    robot: Robot,
+    places: Callable[[np.ndarray, np.ndarray], list[dict[str, Any]]],
+    distances: dict[str, Any],
 ) -> dict[str, Any]:
-    """Return a task from place to place on any path past obstacles."""
+    """Return a task from place to place on any path past boxes that leave the platform at both ends clear."""
+    reach = 0.3 * _size(robot)
+    start = end = robot.home
+    boxes: list[dict[str, Any]] = []
+    for _ in range(30):
+        start = _place(rng, robot, reach)
+        others = [_place(rng, robot, reach) for _ in range(20)]
+        end = max(others, key=lambda pose: float(np.linalg.norm((pose - start)[:2])))
+        boxes = places(start, end)
+        if min(_outside(robot, pose, box) for pose in (start, end) for box in boxes) > 0.1 * reach:
+            break
     path = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
     tube = {"position": "free", "attitude": float(rng.choice([0.0, 0.2]))}
-    task = {"path": path, "duration": float(rng.uniform(4.0, 8.0)), "tube": tube, "limits": {"keep_out": places}}
+    limits = {"keep_out": [{**box, **distances} for box in boxes]}
+    task = {"path": path, "duration": float(rng.uniform(4.0, 8.0)), "tube": tube, "limits": limits}
     return task | {"steps": 60, "base": _base(rng, robot)}
+
+
+def _outside(robot: Robot, pose: np.ndarray, box: dict[str, Any]) -> float:
+    """Return how far the platform is outside a box [m]; it is nearly level."""
+    points = pose[:3] + np.vstack([robot.attachments, robot.platform.com])
+    beyond = np.maximum(np.array(box["min"]) - points, points - np.array(box["max"]))
+    return float(beyond.max(axis=1).min())
 
 
 def _team(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
