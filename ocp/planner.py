@@ -18,6 +18,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError
 from ..inputs import shown
 from ..models import Robot
@@ -30,6 +32,7 @@ from .cost import cost
 from .durations import Durations, durations
 from .global_path.global_path import find_global_path
 from .global_path.need import guess_exceeds, is_open
+from .nlp.guess import formation_guess, usual_guess
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
 from .relaxations import near_fixed_motion, near_motion
@@ -279,9 +282,12 @@ def _global_path(search: Search) -> Deviation | None:
     if scenario.count == 0 or search.knows(Mesh(scenario.task.steps)) or not is_open(scenario):
         return None
     with search.stage("global path") as stage:
-        exceeded = guess_exceeds(scenario)
+        exceeded = guess_exceeds(scenario, partial(usual_guess, scenario))
         if not exceeded:
             return None
+        if (formation := formation_guess(scenario)) is not None and not guess_exceeds(scenario, formation):
+            stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
+            return formation(np.linspace(0.0, scenario.duration, scenario.task.steps + 1))
         path, message = find_global_path(scenario, GLOBAL_SHARE * scenario.task.time_limit)
         stage.message = f"the direct motion exceeds {exceeded}: {message}"
         return None if path is None else path.guess(scenario)

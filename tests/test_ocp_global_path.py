@@ -1,5 +1,7 @@
 """Paths past obstacles before any program is solved: through holes, round walls; checked by distances of our own."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from towline.ocp import plan
 from towline.ocp.global_path.global_path import find_global_path
 from towline.ocp.global_path.need import guess_exceeds, is_open
 from towline.ocp.global_path.space import Space
+from towline.ocp.nlp.guess import usual_guess
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 
@@ -65,7 +68,7 @@ def through_the_hole():
 def test_a_path_past_walls_is_clear_between_its_places_too(places, through_the_hole):
     scenario = scenario_of(places)
     assert is_open(scenario)
-    assert guess_exceeds(scenario) == "keep_out"
+    assert guess_exceeds(scenario, partial(usual_guess, scenario)) == "keep_out"
     path = through_the_hole if places is WALL_WITH_A_HOLE else find_global_path(scenario)[0]
     assert path is not None
     platform, _ = path.space.poses(path.at(np.linspace(0, 1, FINE)))
@@ -94,8 +97,10 @@ def test_a_path_is_as_short_as_its_corners_permit(through_the_hole):
 def test_the_guess_is_checked_between_its_places():
     """A sheet that is thinner than the steps of the check, and in the middle of one of them, is in the way."""
     thin = [box([0.0102, -FAR, -FAR], [0.0103, FAR, FAR], platform=0.0)]
-    assert guess_exceeds(scenario_of(thin)) == "keep_out"
-    assert guess_exceeds(scenario_of([box([0.1, 1, -FAR], [0.2, FAR, FAR])])) == ""
+    aside = [box([0.1, 1, -FAR], [0.2, FAR, FAR])]
+    for places, exceeded in ((thin, "keep_out"), (aside, "")):
+        scenario = scenario_of(places)
+        assert guess_exceeds(scenario, partial(usual_guess, scenario)) == exceeded
 
 
 def test_no_way_through_ends_in_time():

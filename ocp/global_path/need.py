@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from ..nlp.guess import usual_guess
+from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import WaypointPath
 from ..tasks.scenario import POSITION, Scenario
@@ -39,13 +41,13 @@ def is_open(scenario: Scenario) -> bool:
     return all(np.ptp(values, axis=0).max(initial=0.0) <= STILL for values in given)
 
 
-def guess_exceeds(scenario: Scenario) -> str:
-    """Return the name of the limit that the usual guess exceeds at rest, "tensions", or "" if it keeps all.
+def guess_exceeds(scenario: Scenario, guess_at: Callable[[np.ndarray], Deviation]) -> str:
+    """Return the name of the limit that a guess exceeds at rest, "tensions", or "" if it keeps all.
 
-    Between the places that are checked no distance is exceeded either.
+    Between the places that are checked no distance is exceeded either. `guess_at` returns the guess at times (n,) [s].
     """
     times = np.linspace(0.0, scenario.duration, PLACES)
-    guess, rest = usual_guess(scenario, times), AtRest(scenario, 1.0, spare=0.0)
+    guess, rest = guess_at(times), AtRest(scenario, 1.0, spare=0.0)
 
     def kept_at(times: np.ndarray) -> Kept:
         platform, carriers = scenario.motion(times, guess)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..tasks.ends import fixed_values
 from ..tasks.scenario import POSITION, Scenario
 from .formation import clear_formation
 
-__all__ = ["guess_through", "initial_guess", "usual_guess"]
+__all__ = ["formation_guess", "guess_through", "initial_guess", "usual_guess"]
 
 ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
 
@@ -23,10 +24,14 @@ def initial_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
     keeps them from obstacles (`formation`); others stay. Quadrotors tilt as their thrust has to point. The tensions are
     those of least norm, cut to their limits.
     """
+    in_formation = formation_guess(scenario)
+    return usual_guess(scenario, nodes) if in_formation is None else in_formation(nodes)
+
+
+def formation_guess(scenario: Scenario) -> Callable[[np.ndarray], Deviation] | None:
+    """Return the guess, as a function of its nodes, in the formation that keeps the distances; None if none differs."""
     formation = clear_formation(scenario)
-    if formation is not None:
-        return guess_through(scenario, formation.motion(nodes), nodes)
-    return usual_guess(scenario, nodes)
+    return None if formation is None else lambda nodes: guess_through(scenario, formation.motion(nodes), nodes)
 
 
 def usual_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
