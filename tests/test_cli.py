@@ -178,7 +178,7 @@ base: {kind: free, acceleration_max: 3, ends: periodic}
 
 def test_plan_writes_a_report_and_a_film(tmp_path):
     (tmp_path / "circle.yaml").write_text(FREE_TASK)
-    files = ("--report", "out/plan.html", "--animate", "out/plan.gif", "--speed", "0.5", "--fps", "10")
+    files = ("--report", "out/plan.html", "--animate", "out/plan.gif", "--speed", "0.5", "--fps", "4")
     done = run("plan", "wang-flying", "circle.yaml", *files, "--figures", "out", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -191,11 +191,12 @@ def test_plan_writes_a_report_and_a_film(tmp_path):
     assert "convergence.png" in [Path(picture).name for picture in answer["figures"]]
     with Image.open(tmp_path / "out" / "plan.gif") as film:
         seconds = 2 * 2 * np.pi / 3
-        assert film.n_frames == int(10 * seconds) + 1
-    told = run("plan", "wang-flying", "circle.yaml", "--report", "plan.html", cwd=tmp_path)
+        assert film.n_frames == int(4 * seconds) + 1
+    (tmp_path / "rest.yaml").write_text("name: rest\npath: {kind: rest, pose: [0, 0, -1]}\nduration: 1\n")
+    told = run("plan", "wang-flying", "rest.yaml", "--report", "plan.html", cwd=tmp_path)
     assert told.stderr == ""  # nobody watches
-    assert told.stdout.startswith("wang-flying, circle: FEASIBLE")
-    assert told.stdout.endswith("\n  Written\n    wang-flying-circle.nc\n    plan.html\n")
+    assert told.stdout.startswith("wang-flying, rest: FEASIBLE")
+    assert told.stdout.endswith("\n  Written\n    wang-flying-rest.nc\n    plan.html\n")
 
 
 def test_plan_refuses_a_wrong_film_before_it_plans(tmp_path):

@@ -75,7 +75,7 @@ def ball(centre, radius, **more):
     return {"limits": {"keep_out": [{"kind": "sphere", "centre": list(centre), "radius": radius, **more}]}}
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     at_end=st.booleans(),
     towards=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),

@@ -106,8 +106,8 @@ def test_a_time_limit_ends_a_search():
     assert "time limit" in found.report()
 
 
-def test_four_quadrotors_go_through_a_slot_and_back():
-    robot = load("multi-quadrotor-4")
+def test_quadrotors_go_through_a_slot_and_back():
+    robot = load("multi-quadrotor-3")
     found = plan(robot, there_and_back())
     assert found.feasible, found.report()
     seen = found.audit

@@ -231,7 +231,7 @@ def nearly_unavailable(seed):
 
 def test_no_infeasible_answer_is_without_its_certificate():
     counts = {True: 0, False: 0}
-    for seed in range(1500):
+    for seed in range(500):
         for problem in nearly_unavailable(seed):
             solution = solve(problem)
             proven = solution.status in (Status.INFEASIBLE, Status.SINGULAR)
@@ -241,7 +241,7 @@ def test_no_infeasible_answer_is_without_its_certificate():
                 assert solution.certificate.verify(problem)
                 assert solution.certificate.singular is (solution.status is Status.SINGULAR)
     print("proven and not:", counts)
-    assert min(counts.values()) > 500
+    assert min(counts.values()) > 160
 
 
 def test_the_kernels_own_direction_proves_what_the_projection_misses(monkeypatch):
