@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,6 +74,10 @@ class Plan:
     stages: tuple[Stage, ...] = ()
     objective: float | None = None
     offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle holds: the relaxations, which are computed now, rather than what computes them."""
+        return {**self.__dict__, "offers": partial(tuple, self.relaxations)}
 
     @property
     def feasible(self) -> bool:

@@ -1,5 +1,7 @@
 """What a report offers in place of an infeasible task is feasible when it is planned, and little less is not."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -122,6 +124,16 @@ def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
     rates = np.diff(least_squares.tensions, axis=0) / np.diff(least_squares.times)[:, None]
     assert rate < 0.3 * np.abs(rates).max()
     assert plan(ROBOT, task | {"limits": {"tension_rate": rate}}).feasible
+
+
+def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relaxations():
+    """What computes them holds programs, which no pickle takes."""
+    task = TASK | {"tube": {"position": 0.02}, "steps": 20, "limits": {"tension_rate": 30}}
+    planned = plan(ROBOT, task)
+    assert planned.status is MotionStatus.NOT_FOUND
+    sent = pickle.loads(pickle.dumps(planned))
+    assert [relaxed.to_dict() for relaxed in sent.relaxations] == [each.to_dict() for each in planned.relaxations]
+    assert sent.relaxations
 
 
 def test_limits_of_ones_own_stay_and_stay_soft():
