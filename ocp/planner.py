@@ -277,7 +277,7 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
 
 
 def _global_path(search: Search) -> Deviation | None:
-    """Return a motion past what the usual guess collides with; None if it needs none, or none is found."""
+    """Return a motion past what the usual guess collides with, or the best guess; None if it collides with nothing."""
     scenario = search.scenario
     if scenario.count == 0 or search.knows(Mesh(scenario.task.steps)) or not is_open(scenario):
         return None
@@ -285,12 +285,16 @@ def _global_path(search: Search) -> Deviation | None:
         exceeded = guess_exceeds(scenario, partial(usual_guess, scenario))
         if not exceeded:
             return None
-        if (formation := formation_guess(scenario)) is not None and not guess_exceeds(scenario, formation):
+        nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
+        formation = formation_guess(scenario)
+        if formation is not None and not guess_exceeds(scenario, formation):
             stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
-            return formation(np.linspace(0.0, scenario.duration, scenario.task.steps + 1))
+            return formation(nodes)
         path, message = find_global_path(scenario, GLOBAL_SHARE * scenario.task.time_limit)
         stage.message = f"the direct motion exceeds {exceeded}: {message}"
-        return None if path is None else path.guess(scenario)
+        if path is not None:
+            return path.guess(scenario)
+        return None if formation is None else formation(nodes)
 
 
 def _coarse(search: Search, start: Deviation | None) -> Deviation | None:
