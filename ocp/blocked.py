@@ -53,6 +53,11 @@ class Blocked(NamedTuple):
             lines.append(f"no tensions at t = {self.certificate.time:.3f} s")
         return "; ".join(lines)
 
+    @property
+    def by_rates(self) -> bool:
+        """Return whether only speeds and accelerations are exceeded, which fall with a longer duration."""
+        return self.certificate is None and all("/s" in excess.unit for excess in self.excess)
+
     def of(self, audit: Audit) -> Audit:
         """Return an audit that shows what is proven, and no more."""
         return replace(audit, excess=self.excess, certificate=self.certificate)

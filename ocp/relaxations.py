@@ -54,10 +54,12 @@ def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None
     return _other_duration(search, scenario, left, audit) + (chosen or _other_limits(search, scenario, None, audit))
 
 
-def near_motion(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
+def near_motion(
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool = True
+) -> list[Relaxed]:
     """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one."""
     limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
-    return _longer_duration(search) + limits
+    return (_longer_duration(search) if slower_helps else []) + limits
 
 
 def _other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:

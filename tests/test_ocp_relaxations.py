@@ -114,6 +114,16 @@ def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
         assert plan(ROBOT, with_change(task, relaxed)).feasible
 
 
+def test_no_longer_duration_is_tried_where_an_end_is_in_the_way(monkeypatch):
+    """That would be a program or two for nothing: whether an end is inside a ball does not depend on time."""
+    durations = []
+    monkeypatch.setattr(relaxations, "_longer_duration", lambda search: durations.append(search) or [])
+    for limits in ({"keep_out": [{**BALL, "centre": [0.5, 0.3, 1.2], "cables": None}]}, {"platform_speed": 0.2}):
+        task = TASK | {"tube": {"position": 0.02}, "steps": 20, "limits": limits}
+        _ = plan(ROBOT, task).relaxations
+    assert len(durations) == 1
+
+
 def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
     path = {**LINE, "end": [0.6, 0.4, 1.6]}
     task = {"path": path, "duration": 1, "steps": 40, "limits": {"tension_rate": 100}}
