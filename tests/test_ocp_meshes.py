@@ -57,7 +57,7 @@ def from_triangles(triangles):
 
 
 def heights(points, p):
-    """How far p is beyond the plane of each face of a hull, (n,)."""
+    """Return how far p is beyond the plane of each face of a hull, (n,)."""
     equations = ConvexHull(points).equations
     return equations[:, :3] @ p + equations[:, 3]
 

@@ -159,9 +159,8 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
         at, near, far, *further = _off_path(audited, end + steps)
         speed = (-3 * at + 4 * near - far) / (2 * inwards * STEP)
         acceleration = np.array([2.0, -5.0, 4.0, -1.0]) @ np.stack([at, *further]) / CURVED_STEP**2
-        if (
-            word == "rest" and scenario.platform_free
-        ):  # the motion itself stands still, in the frame of its path: otherwise it moves as the path
+        # The motion itself rests, in the frame of its path; without freedom it moves as the path does.
+        if word == "rest" and scenario.platform_free:
             of_path = scenario.path.at(np.array([end]), scenario.duration)
             speed, acceleration = speed + of_path.velocity[0], acceleration + of_path.acceleration[0]
         values_of = [(at, "", PATH_TOLERANCE), (speed, "/s", END_TOLERANCE)]

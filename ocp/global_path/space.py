@@ -26,10 +26,8 @@ HOME_SHAPE = (1.0, 0.0, 1.0)
 SMALLEST = 0.15  # of a formation's size, across
 FLATTEST = 0.97  # of a cable's length: its largest horizontal part
 AS_USUAL = 0.5  # share of the samples that leave attitude, or formation, as it is at the ends
-ANYWHERE, NEAR = (
-    0.5,
-    0.3,
-)  # shares of the samples: in the whole box, and about the line between the ends; the rest is on it
+ANYWHERE = 0.5  # share of the samples in the whole box
+NEAR = 0.3  # share of those about the line between the ends; the rest is on it
 SPREAD = 0.3  # of the box: the farthest that those about it are
 SMALL = 0.1  # of the distance of the ends: the smallest size that a robot counts as
 AROUND = 1.0  # of the distance of the ends, about them: where a platform without frame and box may go
