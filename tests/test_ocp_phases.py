@@ -58,7 +58,7 @@ def with_load(robot, carried):
 
 
 def balance(planned):
-    """Return what the cables pull and the ground pushes on the platform at each audited instant, (n, 3) [N], from the file."""
+    """Return the force of cables and ground on the platform at each audited instant, (n, 3) [N], from the file."""
     robot, audit = planned.scenario.robot, planned.audit
     turned = Rotation.from_euler("ZYX", audit.motion.pose[:, 5:2:-1]).as_matrix()
     attachments = audit.motion.pose[:, None, :3] + np.einsum("nij,mj->nmi", turned, robot.attachments)
