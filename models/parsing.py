@@ -272,9 +272,9 @@ def _close(text: str, known: list[str]) -> str:
 
 
 def _resolve(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    """Follow references, and the one object among alternatives, to the schema that has the properties."""
+    """Follow references, and the one object among alternatives, to the schema that has the properties or the kinds."""
     for option in node.get("anyOf", []):
-        if "$ref" in option:
+        if "$ref" in option or "discriminator" in option:
             node = option
     if "$ref" in node:
         return schema["$defs"][node["$ref"].rsplit("/", 1)[1]]

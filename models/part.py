@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from typing_extensions import override
 
 from ..errors import InputError
 
@@ -68,6 +69,14 @@ class Part(BaseModel):
             return super().model_validate(obj, **options)
         except ValidationError as error:
             raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
+
+
+    @override
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other is of the same class with equal fields, whatever either has computed from them."""
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
 
 
 class Box(Part):

@@ -373,3 +373,45 @@ def test_a_sweep_varies_a_phase_by_its_number():
     cases.check()
     assert [cases.case(number)[1].seconds for number in range(2)] == [8.0, 10.0]
     assert cases.units() == ("s",)
+
+
+def test_a_copy_with_other_phases_has_their_path():
+    """`model_copy` checks nothing and computes nothing: the path of the phases before would be followed."""
+    whole = Task.model_validate({"phases": [line(HIGH, LOW, name="down"), line(LOW, HIGH, name="up")]})
+    part = whole.model_copy(update={"phases": whole.phases[:1]})
+    assert part.path.natural_duration == 2.0
+    assert part == Task.model_validate({"phases": [line(HIGH, LOW, name="down")]})
+
+
+def test_tasks_with_phases_are_equal_whatever_was_computed_from_them():
+    """What a path has computed stays in it, as arrays, which have no single truth value."""
+    ours, theirs = (Task.model_validate({"phases": [line(HIGH, LOW, name="down")]}) for _ in range(2))
+    assert plan(COGIRO, ours).feasible
+    assert ours == theirs
+    assert plan(COGIRO, theirs).feasible
+    assert ours == theirs
+    assert ours != ours.model_copy(update={"margin": 1.0})
+
+
+def test_a_phase_between_two_instants_of_the_audit_is_refused():
+    """Nothing would be evaluated in it: a load of 100 t for a third of a millisecond passed."""
+    rest = {"kind": "rest", "pose": HIGH}
+    phases = [{"name": name, "path": rest, "duration": 1.0001} for name in ("before", "short", "after")]
+    phases[1] |= {"duration": 0.0003, "load": {"mass": 1e5}}
+    with pytest.raises(InputError, match=r"phases\[1\] must last at least 0.01 s.* got 0.0003 s"):
+        plan(COGIRO, {"phases": phases})
+    phases[1]["duration"] = 0.01
+    assert not plan(COGIRO, {"phases": phases}).feasible
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ({"kind": "lin"}, "phases[0].path.kind must be one of circle, line, rest, samples, timed, waypoints, got 'lin'"),
+        ({"kind": "line", "start": HIGH}, "phases[0].path.end is missing"),
+    ],
+)
+def test_the_path_of_a_phase_is_named_like_that_of_a_task(path, message):
+    with pytest.raises(InputError) as refused:
+        Task.model_validate({"phases": [{"name": "a", "path": path, "duration": 1}]})
+    assert message in str(refused.value)

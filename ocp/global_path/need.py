@@ -28,8 +28,6 @@ def is_open(scenario: Scenario) -> bool:
         return False
     if scenario.phases.all:  # loads and limits depend on the time
         return False
-    if scenario.phases.rest or scenario.phases.carry:
-        return False  # it has places on its way, and tensions at rest change with the load
     if not {i for i in POSITION if scenario.robot.dof_mask[i]} <= set(scenario.platform_free):
         return False
     platform, carriers = scenario.references(np.linspace(0.0, scenario.duration, PLACES))

@@ -11,7 +11,7 @@ from .paths import SequencePath
 from .phase import Ground
 from .phases import LaidPhase, Phases
 from .resting import support_forces
-from .scenario import Scenario
+from .scenario import AUDIT_RATE, Scenario
 from .scheme import SCHEMES
 from .task import Task
 from .wind_set import WindBox
@@ -19,6 +19,7 @@ from .wind_set import WindBox
 __all__ = ["LEAST_STEPS", "lay_out_phases"]
 
 LEAST_STEPS = 4  # of a phase
+LEAST_INSTANTS = 10  # of the audit, in a phase
 BALANCED = 1e-9  # of the wrench: what supports miss of it
 
 
@@ -122,6 +123,12 @@ def _supported(scenario: Scenario, columns: np.ndarray, needed: np.ndarray, name
 def _check_program(scenario: Scenario, phases: Phases, where: str) -> None:
     """Refuse what a program with phases cannot do."""
     task = scenario.task
+    for index, phase in enumerate(phases.all):
+        if phase.end - phase.start < (1 - 1e-6) * LEAST_INSTANTS / AUDIT_RATE:
+            raise InputError(
+                f"{where}: phases[{index}] must last at least {LEAST_INSTANTS / AUDIT_RATE:g} s, in which the audit "
+                f"evaluates {LEAST_INSTANTS} instants, got {phase.end - phase.start:g} s"
+            )
     least = LEAST_STEPS * len(phases.all)
     if task.steps < least:
         raise InputError(f"{where}: steps must be at least {LEAST_STEPS} for each phase, {least}, got {task.steps}")

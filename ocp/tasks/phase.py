@@ -59,7 +59,7 @@ class Phase(Part):
 
     name: Name
     path: SinglePath | None = Field(default=None, description="default: rest where the phase before ends")
-    duration: Positive | None = Field(default=None, description="[s]; default: the path's own")
+    duration: Positive | None = Field(default=None, description="[s], at least 0.01; default: the path's own")
     load: Load | None = Field(default=None, description="carried beside the platform; default: nothing")
     ground: Ground | None = Field(
         default=None, description="the platform rests on the ground, or what it carries does; default: it hangs"

@@ -201,6 +201,14 @@ class Task(Part):
         return self
 
     @override
+    def model_copy(self, **options: Any) -> Self:
+        """Return a copy, by `options` of pydantic; its `path` is that of its phases, if it has some."""
+        copy = super().model_copy(**options)
+        if copy.phases is not None:
+            object.__setattr__(copy, "path", path_of(copy.phases))
+        return copy
+
+    @override
     def model_dump(self, **options: Any) -> dict[str, Any]:
         """Return the fields, by `options` of pydantic; without `path` if that follows from `phases`.
 
