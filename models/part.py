@@ -70,7 +70,6 @@ class Part(BaseModel):
         except ValidationError as error:
             raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
 
-
     @override
     def __eq__(self, other: object) -> bool:
         """Return whether the other is of the same class with equal fields, whatever either has computed from them."""
