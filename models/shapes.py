@@ -8,6 +8,8 @@ from typing import Any, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
+from ..errors import InputError
+from ..inputs import shown
 from .part import AT_ORIGIN, Part, Pose, Positive, Vector3
 from .points import placed, rotations
 from .polyhedron import Polyhedron, convex_hull, polyhedron
@@ -116,19 +118,24 @@ class ConvexMesh(Part):
             return data
         if set(data) - set(cls.model_fields):  # a misspelt key is reported before what is missing without it
             return data
-        name, scale = data["file"], data.get("scale")
+        name, scale, hull = data["file"], data.get("scale"), data.get("hull", False)
         if data.get("vertices"):
             raise ValueError(f"vertices must be left out, since file has them, got both and {name!r}")
         if scale is None:
             raise ValueError(
                 f"scale must be given with the file {name!r}, since STL has no unit: 0.001 for millimetres"
             )
-        triangles = read_stl((info.context or {}).get("folder", Path()) / name)
+        if not isinstance(hull, bool):  # any text is true, "no" too
+            raise ValueError(f"hull of the file {name!r} must be true or false, got {shown(hull)}")
+        try:
+            triangles = read_stl((info.context or {}).get("folder", Path()) / name)
+        except InputError as error:
+            raise ValueError(f"file {error}") from None
         try:
             body = convex_hull(triangles.reshape(-1, 3))
         except ValueError as error:
             raise ValueError(f"file {name!r} {error}") from None
-        dent = 0.0 if data.get("hull") else _dent(body, triangles)
+        dent = 0.0 if hull else _dent(body, triangles)
         if dent > DENT * body.size:
             by = dent * scale if isinstance(scale, int | float) else dent
             raise ValueError(

@@ -16,7 +16,8 @@ __all__ = ["read_stl"]
 
 LARGEST_FILE = 50_000_000  # [bytes], a million triangles
 HEADER, RECORD = 84, 50  # bytes of a binary file: before the triangles, and of each
-VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  # in small letters
+MARK = b"\xef\xbb\xbf"  # with which some editors begin a text in UTF-8
 
 
 def read_stl(path: Path) -> np.ndarray:
@@ -30,8 +31,9 @@ def read_stl(path: Path) -> np.ndarray:
     """
     where, content = printable(path.name), read_bytes(path, "an STL file", LARGEST_FILE)
     count = int.from_bytes(content[HEADER - 4 : HEADER], "little") if len(content) >= HEADER else 0
-    if content[:5].lower() == b"solid" and len(content) != HEADER + RECORD * count:
-        triangles = _from_text(content, where)
+    begins = content[:HEADER].removeprefix(MARK).lstrip()
+    if begins[:5].lower() == b"solid" and len(content) != HEADER + RECORD * count:
+        triangles = _from_text(content.lower(), where)
     else:
         triangles = _from_binary(content, count, where)
     if not len(triangles):
@@ -46,7 +48,9 @@ def read_stl(path: Path) -> np.ndarray:
 
 def _from_binary(content: bytes, count: int, where: str) -> np.ndarray:
     if len(content) < HEADER:
-        raise InputError(f"{where} must be an STL file, got {len(content)} bytes that are none")
+        raise InputError(f"{where} must be an STL file, got {len(content)} bytes, fewer than its header has")
+    if HEADER + RECORD * count > LARGEST_FILE:  # four bytes of anything else are a number too
+        raise InputError(f"{where} must be an STL file, got other content")
     if len(content) < HEADER + RECORD * count:
         raise InputError(
             f"{where} must have the {count} triangles that its header states, {HEADER + RECORD * count} bytes, got "

@@ -175,7 +175,12 @@ def l_shape():
     return np.array(sides + [level[list(corners)] for level in (low, high) for corners in flat])
 
 
-@pytest.mark.parametrize("written", [binary_stl, text_stl, lambda t: binary_stl(t, b"solid but binary")])
+def shouted_stl(triangles):
+    """Text in capitals, behind a byte order mark and an empty line, as some programs write it."""
+    return b"\xef\xbb\xbf\r\n" + text_stl(triangles).upper().replace(b"\n", b"\r\n")
+
+
+@pytest.mark.parametrize("written", [binary_stl, text_stl, shouted_stl, lambda t: binary_stl(t, b"solid but binary")])
 def test_a_mesh_of_a_file_is_that_of_its_corners(tmp_path, written):
     """And a saved task does not need the file any more."""
     (tmp_path / "parts").mkdir()
@@ -201,10 +206,12 @@ def wrong(content, message, **fields):
 @pytest.mark.parametrize(
     ("content", "fields", "message"),
     [
-        wrong(b"", "0 bytes that are none"),
+        wrong(b"", "keep_out[0].file part.stl must be an STL file, got 0 bytes"),
         wrong(b"\x89PNG" * 10, "must be an STL file"),
+        wrong(b"\x89PNG" * 100, "must be an STL file, got other content"),
+        wrong(binary_stl(l_shape()), "hull of the file 'part.stl' must be true or false, got 'no'", hull="no"),
         wrong(binary_stl(triangles_of(PRISM))[:-7], "must have the 8 triangles that its header states"),
-        wrong(bytes(80) + b"\xff\xff\xff\xff", "must have the 4294967295 triangles"),
+        wrong(bytes(80) + b"\xff\xff\xff\xff", "must be an STL file, got other content"),
         wrong(bytes(84), "must have triangles, got none"),
         wrong(binary_stl(np.full((4, 3, 3), np.nan)), "finite coordinates up to 1e+09, got others in triangle 1"),
         wrong(text_stl(triangles_of(PRISM))[:300], "text that is cut off"),
@@ -215,6 +222,7 @@ def wrong(content, message, **fields):
         wrong(binary_stl(CUBE[[[0, 1, 2], [1, 2, 3]]]), "file 'part.stl' must span a body, got 4 different points"),
         wrong(binary_stl(l_shape()), "must be convex, got a surface up to 0.000707 m inside its convex hull"),
         wrong(None, "part.stl: no such file"),
+        wrong(None, "keep_out[0].file"),
     ],
 )
 def test_wrong_files_are_one_line(tmp_path, content, fields, message):
