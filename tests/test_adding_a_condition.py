@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +10,10 @@ import pytest
 from towline.models import Dynamics, load
 from towline.workspace import Condition, Places, StaticEquilibrium, sample
 
+from .warm import run, towline
+
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "adding-a-condition.md").read_text()
-TOWLINE = Path(sys.executable).with_name("towline")
 HIGH = '{"kind": "above-ground", "height": 0.3}'
 
 
@@ -26,15 +25,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def run(folder, *command):
-    done = subprocess.run([str(part) for part in command], cwd=folder, capture_output=True, text=True, check=False)
-    assert "Traceback" not in done.stderr, done.stderr
-    return done
-
-
 def test_the_example_runs_and_resumes(folder):
     """Compute in another way that every accepted place is at rest and above the ground."""
-    done = run(folder, sys.executable, "conditions_of_mine.py")
+    done = run(folder / "conditions_of_mine.py", cwd=folder)
     both, lowest, high = done.stdout.split()
     robot = load("cogiro")
     found = sample(robot, StaticEquilibrium(), samples=40_000, keep="all")
@@ -50,9 +43,9 @@ def test_the_example_runs_and_resumes(folder):
     checkpoint = folder / "run.checkpoint"
     whole = checkpoint.read_bytes()
     checkpoint.write_bytes(whole[: len(whole) // 2])
-    command = [TOWLINE, "workspace", "cogiro", "--define", "conditions_of_mine.py", "--samples", "40000", "--json"]
+    command = ["workspace", "cogiro", "--define", "conditions_of_mine.py", "--samples", "40000", "--json"]
     command += ["--condition", "static-equilibrium", "--condition", HIGH]
-    done = run(folder, *command, "--resume", "run.checkpoint", "--workers", "2")
+    done = towline(*command, "--resume", "run.checkpoint", "--workers", "2", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["accepted"] == int(both)
     assert checkpoint.read_bytes() == whole
@@ -70,7 +63,7 @@ def test_the_example_runs_and_resumes(folder):
 def test_a_file_that_cannot_be_imported_is_one_line(tmp_path, file, text, message):
     if text is not None:
         (tmp_path / file).write_text(text)
-    done = run(tmp_path, TOWLINE, "workspace", "cogiro", "--define", file, "--condition", HIGH)
+    done = towline("workspace", "cogiro", "--define", file, "--condition", HIGH, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"towline: --define must be a Python file that can be imported, got {file} (")
     assert message in done.stderr

@@ -1,4 +1,4 @@
-"""The command line through its real entry point: what it prints, what it writes, its exit codes, and no traceback."""
+"""The command line through its entry point: what it prints, what it writes, its exit codes, and no traceback."""
 
 import json
 import os
@@ -15,16 +15,8 @@ from PIL import Image
 from towline.models import available, load
 from towline.models.library import FOLDER
 
-TOWLINE = Path(sys.executable).with_name("towline")
-
-
-def run(*arguments, cwd=None):
-    """Run towline; nothing that it does may show a traceback."""
-    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
-    command = [str(TOWLINE), *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=120, check=False)
-    assert "Traceback" not in done.stderr + done.stdout
-    return done
+from .warm import TOWLINE
+from .warm import towline as run
 
 
 @pytest.fixture(scope="module")
@@ -309,7 +301,9 @@ def test_wrong_arguments_are_one_line_and_exit_code_2(arguments, message):
 
 
 def test_version_and_help():
-    assert run("--version").stdout.strip() == "towline 0.2.0"
+    """The version by a process of its own, as users start it."""
+    version = subprocess.run([TOWLINE, "--version"], capture_output=True, text=True, check=True).stdout
+    assert version.strip() == "towline 0.2.0"
     for command in ("demo", "robots", "tension", "plan", "export"):
         assert run(command, "--help").returncode == 0
     # Units are in brackets, which a mark-up may take for its own.

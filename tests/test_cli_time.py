@@ -1,8 +1,6 @@
-"""`towline time` and the schema of tasks, through the real entry point."""
+"""`towline time` and the schema of tasks, through the entry point."""
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,9 +12,10 @@ from towline.models.parsing import parse_yaml
 from towline.ocp import Task, read_task
 from towline.ocp import plan as plan_motion
 
+from .warm import towline as run
+
 pytest.importorskip("toppra")
 
-TOWLINE = Path(sys.executable).with_name("towline")
 GRAVITY = 9.81
 ROBOT = """\
 name: hoist
@@ -30,14 +29,6 @@ name: lift
 path: {kind: line, start: [0, 0, 0.5], end: [0, 0, 1.5]}
 duration: 9
 """
-
-
-def run(*arguments, cwd):
-    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
-    command = [str(TOWLINE), *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=120, check=False)
-    assert "Traceback" not in done.stderr + done.stdout
-    return done
 
 
 @pytest.fixture

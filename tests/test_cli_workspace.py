@@ -1,10 +1,7 @@
-"""`towline workspace` through the real entry point."""
+"""`towline workspace` through the entry point."""
 
 import json
 import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +12,8 @@ from towline.cli.tension import METHODS
 from towline.cli.workspace import CONDITIONS
 from towline.workspace import Condition
 
-TOWLINE = Path(sys.executable).with_name("towline")
+from .warm import towline
+
 ROBOT = """\
 name: hanging-mass
 source: a test, a point mass on three cables from a triangle of 2 m x 3 m
@@ -30,11 +28,7 @@ BOX = "-1 0 0; 1 3 2"
 
 
 def run(*arguments, cwd):
-    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
-    command = [str(TOWLINE), "workspace", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=120, check=False)
-    assert "Traceback" not in done.stderr + done.stdout
-    return done
+    return towline("workspace", *arguments, cwd=cwd)
 
 
 @pytest.fixture

@@ -1,14 +1,14 @@
-"""Each script in `examples/` does what it says, run as a user runs it: in a folder of its own."""
+"""Each script in `examples/` does what it says, run as a user runs it, as a script in a folder of its own."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
+
+from .warm import run
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
@@ -98,7 +98,7 @@ SHOWN = {
 def test_an_example_does_what_it_says(name, tmp_path):
     script = ROOT / "examples" / f"{name}.py"
     assert len(script.read_text().splitlines()) <= MOST_LINES
-    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = run(script, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert re.search(rf"{name.replace('_', '-')}: FEASIBLE", done.stdout), done.stdout
     if name == "flying_circle":

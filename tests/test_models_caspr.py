@@ -3,10 +3,7 @@
 import json
 import os
 import re
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +14,7 @@ from towline.models.caspr import read_caspr
 from towline.models.parsing import parse_yaml, to_yaml
 
 from .caspr_xml import BODIES, CABLES, REAL, write
+from .warm import towline as run
 
 needs_real = pytest.mark.skipif(not REAL.is_dir(), reason=f"the CASPR robots are not there: {REAL}")
 
@@ -422,15 +420,6 @@ def test_real_robots_have_the_wrench_matrix_of_their_xml(folder):
             continue  # the direction depends on the pulley; models/cables has its own tests
         np.testing.assert_allclose(Dynamics(robot).wrench_matrix(robot.home), np.array(columns).T, atol=1e-12)
         assert len(columns) == robot.m
-
-
-TOWLINE = Path(sys.executable).with_name("towline")
-
-
-def run(*arguments, cwd=None):
-    done = subprocess.run([str(TOWLINE), *map(str, arguments)], capture_output=True, text=True, cwd=cwd, check=False)
-    assert "Traceback" not in done.stderr + done.stdout
-    return done
 
 
 def test_command_writes_a_file_that_loads(tmp_path):

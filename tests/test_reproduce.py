@@ -37,6 +37,8 @@ from towline.studies.flying import (
     wind,
 )
 
+from .warm import towline
+
 CHEAP = [
     parameters,
     pairing,
@@ -284,10 +286,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
 
 
 def test_an_unknown_paper_is_one_line(tmp_path):
-    towline = Path(sys.executable).with_name("towline")
-    done = subprocess.run(
-        [str(towline), "reproduce", "walking"], capture_output=True, text=True, cwd=tmp_path, check=False
-    )
+    done = towline("reproduce", "walking", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("towline: PAPER must be one of flying, ctmrts, got 'walking'")
     assert done.stderr.count("\n") == 1

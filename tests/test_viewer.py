@@ -2,7 +2,6 @@
 
 import ast
 import json
-import os
 import re
 import socket
 import subprocess
@@ -27,7 +26,8 @@ from towline.viewer.sliders import poses, sliders
 from towline.viewer.words import readout
 from towline.workspace import StaticEquilibrium, sample, save
 
-TOWLINE = Path(sys.executable).with_name("towline")
+from .warm import towline
+
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}
 
 
@@ -271,21 +271,15 @@ def test_names_from_files_cannot_be_code(folder, tmp_path):
     assert "<script>alert(1)" not in page
 
 
-def run(*arguments, cwd):
-    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
-    command = [str(TOWLINE), "view", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=60, check=False)
-
-
 def test_the_command_writes_a_page_and_nothing_else(folder, tmp_path):
-    done = run(folder / "hover.nc", "--html", "page.html", "--json", cwd=tmp_path)
+    done = towline("view", folder / "hover.nc", "--html", "page.html", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {"kind": "plan", "robot": "wang-flying", "file": "page.html"}
     page = (tmp_path / "page.html").read_text()
     assert not re.search(r"""(src|href)\s*=\s*["']https?:""", page)
     assert "t_max = 60 N" in page
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
-    done = run("wang-flyin", "--html", "other.html", cwd=tmp_path)
+    done = towline("view", "wang-flyin", "--html", "other.html", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "other.html").exists()
