@@ -2,8 +2,8 @@
 
 Where the platform starts and ends, and along a path that it must follow, some coordinates have no freedom. Whether a
 limit that depends on these alone is kept does not depend on the planner. Nor does whether tensions exist, where the
-task fixes all of platform and carriers. A distance from an obstacle changes by at most the distance that points of the
-platform can move inside the tube.
+task fixes all of platform and carriers, or whether all cables together can carry the weight. A distance from an
+obstacle changes by at most the distance that points of the platform can move inside the tube.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from .tasks.ends import AT_REST, fixed_values
 from .tasks.paths import Motion
 from .tasks.scenario import ATTITUDE, Scenario
 from .too_fast import too_fast
+from .too_heavy import OF_WEIGHT, too_heavy
 
 __all__ = ["Blocked", "blocked"]
 
@@ -58,6 +59,11 @@ class Blocked(NamedTuple):
         """Return whether only speeds and accelerations are exceeded, which fall with a longer duration."""
         return self.certificate is None and all("/s" in excess.unit for excess in self.excess)
 
+    @property
+    def by_weight(self) -> bool:
+        """Return whether the robot is too weak for what it carries, which no other field of the task changes."""
+        return any(excess.limit in OF_WEIGHT for excess in self.excess)
+
     def of(self, audit: Audit) -> Audit:
         """Return an audit that shows what is proven, and no more."""
         return replace(audit, excess=self.excess, certificate=self.certificate)
@@ -73,6 +79,7 @@ def blocked(scenario: Scenario) -> Blocked | None:
     known = {(excess.limit, excess.about) for excess in proven}
     hurried = _hurried(scenario, times, freedom, platform, carriers)
     proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
+    proven += too_heavy(scenario, _resting(freedom, platform, carriers))
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
     return Blocked(proven, certificate) if proven or certificate is not None else None
 
@@ -178,10 +185,15 @@ def _hurried(
     for row, kind in enumerate(which):
         spread[:, row] = np.where((freedom[kind][:, 0] == FREE).any(axis=1), np.inf, 0.0)
         spread[0, row] += _reach(scenario, freedom[kind])
-    speeds = np.concatenate([platform.velocity[None], carriers.velocity.swapaxes(0, 1)])[:, :2, :3]
-    given = np.stack([freedom[end][:, 1, :3] == GIVEN for end in (0, 1)], axis=1)
-    moving = ~given | (np.abs(speeds) >= AT_REST)
-    return too_fast(scenario, times[order], poses, spread[:, order], ~np.any(moving, axis=(1, 2)))
+    resting = np.all(_resting(freedom, platform, carriers, 3), axis=0)
+    return too_fast(scenario, times[order], poses, spread[:, order], resting)
+
+
+def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:
+    """Return which of platform and carriers have no speed in the first coordinates at start and end, (2, 1 + c)."""
+    speeds = np.concatenate([platform.velocity[:2, None], carriers.velocity[:2]], axis=1)[:, :, :count]
+    given = np.stack([freedom[end][:, 1, :count] == GIVEN for end in (0, 1)])
+    return np.all(given & (np.abs(speeds) < AT_REST), axis=2)
 
 
 def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -240,7 +240,8 @@ def _blocked(search: Search) -> Plan | None:
     motion = between_fixed_values(slowest)
     audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
-    offers = partial(near_motion, search, slowest, motion, audited, slower_helps=proof.by_rates)
+    near = partial(near_motion, search, slowest, motion, audited, slower_helps=proof.by_rates)
+    offers = tuple if proof.by_weight else near
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 
 
