@@ -192,13 +192,13 @@ def _fixed_motion(search: Search) -> Plan:
     start = time.perf_counter()
     audit = search.audit_motion(search.scenario, None)
     spent = time.perf_counter() - start
-    status = MotionStatus.FEASIBLE if audit.passed else MotionStatus.INFEASIBLE
+    status, reason = MotionStatus.FEASIBLE if audit.passed else MotionStatus.INFEASIBLE, ""
     if not audit.passed and other_tensions_may_pass(search.scenario, audit):
         chosen = _free_motion(search, None)
         if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, audit):
             return chosen
-        status = MotionStatus.NOT_FOUND
-    plan = Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent)
+        status, reason = MotionStatus.NOT_FOUND, chosen.reason
+    plan = Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, reason=reason)
     if audit.passed:
         weighed = search.scenario.task.objective
         if weighed.margin is weighed.tension_rate is None or not other_tensions_exist(search.scenario, audit):

@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
-from towline.ocp import plan
+from towline.ocp import MotionStatus, plan
 
 GRAVITY = 9.81
 FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
@@ -120,6 +120,14 @@ def test_tension_rates_hold_in_the_saved_trajectory():
     found = plan(robot, {**task, "limits": {"tension_rate": 0.5 * before}})
     assert found.feasible, found.report()
     assert fastest(found) <= 0.5 * before * (1 + 1e-3)
+
+
+def test_a_given_motion_without_tensions_that_rise_slowly_enough_has_a_reason():
+    path = {"kind": "line", "start": [0, 0, 2], "end": [0.5, 0, 2.4]}
+    failed = plan("cogiro", {"path": path, "duration": 1, "steps": 8, "limits": {"tension_rate": 5}})
+    assert failed.status is MotionStatus.NOT_FOUND
+    assert failed.reason.startswith("the motion with the least missing wrench is short by")
+    assert failed.reason in failed.report().splitlines()[0]
 
 
 def test_what_the_audit_reports_is_kept_clear_of_on_the_next_mesh():
