@@ -6,14 +6,14 @@ export PYTHONDONTWRITEBYTECODE :=
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
-.PHONY: demo test setup lint types unit docs errata pictures clean
+.PHONY: demo test setup lint types kernels unit docs errata pictures clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
 
-# The tests have two workers of their own; what comes before them has not.
+# The tests have two workers of their own; what comes before them has not, and the type checker takes longest.
 test: .venv/dev.stamp
-	$(MAKE) --jobs=2 lint types docs
+	$(MAKE) --jobs=2 lint types kernels docs
 	$(MAKE) unit
 
 setup: .venv/dev.stamp
@@ -24,6 +24,10 @@ lint: .venv/dev.stamp
 
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
+
+# The solvers' machine code, once; otherwise the tests' processes compute without it until one of them compiles it.
+kernels: .venv/dev.stamp
+	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once.
 unit: .venv/dev.stamp
@@ -52,12 +56,16 @@ pictures: .venv/core.stamp
 clean:
 	rm -rf .venv towline-demo build site *.egg-info
 
-.venv/core.stamp: pyproject.toml constraints.txt
+.venv/venv.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
+	touch $@
+
+.venv/core.stamp: pyproject.toml constraints.txt | .venv/venv.stamp
 	$(INSTALL) .
 	touch $@
 
-.venv/dev.stamp: .venv/core.stamp
+# One installation, not one after the core's: each builds towline anew.
+.venv/dev.stamp: pyproject.toml constraints.txt | .venv/venv.stamp
 	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,notebooks,timing,viewer]"
-	touch $@
+	touch .venv/core.stamp $@
