@@ -138,7 +138,7 @@ def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
 
 def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relaxations():
     """What computes them holds programs, which no pickle takes."""
-    task = TASK | {"tube": {"position": 0.02}, "steps": 20, "limits": {"tension_rate": 30}}
+    task = TASK | {"tube": {"position": 0.02}, "steps": 12, "limits": {"tension_rate": 3}}
     planned = plan(ROBOT, task)
     assert planned.status is MotionStatus.NOT_FOUND
     sent = pickle.loads(pickle.dumps(planned))
