@@ -22,7 +22,7 @@ class PhaseSummary(NamedTuple):
     load
         The mass that the platform carries [kg].
     tension_min, tension_max
-        Smallest and largest audited tension [N]; None if at some time there are none.
+        Smallest and largest audited tension [N]; None if at some time there are none, or none were evaluated.
     reaction_max
         The largest sum of the forces of the ground [N]; None for a phase without ground, or without tensions.
     """
@@ -41,7 +41,7 @@ def summaries(scenario: Scenario, audit: Audit) -> tuple[PhaseSummary, ...]:
     result = []
     for phase in scenario.phases.all:
         tensions = audit.tensions[rows := scenario.phases.index_at(audit.times) == scenario.phases.all.index(phase)]
-        there = bool(np.isfinite(tensions).all())
+        there = bool(tensions.size and np.isfinite(tensions).all())  # what is only shown may step over a short phase
         extremes = (float(tensions.min()), float(tensions.max())) if there else (None, None)
         reaction = None
         if phase.rests and there and audit.supports is not None:

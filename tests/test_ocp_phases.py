@@ -327,7 +327,10 @@ def phase(index, **fields):
         (changed(path={"kind": "rest", "pose": LOW}), "path must be left out with phases"),
         (changed(steps=20), "steps must be at least 4 for each phase, 24, got 20"),
         (changed(solver="fatrop"), "solver must be ipopt with phases, got fatrop"),
-        (changed(tube={"position": 0.1}, scheme="spline"), "scheme must be another than spline with phases"),
+        (
+            changed(tube={"position": 0.1}, scheme="spline"),
+            "scheme must be one of constant, linear, hermite, gauss with phases, got",
+        ),
         (changed(tube={"position": 0.1}, scheme="gauss"), "scheme must be one of linear, hermite with a phase on the"),
         (changed(tube={"position": 0.1, "waypoints": "exact"}), "tube.waypoints must be free with phases"),
         ({"phases": TAKE_OFF, "objective": {"margin": 5}}, "phases.ground.slack must be false with a margin to choose"),
@@ -415,3 +418,14 @@ def test_the_path_of_a_phase_is_named_like_that_of_a_task(path, message):
     with pytest.raises(InputError) as refused:
         Task.model_validate({"phases": [{"name": "a", "path": path, "duration": 1}]})
     assert message in str(refused.value)
+
+
+def test_a_phase_that_an_infeasible_motion_steps_over_has_no_tensions():
+    """What is proven impossible is only shown, at the samples of the output: here every tenth of a second."""
+    short = line(HIGH, [0, 0, 2.3], name="short", duration=0.02)
+    phases = [line(LOW, HIGH, name="up", duration=1.01), short, line([0, 0, 2.3], HIGH, name="down", duration=0.97)]
+    limits = {"platform_speed": 0.1}
+    shown = plan(COGIRO, {"phases": phases, "tube": {"position": 0.01}, "limits": limits, "output_rate": 10})
+    assert shown.status is MotionStatus.INFEASIBLE
+    assert shown.phases[1].tension_max is None
+    assert "short" in shown.report()

@@ -137,7 +137,8 @@ def _check_program(scenario: Scenario, phases: Phases, where: str) -> None:
     if task.solver == "fatrop":
         raise InputError(f"{where}: solver must be ipopt with phases, got fatrop")
     if scenario.count and SCHEMES[task.scheme].smooth:
-        raise InputError(f"{where}: scheme must be another than {task.scheme} with phases")
+        accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if not scheme.smooth)
+        raise InputError(f"{where}: scheme must be one of {accepted} with phases, got {task.scheme}")
     if not phases.rest:
         return
     if not SCHEMES[task.scheme].continuous:
