@@ -130,6 +130,15 @@ def test_a_given_motion_without_tensions_that_rise_slowly_enough_has_a_reason():
     assert failed.reason in failed.report().splitlines()[0]
 
 
+def test_a_program_with_more_equations_than_unknowns_is_an_answer_without_a_warning(capfd):
+    """Quadrotors that hold their places give no force across their thrust: few motions do without, or none."""
+    path = {"kind": "line", "start": [0, 0, 0], "end": [0.03, -0.04, 0.02]}
+    tube = {"position": 0.05, "attitude": 0.1}
+    held = plan("flycrane", {"path": path, "duration": 1, "steps": 4, "scheme": "gauss", "tube": tube})
+    assert held.status is MotionStatus.NOT_FOUND
+    assert capfd.readouterr() == ("", "")
+
+
 def test_what_the_audit_reports_is_kept_clear_of_on_the_next_mesh():
     """Between nodes the rates of 8 cables exceed theirs by a fifth on 40 steps, and by a twentieth on 160."""
     path = {"kind": "line", "start": [-0.5, 0.3, 2.0], "end": [0.4, -0.2, 2.1]}
