@@ -16,8 +16,8 @@ from towline.benchmarks.tension_tasks import KINDS, make_task
 from towline.errors import InputError
 from towline.solvers import certify
 
+from . import warm
 from .references import optimum_by_enumeration
-from .warm import run, towline
 
 FOLDER = Path(__file__).parent.parent / "benchmarks" / "cdpr_qpbenchmark"
 
@@ -72,7 +72,7 @@ def test_qpbenchmark_runs_it_from_its_own_command_line(tmp_path):
 
 
 def test_the_data_are_what_the_generator_makes(tmp_path, test_set):
-    done = run(FOLDER / "generate" / "generate.py", tmp_path)
+    done = warm.run(FOLDER / "generate" / "generate.py", tmp_path)
     assert done.returncode == 0, done.stderr
     made = module(FOLDER / "cdpr_qpbenchmark.py").CdprQpbenchmark
     for name in ("cdpr.parquet", "cdpr_infeasible.parquet"):
@@ -141,7 +141,7 @@ def test_tasks_are_what_they_are_called(kind):
 def bench(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     options = ["--count", "3", "--repeats", "1", "--m", "8", "--json", "--out", folder]
-    done = towline("bench", "tension", *options)
+    done = warm.towline("bench", "tension", *options)
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)
 
@@ -204,7 +204,7 @@ def test_who_hangs_or_breaks_is_out_and_the_others_go_on():
     ],
 )
 def test_bench_refuses_in_one_line(arguments, told):
-    done = towline("bench", "tension", *arguments)
+    done = warm.towline("bench", "tension", *arguments)
     assert done.returncode == 2
     assert told in done.stderr
 

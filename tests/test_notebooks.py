@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 
 import nbformat
 import pytest
+from jupyter_client.manager import KernelManager
 from nbclient import NotebookClient
 from traitlets.config import Config
 
@@ -34,8 +35,19 @@ def test_they_are_all_there():
     assert [path.stem for path in NOTEBOOKS] == wanted
 
 
+@pytest.fixture(scope="module")
+def kernel():
+    """Start one process for all notebooks, since each would spend seconds on the same imports."""
+    with TemporaryDirectory() as folder:  # sockets instead of ports; their paths have to be short
+        sockets = Config({"KernelManager": {"transport": "ipc", "ip": str(Path(folder) / "kernel")}})
+        manager = KernelManager(kernel_name="python3", config=sockets)
+        manager.start_kernel()
+        yield manager
+        manager.shutdown_kernel(now=True)
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs_and_says_the_same(path, tmp_path):
+def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
     assert path.stat().st_size < MOST_BYTES
     stored, fresh = (nbformat.read(path, as_version=4) for _ in range(2))
     assert 8 <= len(stored.cells) <= 17
@@ -43,10 +55,9 @@ def test_a_notebook_runs_and_says_the_same(path, tmp_path):
     shown = [out for cell in code(stored) for out in cell.outputs]
     assert {out.output_type for out in shown} <= {"stream", "display_data", "execute_result"}
     assert any("image/png" in out.get("data", {}) for out in shown)
-    place = {"metadata": {"path": str(tmp_path)}}
-    with TemporaryDirectory() as folder:  # sockets instead of ports; their paths have to be short
-        sockets = Config({"KernelManager": {"transport": "ipc", "ip": str(Path(folder) / "kernel")}})
-        NotebookClient(fresh, kernel_name="python3", config=sockets, timeout=MOST_SECONDS, resources=place).execute()
+    # It begins without the names of the notebook before, in a folder of its own.
+    fresh.cells.insert(0, nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {tmp_path}"))
+    NotebookClient(fresh, km=kernel, timeout=MOST_SECONDS).execute()
     words, numbers = verdicts(stored)
     assert words
     assert verdicts(fresh)[0] == words
