@@ -394,3 +394,17 @@ def test_a_corner_that_is_cut_between_nodes_is_kept_clear_by_the_next_program():
     assert found.feasible, found.report()
     audits = [stage.message for stage in found.stages if stage.name == "audit"]
     assert audits == ["1 other limit exceeded", "passed"]
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        {"kind": "sphere", "centre": [0, 0, 1], "radius": 1e-6},
+        {"kind": "box", "min": [0, 0, 0], "max": [1, 1, 2e-6]},
+        {"kind": "mesh", "vertices": CUBE.tolist(), "scale": 1e-300},
+    ],
+)
+def test_what_is_thinner_than_the_rounding_of_distances_is_refused(place):
+    """A platform that passed through it was feasible, since its distance was rounded to zero, or a division failed."""
+    with pytest.raises(InputError, match=r"limits.keep_out\[0\] must be at least 1e-05 m thick, got "):
+        read_task({"path": {"kind": "rest", "pose": [0, 0, 1]}, "limits": {"keep_out": [place]}})

@@ -32,6 +32,8 @@ OF_CARRIERS = (
 # Limits that come from places in the frame of the platform.
 OF_BODY = ("cable_platform_clearance", "carrier_platform_clearance")
 
+THINNEST = 1e-5  # [m] of a place: distances are rounded by a tenth of it where things touch
+
 
 class KeepOut(Part):
     """The base of all places to keep out of: by how much platform, carriers and cables stay outside.
@@ -50,6 +52,13 @@ class KeepOut(Part):
     platform: Distance = 0.0
     carriers: Distance = 0.0
     cables: Distance = 0.0
+
+    @model_validator(mode="after")
+    def _thick_enough(self) -> Self:
+        thickness = getattr(self, "thickness", np.inf)  # that of the shape, which each subclass adds
+        if thickness < THINNEST:
+            raise ValueError(f"must be at least {THINNEST:g} m thick, got {thickness:.3g} m")
+        return self
 
 
 class Sphere(KeepOut, shapes.Sphere):
