@@ -429,3 +429,14 @@ def test_a_phase_that_an_infeasible_motion_steps_over_has_no_tensions():
     assert shown.status is MotionStatus.INFEASIBLE
     assert shown.phases[1].tension_max is None
     assert "short" in shown.report()
+
+
+def test_a_certificate_of_slack_cables_has_their_lower_limit():
+    """A load beside its only support: the cables that would have to push have 0 N, not t_min and the margin."""
+    ground = {"slack": True, "support": [[0, 0, 0]]}
+    rest = {"name": "tilting", "duration": 1, "path": {"kind": "rest", "pose": HIGH}, "ground": ground}
+    tilting = plan(COGIRO, {"margin": 20, "phases": [rest | {"load": {"mass": 1e5, "com": [2, 0, 0]}}]})
+    assert tilting.status is MotionStatus.INFEASIBLE
+    (limits,) = (text for text in tilting.report().splitlines() if "t_min of cables" in text)
+    assert "(0 N); t_max of cables" in limits
+    assert "(4980 N)" in limits

@@ -199,7 +199,8 @@ def _relaxation(plan: Plan, relaxed: Relaxed) -> Fact:
 
 def _bounds(plan: Plan, certificate: Certificate) -> str:
     """Return the tension limits of a certificate with their values; empty if no cable pulls along it."""
-    low, high = plan.scenario.bounds()
+    scenario, time = plan.scenario, certificate.time
+    low, high = scenario.bounds_in(None if time is None else scenario.phases.at(time))
     limits = [
         f"{name} of {'cables' if len(cables) > 1 else 'cable'} {', '.join(str(k + 1) for k in cables)} "
         f"({quantity_row(np.unique(bound[cables]), 'N')})"
