@@ -63,7 +63,7 @@ def _mean_rate(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray) 
     pair, which = np.unravel_index(rate.argmax(), rate.shape)
     if rate[pair, which] > limit.high + limit.tolerance:
         begin, end = float(times[first[pair]]), float(times[last[pair]])
-        why = f"mean from there to t = {end:.3f} s, at least"
+        why = f"the smallest possible mean speed until t = {end:.3f} s"
         yield Excess(limit.name, limit.labels[which], begin, float(rate[pair, which]), limit.high, limit.unit, why=why)
 
 
@@ -71,7 +71,11 @@ def _acceleration(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarra
     """Yield the limit of an acceleration if that of a motion within off (n,) of x (n, 3) must exceed it."""
     whole = times[-1] - times[0]
     moved = np.linalg.norm(x[-1] - x[0]) - off[-1] - off[0]
-    worst, at, why = 4 * moved / whole**2 if rests else -np.inf, 0.0, "least from rest to rest in this time"
+    worst, at, why = (
+        4 * moved / whole**2 if rests else -np.inf,
+        0.0,
+        "the smallest possible from rest to rest in this time",
+    )
     for steps in range(1, (len(times) - 1) // 2 + 1):
         before, here, after = slice(None, -2 * steps), slice(steps, -steps), slice(2 * steps, None)
         bent = np.linalg.norm(x[before] - 2 * x[here] + x[after], axis=1) - off[before] - 2 * off[here] - off[after]

@@ -319,7 +319,7 @@ def phase(index, **fields):
         (phase(0, duration=None), r"phases\[0\].duration must be a number > 0 \[s\] for a path of kind line"),
         (phase(0, path=None), r"phases\[0\].path must be a path, since no phase comes before"),
         (phase(3, name="lift"), r"phases\[3\].name must be unique, got 'lift' twice"),
-        (phase(0, ground={}), r"phases\[0\].path must be of kind rest on the ground, got line"),
+        (phase(0, ground={}), r"phases\[0\].path must be of kind rest in a phase on the ground, got line"),
         (phase(1, load=None), r"phases\[1\].load must weigh at least as much as that of phases\[2\]"),
         (phase(1, ground={"support": [[2, 0, 0], [2, 1, 0]]}), r"phases\[1\].ground.support must have points about"),
         (phase(1, ground={"suport": []}), "suport is not a known key, did you mean 'support'"),
@@ -412,11 +412,15 @@ def test_a_phase_between_two_instants_of_the_audit_is_refused():
     [
         ({"kind": "lin"}, "phases[0].path.kind must be one of circle, line, rest, samples, timed, waypoints, got"),
         ({"kind": "line", "start": HIGH}, "phases[0].path.end is missing"),
+        (
+            {"kind": "rest", "pose": HIGH, "frame": "moon"},
+            "phases[0].path.frame must be one of world, frame, got 'moon'",
+        ),
     ],
 )
 def test_the_path_of_a_phase_is_named_like_that_of_a_task(path, message):
     with pytest.raises(InputError) as refused:
-        Task.model_validate({"phases": [{"name": "a", "path": path, "duration": 1}]})
+        plan(COGIRO, {"phases": [{"name": "a", "path": path, "duration": 1}]})
     assert message in str(refused.value)
 
 

@@ -129,7 +129,8 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
     only = robot.carriers[0].name if len(robot.carriers) == 1 else None
     if frame != "world" and frame != only:
         accepted = "world" if only is None else f"world, {only}"
-        raise InputError(f"{where}: path.frame must be one of {accepted}, got {frame!r}")
+        key = "path.frame" if task.phases is None else "phases[0].path.frame"
+        raise InputError(f"{where}: {key} must be one of {accepted}, got {frame!r}")
     return frame != "world"
 
 

@@ -89,7 +89,7 @@ def path_of(phases: Sequence[Phase]) -> SequencePath:
         if joined and path.frame != joined[0][0].frame:
             raise ValueError(f"{key}.path.frame must be {joined[0][0].frame!r}, as before, got {path.frame!r}")
         if phase.ground is not None and not isinstance(path, RestPath):
-            raise ValueError(f"{key}.path must be of kind rest on the ground, got {path.kind}")
+            raise ValueError(f"{key}.path must be of kind rest in a phase on the ground, got {path.kind}")
         try:
             joined.append((path, lasting(path, phase.duration)))
         except ValueError as error:

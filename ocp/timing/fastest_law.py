@@ -111,7 +111,9 @@ def _check(robot: Robot, task: Task) -> None:
     """
     where = f"task {task.name!r}"
     if task.phases is not None:
-        raise InputError(f"{where}: phases must be left out to time a path, got {len(task.phases)}; plan them instead")
+        raise InputError(
+            f"{where}: phases must be left out to time a path, got {len(task.phases)} phases; plan the task instead"
+        )
     if isinstance(task.base, FreeBase):
         raise InputError(f"{where}: base.kind must be hold or given to time a path, got 'free'")
     if task.tube.radius or task.tube.turn:
