@@ -16,6 +16,8 @@ from hypothesis.extra.numpy import mutually_broadcastable_shapes
 from towline.errors import InputError, SolverError
 from towline.models import Dynamics, available, batch, kernel, load, tape
 
+from . import warm
+
 RELATIVE = 1e-14
 UNARY = [
     "sqrt",
@@ -364,33 +366,34 @@ print("compiled" if recorder.buffer else "loaded")
 """
 
 
-def other_process(number, folder, **environment):
-    """Start a process that evaluates sin(x) times `number`."""
-    return subprocess.Popen(
-        [sys.executable, "-c", _OTHER_PROCESS.format(number=number)],
-        env=os.environ | {"TOWLINE_CACHE": str(folder)} | environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+@pytest.fixture
+def other_process(tmp_path_factory):
+    """Return a function that lets a process evaluate sin(x) times a number, and returns what it did for that."""
+    script = tmp_path_factory.mktemp("script") / "script.py"
+
+    def evaluate(number, folder):
+        script.write_text(_OTHER_PROCESS.format(number=number))
+        done = warm.run(script, env=os.environ | {"TOWLINE_CACHE": str(folder)})
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr
+        return done.stdout.strip()
+
+    return evaluate
 
 
-def outcome(process):
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == 0, err
-    assert not err
-    return out.strip()
+def test_the_next_process_loads(tmp_path, other_process):
+    assert other_process(3.0, tmp_path) == "compiled"
+    assert other_process(3.0, tmp_path) == "loaded"
 
 
-def test_the_next_process_loads(tmp_path):
-    assert outcome(other_process(3.0, tmp_path)) == "compiled"
-    assert outcome(other_process(3.0, tmp_path)) == "loaded"
-
-
-def test_two_processes_at_once(tmp_path):
-    for process in [other_process(4.0, tmp_path) for _ in range(3)]:
-        assert outcome(process) in ("compiled", "loaded")
-    assert outcome(other_process(4.0, tmp_path)) == "loaded"
+def test_three_processes_at_once(tmp_path, other_process):
+    command = [sys.executable, "-c", _OTHER_PROCESS.format(number=4.0)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment = os.environ | {"TOWLINE_CACHE": str(tmp_path)}
+    for process in [subprocess.Popen(command, env=environment, **pipes) for _ in range(3)]:
+        out, err = process.communicate(timeout=120)
+        assert (process.returncode, err) == (0, ""), err
+        assert out.strip() in ("compiled", "loaded")
+    assert other_process(4.0, tmp_path) == "loaded"
 
 
 def spoil(file, how):
@@ -406,15 +409,15 @@ def spoil(file, how):
 
 
 @pytest.mark.parametrize("how", ["cut", "emptied", "flipped"])
-def test_a_spoiled_cache_is_made_anew(tmp_path, how):
+def test_a_spoiled_cache_is_made_anew(tmp_path, how, other_process):
     """Any of its files: nothing breaks, and the process after next loads again."""
-    assert outcome(other_process(5.0, tmp_path)) == "compiled"
+    assert other_process(5.0, tmp_path) == "compiled"
     files = [file for file in tmp_path.rglob("*") if file.is_file()]
     assert len(files) == 4  # source, Numba's index and machine code, seal
     for file in files:
         spoil(file, how)
-    assert outcome(other_process(5.0, tmp_path)) == "compiled"
-    assert outcome(other_process(5.0, tmp_path)) == "loaded"
+    assert other_process(5.0, tmp_path) == "compiled"
+    assert other_process(5.0, tmp_path) == "loaded"
 
 
 def test_each_file_spoiled_alone(tmp_path):
@@ -432,10 +435,10 @@ def test_each_file_spoiled_alone(tmp_path):
             assert kernel._is_intact(folder, source)
 
 
-def test_no_place_to_write(tmp_path):
+def test_no_place_to_write(tmp_path, other_process):
     (tmp_path / "file").touch()
-    assert outcome(other_process(7.0, tmp_path / "file")) == "compiled"
-    assert outcome(other_process(7.0, "/proc/none")) == "compiled"
+    assert other_process(7.0, tmp_path / "file") == "compiled"
+    assert other_process(7.0, "/proc/none") == "compiled"
 
 
 def test_where_the_cache_is(monkeypatch, tmp_path):
