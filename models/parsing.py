@@ -23,6 +23,7 @@ from .schema import json_schema
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
+NAMES = 'must have only letters, digits, ".", "_" and "-", and begin with a letter or digit'  # `part.Name`
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -143,7 +144,7 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         message = f"must be a mapping with {_keys(node)}, got {shown(value)}"
     else:
-        message = detail["msg"]
+        message = NAMES if kind == "string_pattern_mismatch" else detail["msg"]
         if kind != "value_error" or not isinstance(value, dict):
             message += f", got {shown(value)}"
     if not field:

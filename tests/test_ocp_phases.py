@@ -444,3 +444,8 @@ def test_a_certificate_of_slack_cables_has_their_lower_limit():
     (limits,) = (text for text in tilting.report().splitlines() if "t_min of cables" in text)
     assert "(0 N); t_max of cables" in limits
     assert "(4980 N)" in limits
+
+
+def test_a_phase_with_a_space_in_its_name_is_refused_in_words():
+    with pytest.raises(InputError, match=r"phases\[0\].name must have only letters, digits, .* got 'pick up'"):
+        Task.model_validate({"phases": [line(HIGH, LOW, name="pick up")]})
