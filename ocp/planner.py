@@ -32,12 +32,13 @@ from .cost import cost
 from .durations import Durations, durations
 from .global_path.global_path import find_global_path
 from .global_path.need import guess_exceeds, is_open
+from .global_path.space import Space
 from .nlp.guess import formation_guess, usual_guess
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
 from .relaxations import near_fixed_motion, near_motion
 from .result import Plan
-from .search import ENDS, Search
+from .search import Search, ended
 from .start import deviation_from
 from .status import MotionStatus
 from .tasks.deviation import Deviation
@@ -277,18 +278,21 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
-def _global_path(search: Search) -> Deviation | None:
-    """Return a motion past what the usual guess collides with, or the best guess; None if it collides with nothing."""
+def _global_path(search: Search, balance: bool) -> Deviation | None:
+    """Return a motion past what the usual guess collides with, or the best guess; None if it collides with nothing.
+
+    With `balance` a place without tensions at rest counts as a collision.
+    """
     scenario = search.scenario
-    if scenario.count == 0 or search.knows(Mesh(scenario.task.steps)) or not is_open(scenario):
+    if scenario.count == 0 or not is_open(scenario):
         return None
     with search.stage("global path") as stage:
-        exceeded = guess_exceeds(scenario, partial(usual_guess, scenario))
+        exceeded = guess_exceeds(scenario, partial(usual_guess, scenario), balance)
         if not exceeded:
             return None
         nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
         formation = formation_guess(scenario)
-        if formation is not None and not guess_exceeds(scenario, formation):
+        if formation is not None and not guess_exceeds(scenario, formation, balance):
             stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
             return formation(nodes)
         path, message = find_global_path(scenario, GLOBAL_SHARE * scenario.task.time_limit)
@@ -301,7 +305,7 @@ def _global_path(search: Search) -> Deviation | None:
 def _coarse(search: Search, start: Deviation | None) -> Deviation | None:
     """Return the optimum on a coarse mesh, to start a fine one from; None if that would save no time."""
     steps, coarse = search.scenario.task.steps, COARSE_OF_MANY if search.scenario.count > MANY else COARSE
-    if steps < 4 * coarse or search.knows(Mesh(steps)):
+    if steps < 4 * coarse:
         return None
     outcome = search.solve("coarse program", Mesh(coarse), start)
     return outcome.deviation if outcome.success else None
@@ -310,18 +314,36 @@ def _coarse(search: Search, start: Deviation | None) -> Deviation | None:
 def _free_motion(search: Search, start: Deviation | None) -> Plan:
     """Solve, audit and refine; if the program has no solution, search for the closest motion first."""
     scenario = search.scenario
-    steps = scenario.task.steps
-    start, given = _global_path(search) if start is None else start, start is not None
-    coarse = None if given else _coarse(search, start)
-    outcome = search.solve("nonlinear program", Mesh(steps), coarse or start, coarser=coarse is not None)
+    mesh = Mesh(scenario.task.steps)
+    guessed = start is None and not search.knows(mesh)
+    # The program alone gets past most places without tensions at rest, unless another formation is what they need.
+    team = bool(Space(scenario).loose)
+    if guessed:
+        start = _global_path(search, balance=team)
+    outcome = _from_near(search, mesh, start, guessed)
+    if not outcome.success and guessed and not team and search.seconds_left > 0:
+        path = _global_path(search, balance=True)
+        if path is not None:
+            start, outcome = path, search.solve("nonlinear program", mesh, path)
     if not outcome.success and search.seconds_left > 0:
-        closest = search.solve("elastic program", Mesh(steps, elastic=True), start)
+        closest = search.solve("elastic program", Mesh(mesh.steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
             short = quantity(closest.slack, "N")
             return _closest(search, f"the motion with the least missing wrench is short by {short} at its nodes")
-        outcome = search.solve("nonlinear program", Mesh(steps), closest.deviation)
+        outcome = search.solve("nonlinear program", mesh, closest.deviation)
     return _closest(search, _refine(search, outcome))
+
+
+def _from_near(search: Search, mesh: Mesh, start: Deviation | None, guessed: bool) -> Outcome:
+    """Solve the program from a motion that is nearer to its solution than `start`, if there is one."""
+    near = None if search.knows(mesh) else search.approach(mesh, start)
+    if near is None and guessed:
+        near = _coarse(search, start)
+    outcome = search.solve("nonlinear program", mesh, near or start, coarser=near is not None)
+    if outcome.success or near is None or search.seconds_left <= 0:
+        return outcome
+    return search.solve("nonlinear program", mesh, start)
 
 
 def _closest(search: Search, reason: str) -> Plan:
@@ -347,12 +369,11 @@ def _refine(search: Search, outcome: Outcome) -> str:
         shrink = SHRINK * attempt if audit.excess else shrink
         further = _missed(scenario, audit, further) if outcome.success else ()  # not again what had no solution
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
-        outcome = search.solve("nonlinear program", mesh, outcome.deviation)
+        outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
         audit = search.audit(outcome)
     if outcome.success:
         return f"the audit reports violations up to the finest mesh, {steps} steps"
-    ended = ENDS.get(outcome.message, f"stopped ({outcome.message})")
-    return f"nonlinear program of {steps} steps: {ended}"
+    return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
 
 
 def _missed(

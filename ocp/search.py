@@ -7,9 +7,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from operator import itemgetter
 
+import numpy as np
+
 from ..text import quantity
 from .audits.audit import Audit, audit
-from .nlp.program import build
+from .nlp.grid import Grid
+from .nlp.guess import initial_guess
+from .nlp.linear import LinearDistances
+from .nlp.near import Near, is_local
+from .nlp.program import Program, build
 from .nlp.rows import Mesh
 from .nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from .nlp.waiting import wait_for
@@ -23,6 +29,11 @@ from .violation import relative_violation
 __all__ = ["Search"]
 
 
+NEAR = 0.3  # of a motion's extent: where a place is, of which a program has rows the first time
+PASSES = 3
+APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
+USABLE = 1e-2  # of it: what the true program makes up for
+GAIN = 0.02  # of the objective: less of it is not worth another pass
 ENDS = {  # of a run of the solver, by its message; others are quoted
     "Solve_Succeeded": "solved",
     "Solved_To_Acceptable_Level": "solved with less accuracy",
@@ -46,6 +57,7 @@ class Search:
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
+        self._linear: dict[Mesh, LinearDistances] = {}
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
@@ -78,25 +90,77 @@ class Search:
         A guess is `coarser` if it is the same task's optimum on a coarser mesh.
         """
         with self.stage(f"{name}, {mesh.steps} steps") as stage:
-            start = time.perf_counter()
-            if mesh not in self._solvers:
-                self._solvers[mesh] = wait_for(lambda: Solver(build(self.scenario, mesh)))
-            solver = self._solvers[mesh]
-            solver.prepare(guess, coarser)
-            built = time.perf_counter()
-            at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
-            try:
-                outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
-            except BaseException:
-                self._interrupted = None if mesh.elastic else solver.interrupted
-                raise
-            self.build_s += built - start
-            self.solve_s += time.perf_counter() - built
-            ended = ENDS.get(outcome.message, f"stopped ({outcome.message})")
-            stage.message = f"{ended} {'in' if ended == 'solved' else 'after'} {outcome.iterations} iterations"
+            outcome = self._run(mesh, guess, coarser, NEAR if coarser else np.inf)
+            if (
+                outcome.success
+                and self.seconds_left > 0
+                and not self._solvers[mesh].program.suffices(outcome.deviation)
+            ):
+                outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf)
+            how = ended(outcome.message)
+            stage.message = f"{how} {'in' if how == 'solved' else 'after'} {outcome.iterations} iterations"
             if mesh.elastic:
                 stage.message += f", short by {quantity(outcome.slack, 'N')}"
         return outcome
+
+    def approach(self, mesh: Mesh, guess: Deviation | None) -> Deviation | None:
+        """Return a motion past the places that are in the way, from which the program of `mesh` soon ends, or None.
+
+        It results from passes with linear distances, each about the motion of the one before.
+        """
+        scenario = self.scenario
+        if not any(is_local(limit) for limit in scenario.limits) or scenario.task.solver == "fatrop":
+            return None
+        with self.stage(f"program with linear distances, {mesh.steps} steps") as stage:
+            start = time.perf_counter()
+            if mesh not in self._linear:
+                self._linear[mesh] = wait_for(lambda: LinearDistances(build(scenario, mesh)))
+            linear = self._linear[mesh]
+            self.build_s += time.perf_counter() - start
+            motion = initial_guess(scenario, linear.shares * scenario.duration) if guess is None else guess
+            motion = motion.at(linear.shares * motion.nodes[-1])
+            objective, iterations, missed = np.inf, 0, np.inf
+            for passed in range(PASSES):
+                start = time.perf_counter()
+                outcome = linear.solve(motion, self._iteration, passed > 0, self.seconds_left)
+                self.solve_s += time.perf_counter() - start
+                iterations += outcome.iterations
+                stage.message = f"{ended(outcome.message)} after {iterations} iterations in pass {passed + 1}"
+                if not outcome.success:
+                    break
+                motion, missed = outcome.deviation, linear.missed(outcome.deviation)
+                if missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective):
+                    break
+                objective = outcome.objective
+        return motion if missed <= USABLE else None
+
+    def _run(self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float) -> Outcome:
+        """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""
+        start = time.perf_counter()
+        known = self._solvers.get(mesh)
+        if known is None or (guess is not None and not np.isfinite(reach) and not known.program.near.is_everywhere):
+            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
+        solver = self._solvers[mesh]
+        solver.prepare(guess, coarser)
+        built = time.perf_counter()
+        at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
+        try:
+            outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
+        except BaseException:
+            self._interrupted = None if mesh.elastic else solver.interrupted
+            raise
+        self.build_s += built - start
+        self.solve_s += time.perf_counter() - built
+        return outcome
+
+    def _built(self, mesh: Mesh, guess: Deviation | None, reach: float) -> Program:
+        """Return the program of `mesh`, without the rows of places that are farther than `reach` from the guess."""
+        scenario = self.scenario
+        if not any(is_local(limit) for limit in scenario.limits) or not np.isfinite(reach):
+            return build(scenario, mesh)
+        shares = Grid.of(scenario, mesh.steps).shares
+        motion = initial_guess(scenario, shares * scenario.duration) if guess is None else guess
+        return build(scenario, mesh, Near.along(scenario, shares, motion, reach))
 
     def audit(self, outcome: Outcome) -> Audit:
         """Audit the motion of a program's solution, which `best` then chooses from."""
@@ -140,6 +204,11 @@ class Search:
             audited = audit(scenario, deviation)
             stage.message = "passed" if audited.passed else describe(audited)
         return audited
+
+
+def ended(message: str) -> str:
+    """Return how a run of the solver ended, from its message."""
+    return ENDS.get(message, f"stopped ({message})")
 
 
 def describe(audited: Audit) -> str:

@@ -52,11 +52,12 @@ class _Balance(NamedTuple):
 class AtRest:
     """Evaluate the hard limits of a scenario, and whether there are tensions, for platform and carriers at rest.
 
-    Limits of other units than metres are kept or not: their slack is in parts of the robot's size.
+    Limits of other units than metres are kept or not: their slack is in parts of the robot's size. Without `balance`
+    it does not matter whether there are tensions.
     """
 
-    def __init__(self, scenario: Scenario, size: float, spare: float = SPARE):
-        self.scenario, self.size, self.spare = scenario, size, spare
+    def __init__(self, scenario: Scenario, size: float, spare: float = SPARE, balance: bool = True):
+        self.scenario, self.size, self.spare, self.balance = scenario, size, spare, balance
         robot = scenario.robot
         self._tilting = [
             i for i, carrier in enumerate(robot.carriers) if carrier.efforts and (i, 3) in scenario.carrier_free
@@ -95,6 +96,7 @@ class AtRest:
         A, w, tensions, exist = balance.A, balance.w, balance.tensions, balance.exists
         slack, worst = self._slack(platform, self._tilted(A, carriers, tensions), tensions, off_path)
         # The exact solver decides only where nothing else does: it takes longer than all limits.
+        exist |= not self.balance
         open_ones = np.flatnonzero((slack >= 0.0) & ~exist)
         if open_ones.size and balance.spans:
             exist[open_ones] = solve_batch(A[open_ones], w[open_ones], *self._bounds).feasible

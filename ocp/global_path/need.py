@@ -32,20 +32,23 @@ def is_open(scenario: Scenario) -> bool:
         return False
     platform, carriers = scenario.references(np.linspace(0.0, scenario.duration, PLACES))
     loose = Space(scenario).loose
-    given = [np.delete(platform.pose, scenario.platform_free, axis=1)]
-    given += [carrier.pose for i, carrier in enumerate(carriers) if i not in loose]
+    given = []
+    if np.ptp(platform.pose[[0, -1], :3], axis=0).max() <= STILL:  # else they follow the place (`Space`)
+        given += [np.delete(platform.pose, scenario.platform_free, axis=1)]
+        given += [carrier.pose for i, carrier in enumerate(carriers) if i not in loose]
     if loose and carrier_ends(task) in ("exact", "periodic"):
         given += [carriers[i].pose[[0, -1]][:, :3] - platform.pose[[0, -1]][:, :3] for i in loose]
     return all(np.ptp(values, axis=0).max(initial=0.0) <= STILL for values in given)
 
 
-def guess_exceeds(scenario: Scenario, guess_at: Callable[[np.ndarray], Deviation]) -> str:
+def guess_exceeds(scenario: Scenario, guess_at: Callable[[np.ndarray], Deviation], balance: bool = True) -> str:
     """Return the name of the limit that a guess exceeds at rest, "tensions", or "" if it keeps all.
 
     Between the places that are checked no distance is exceeded either. `guess_at` returns the guess at times (n,) [s].
+    Without `balance` there need not be tensions.
     """
     times = np.linspace(0.0, scenario.duration, PLACES)
-    guess, rest = guess_at(times), AtRest(scenario, 1.0, spare=0.0)
+    guess, rest = guess_at(times), AtRest(scenario, 1.0, spare=0.0, balance=balance)
 
     def kept_at(times: np.ndarray) -> Kept:
         platform, carriers = scenario.motion(times, guess)

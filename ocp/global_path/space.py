@@ -7,6 +7,9 @@ its distance from where its cables attach, and the horizontal part of its offset
 
 A formation that the cables balance at rest stays balanced, since a linear map of balanced horizontal pulls is balanced:
 the formation squeezes, stretches and turns, and all shapes on the way are ones that can carry the load.
+
+Coordinates that the task gives at each time are not searched. They depend on how far a configuration is from the start
+to the end, along the line between them: as they do in a motion that goes straight, and nearly so in others.
 """
 
 from __future__ import annotations
@@ -18,10 +21,12 @@ import numpy as np
 from numpy.random import Generator
 
 from ..tasks.ends import carrier_ends, fixed_values
+from ..tasks.paths.rest_to_rest import rest_to_rest
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 
 __all__ = ["Space"]
 
+TIMES = 101  # at which what is given is evaluated, from start to end
 HOME_SHAPE = (1.0, 0.0, 1.0)
 SMALLEST = 0.15  # of a formation's size, across
 FLATTEST = 0.97  # of a cable's length: its largest horizontal part
@@ -68,8 +73,33 @@ class Space:
     @cached_property
     def references(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the poses of platform and carriers without deviation at start and end, (2, 6) and (2, c, 6)."""
-        platform, carriers = self.scenario.references(np.array([0.0, self.scenario.duration]))
+        platform, carriers = self._given
+        return platform[[0, -1]], carriers[[0, -1]]
+
+    @cached_property
+    def _given(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the poses of platform and carriers without deviation, (n, 6) and (n, c, 6)."""
+        platform, carriers = self.scenario.references(np.linspace(0.0, self.scenario.duration, TIMES))
         return platform.pose, np.stack([carrier.pose for carrier in carriers], axis=1)
+
+    def _without_deviation(self, configurations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the poses of platform (n, 6) and carriers (n, c, 6) that are given, at their share of the way."""
+        start, end = self.ends[:, : len(self.scenario.platform_free)]
+        places = np.isin(self.scenario.platform_free, POSITION)
+        way = (end - start) * places
+        far = float(way @ way)
+        done = np.clip((configurations[:, : len(start)] - start) @ way / far, 0.0, 1.0) if far > 0 else np.zeros(1)
+        laws = rest_to_rest(np.linspace(0.0, 1.0, TIMES))[0]
+        where = np.interp(np.broadcast_to(done, len(configurations)), laws, np.arange(TIMES))
+        before = np.minimum(where.astype(int), TIMES - 2)
+        after = where - before
+
+        def between(poses: np.ndarray) -> np.ndarray:
+            part = after.reshape(-1, *[1] * (poses.ndim - 1))
+            return (1 - part) * poses[before] + part * poses[before + 1]
+
+        platform, carriers = self._given
+        return between(platform), between(carriers)
 
     @cached_property
     def ends(self) -> np.ndarray:
@@ -183,10 +213,9 @@ class Space:
 
     def poses(self, configurations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the poses of the platform (n, 6) and of the carriers (n, c, 6)."""
-        scenario, n = self.scenario, len(configurations)
-        platform = np.repeat(self.references[0][:1], n, axis=0)
+        scenario = self.scenario
+        platform, carriers = self._without_deviation(configurations)
         platform[:, scenario.platform_free] = configurations[:, : len(scenario.platform_free)]
-        carriers = np.repeat(self.references[1][:1], n, axis=0)
         if self.loose:
             carriers[:, self.loose, :3] = self._formation(platform, configurations[:, len(scenario.platform_free) :])
         return platform, carriers

@@ -6,13 +6,12 @@ corners of a box they are rounded, so that a program can pass them. Inside a box
 
 from __future__ import annotations
 
-from functools import cache
-from itertools import combinations
 from typing import Any, TypeAlias
 
 import casadi as ca
 
 from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
+from .box_clearance import segment_outside_box
 from .convex_clearance import cable_outside_mesh, point_outside_mesh
 
 __all__ = ["between_cables", "between_points", "cable_outside", "point_outside"]
@@ -21,8 +20,6 @@ Point: TypeAlias = Any  # (3, 1), SX or DM
 Place: TypeAlias = Shape
 
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
-_BISECTIONS = 20
-_STILL = 1e-9  # [m], of a cable along an axis: the least change that is used
 
 
 def between_points(p: Point, q: Point) -> Any:
@@ -67,7 +64,7 @@ def cable_outside(place: Place, p: Point, p_end: Point) -> Any:
         return between_cables(p, p_end, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
         ends = (_before_turn(place, p), _before_turn(place, p_end))
-        return _cable_outside_box()(ca.DM(place.min), ca.DM(place.max), *ends)
+        return segment_outside_box()(ca.DM(place.min), ca.DM(place.max), *ends)
     if isinstance(place, ConvexMesh):
         return cable_outside_mesh(place, p, p_end)
     raise TypeError(f"{type(place).__name__} is not an obstacle")
@@ -81,20 +78,6 @@ def _before_turn(place: Block, p: Point) -> Point:
     return centre + ca.mtimes(ca.DM(place.axes.T), p - centre)
 
 
-@cache
-def _cable_outside_box() -> ca.Function:
-    """Return the function of a box's corners and a segment's ends that `cable_outside` calls.
-
-    Its 3000 operations are written once in Python: calling it for another cable is ten times quicker.
-    """
-    low, high, p, p_end = (ca.SX.sym(name, 3) for name in ("low", "high", "p", "p_end"))
-    nearest = _beyond(low, high, p + _nearest_share(low, high, p, p_end) * (p_end - p))
-    shares = [0.0, 1.0, *_corners(low, high, p, p_end)]
-    through = -_largest([-_largest(_beyond(low, high, p + share * (p_end - p))) for share in shares])
-    outside = ca.if_else(_squared(nearest) > _TINY, ca.sqrt(_squared(nearest) + _TINY), through)
-    return ca.Function("cable_outside_box", [low, high, p, p_end], [outside])
-
-
 def _beyond(low: Point, high: Point, p: Point) -> list[Any]:
     """Return how far p is beyond the faces of a box along each axis [m]; all negative inside."""
     beyond = ca.fabs(p - (low + high) / 2) - (high - low) / 2
@@ -104,44 +87,6 @@ def _beyond(low: Point, high: Point, p: Point) -> list[Any]:
 def _squared(beyond: list[Any]) -> Any:
     """Return the squared distance from a box [m^2], zero inside."""
     return sum(ca.fmax(value, 0.0) ** 2 for value in beyond)
-
-
-def _nearest_share(low: Point, high: Point, p: Point, p_end: Point) -> Any:
-    """Return the share of a segment at which it is nearest to a box.
-
-    The squared distance is convex along it and its slope piecewise linear: bisection selects the piece, with nothing to
-    differentiate, and a Newton step the place in it, with its true derivatives.
-    """
-    along = p_end - p
-    rate = ca.sumsqr(along) * _TINY
-
-    def slopes(share: Any) -> tuple[Any, Any]:
-        at = p + share * along
-        over, under = at - high, low - at
-        slope = ca.dot(along, ca.fmax(over, 0.0) - ca.fmax(under, 0.0))
-        return slope, ca.dot(along**2, (over > 0) + (under > 0))
-
-    share, step = ca.DM(0.5), 0.25
-    for _ in range(_BISECTIONS):
-        slope, _ = slopes(share)
-        share = share + step * ca.if_else(slope > 0, -1.0, ca.if_else(slope < 0, 1.0, 0.0))
-        step /= 2
-    slope, bend = slopes(share)
-    return _within(share - slope / (bend + rate))
-
-
-def _corners(low: Point, high: Point, p: Point, p_end: Point) -> list[Any]:
-    """Return the shares of a segment at which its distance from a box may be least.
-
-    It is the largest of the six distances from the faces, each linear along the segment: convex with corners, where two
-    of them are equal.
-    """
-    faces = [(sign * (p - bound)[i], sign * (p_end - p)[i]) for sign, bound in ((-1, low), (1, high)) for i in range(3)]
-    shares = []
-    for (value, slope), (other, other_slope) in combinations(faces, 2):
-        change = other_slope - slope
-        shares.append(_within((value - other) / ca.if_else(ca.fabs(change) < _STILL, _STILL, change)))
-    return shares
 
 
 def _from_segment(p: Point, start: Point, end: Point) -> Any:

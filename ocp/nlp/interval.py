@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -16,6 +16,7 @@ from ..tasks import bernstein
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import Layout
+from .near import is_local
 from .rows import (
     OTHER_COSTS,
     Mesh,
@@ -50,20 +51,25 @@ class Interval:
 
     Attributes
     ----------
+    cost
+        (x, x_end, grid) -> cost, with `Grid`'s numbers of the interval.
     function
-        (x, x_end, p, p_end, grid) -> (cost, values), with the reference motions p at the same points, and `Grid`'s
-        numbers of the interval.
+        (x, x_end, p, p_end, grid) -> values, with the reference motions p at the same points.
     flow
         (x, x_end, grid) -> the end's motion that integration gives, from what is free at the end: its acceleration, or
         its snap; and what all nodes share.
     rows
         Names and bounds of `values`. The first are `gaps` equations: the end is what `flow` gives.
+    local
+        Index of each local limit, its function (x, x_end, p, p_end) -> values, and its rows.
     """
 
+    cost: ca.Function
     function: ca.Function
     flow: ca.Function
     rows: list[Row]
     gaps: int
+    local: list[tuple[int, ca.Function, list[Row]]]
 
 
 def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, columns: Sequence[Values]) -> Points:
@@ -106,7 +112,15 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
     _rate_rows(scenario, mesh, layout, h, columns, moving, values, rows)
-    _way_rows(scenario, mesh, layout, columns, moving, values, rows)
+    local = []
+    for index, more, named in _way_rows(scenario, mesh, layout, columns, moving):
+        if is_local(scenario.limits.all[index]):
+            inputs, names = [x, x_end, parameters, parameters_end], ["x", "x_end", "p", "p_end"]
+            its = ca.Function("near", inputs, [ca.vertcat(*more)], names, ["values"], differentiated(4, 2))
+            local.append((index, its, named))
+        else:
+            values += more
+            rows += named
 
     @cache
     def points_of(carrier: int | None) -> Points:
@@ -121,8 +135,11 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
 
     _hull_rows(scenario, mesh, points_of, values, rows)
     inputs = [x, x_end, parameters, parameters_end, numbers]
-    function = ca.Function("interval", inputs, [cost, ca.vertcat(*values)], differentiated(5, 2))
-    return Interval(function, flow, rows, gaps)
+    names = ["x", "x_end", "p", "p_end", "grid"]
+    function = ca.Function("interval", inputs, [ca.vertcat(*values)], names, ["values"], differentiated(5, 2))
+    names = ["x", "x_end", "grid"]
+    costs = ca.Function("interval_cost", [x, x_end, numbers], [cost], names, ["cost"], differentiated(3, 2))
+    return Interval(costs, function, flow, rows, gaps, local)
 
 
 def _numbers(grid: np.ndarray) -> tuple[ca.SX, list[ca.SX]]:
@@ -265,23 +282,20 @@ def _rate_rows(
 
 
 def _way_rows(
-    scenario: Scenario,
-    mesh: Mesh,
-    layout: Layout,
-    columns: list[ca.SX],
-    moving: list[list[list[ca.SX]]],
-    values: list[ca.SX],
-    rows: list[Row],
-) -> None:
-    """Add the distances from thin places on the straight way from point to point."""
+    scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], moving: list[list[list[ca.SX]]]
+) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
+    """Yield index, values and rows of the distances from thin places on the straight way from point to point."""
     at_points = []
     for platform, *carriers in moving:
         at_points.append([ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)])
     for limit, on_the_way in swept(scenario, mesh).items():
+        values: list[ca.SX] = []
+        rows: list[Row] = []
         for first, second in pairwise(at_points):
             more, named = bounded(limit, on_the_way(*first, *second), mesh, layout.slack(columns[0], limit))
             values += more
             rows += named
+        yield scenario.limits.all.index(limit), values, rows
 
 
 def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: list[ca.SX]) -> list[ca.SX]:

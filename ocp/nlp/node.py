@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import casadi as ca
 import numpy as np
 
@@ -11,10 +14,11 @@ from ..limits import Rate
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
+from .near import is_local
 from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread
 from .thin import swept
 
-__all__ = ["node_function"]
+__all__ = ["Node", "node_of"]
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
@@ -22,12 +26,31 @@ SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to 
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
 
-def node_function(
-    scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, carried: np.ndarray
-) -> tuple[ca.Function, list[Row]]:
+class Node(NamedTuple):
+    """One node as functions of its column.
+
+    Attributes
+    ----------
+    cost
+        x -> cost. It is a function of its own, since IPOPT evaluates objective and constraints one after the other.
+    function
+        (x, p, carried) -> values, with the reference motions p, loads and columns of the ground.
+    rows
+        Names and bounds of `values`.
+    local
+        Index of each local limit, its function (x, p) -> values, and its rows.
+    """
+
+    cost: ca.Function
+    function: ca.Function
+    rows: list[Row]
+    local: list[tuple[int, ca.Function, list[Row]]]
+
+
+def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, carried: np.ndarray) -> Node:
     """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
 
-    The function is for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
+    The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
     ground of each, `carried` (10 + 6 s, nodes), or nothing (0, nodes).
     """
     robot, dynamics = scenario.robot, scenario.dynamics
@@ -75,10 +98,23 @@ def node_function(
         rows += [("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
     cost += _slack_cost(scenario, mesh, layout, x)
     off_path = spread(scenario, None) @ x[layout.q]
-    _limit_rows(scenario, mesh, layout, x, [*(ca.vertcat(*body) for body in bodies), tensions, off_path], values, rows)
-    return ca.Function(
-        "node", [x, parameters, parameters_carried], [cost, ca.vertcat(*values)], differentiated(3, 1)
-    ), rows
+    local = []
+    state = [*(ca.vertcat(*body) for body in bodies), tensions, off_path]
+    for index, more, named in _limit_rows(scenario, mesh, layout, x, state):
+        if is_local(scenario.limits.all[index]):
+            function = ca.Function(
+                "near", [x, parameters], [ca.vertcat(*more)], ["x", "p"], ["values"], differentiated(2, 1)
+            )
+            local.append((index, function, named))
+        else:
+            values += more
+            rows += named
+    inputs = [x, parameters, parameters_carried]
+    function = ca.Function(
+        "node", inputs, [ca.vertcat(*values)], ["x", "p", "carried"], ["values"], differentiated(3, 1)
+    )
+    costs = ca.Function("node_cost", [x], [cost], ["x"], ["cost"], {"cse": True})
+    return Node(costs, function, rows, local)
 
 
 def _in_frame(scenario: Scenario, wrench: ca.SX, carriers: list[list[ca.SX]]) -> ca.SX:
@@ -114,21 +150,19 @@ def _slack_cost(scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX) -> ca.
 
 
 def _limit_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX], values: list[ca.SX], rows: list[Row]
-) -> None:
-    """Add the limits that hold at a node; `interval` has those between two points."""
+    scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX]
+) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
+    """Yield index, values and rows of each limit that holds at a node; `interval` has those between two points."""
     limits = scenario.limits
     if not limits.all:
         return
     evaluated, on_the_way = limits.function(*state), swept(scenario, mesh)
-    for limit, place in zip(limits, limits.places, strict=True):
+    for index, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
         hull = limit.hull if limit.is_convex else None
         elsewhere = isinstance(limit, Rate) or limit in on_the_way
         if elsewhere or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
-        more, named = bounded(limit, evaluated[place], mesh, layout.slack(x, limit))
-        values += more
-        rows += named
+        yield index, *bounded(limit, evaluated[place], mesh, layout.slack(x, limit))
 
 
 def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:

@@ -20,6 +20,7 @@ rows are put in order (`stages`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -30,12 +31,16 @@ from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths import WaypointPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.scheme import Scheme
+from .columns import Columns
+from .derivatives import Block, Mapped, derivatives
 from .grid import Grid
-from .interval import Points, interval_of, points
+from .interval import Interval, Points, interval_of, points
 from .layout import DURATION, MARGIN, Layout
-from .node import node_function
+from .near import Near
+from .node import Node, node_of
 from .rows import Mesh, Row, stretch
-from .stages import Block, Stages, all_at_once, put_in_order, stage_by_stage
+from .stages import Stages, all_at_once, put_in_order, stage_by_stage
 
 __all__ = ["Program", "build"]
 
@@ -54,6 +59,14 @@ class Program:
         The place of each unknown among the entries of the points' columns, one column after the other.
     stages
         Sizes of its stages; None if it is not ordered by stages.
+    near
+        Where it has the rows of local limits.
+    costs
+        What the objective sums but for linear terms, and the weights of their sets.
+    blocks
+        The rows of g, in their order if the program is not ordered by stages.
+    local
+        How many of the first blocks are of local limits.
     """
 
     scenario: Scenario
@@ -67,6 +80,10 @@ class Program:
     upper_g: np.ndarray
     order: np.ndarray
     stages: Stages | None
+    near: Near
+    costs: list[tuple[Mapped, np.ndarray]]
+    blocks: list[Block]
+    local: int
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Return the unknowns of each point, one row per point, zero where a point does not have one."""
@@ -100,6 +117,18 @@ class Program:
         wrenches = self.columns(x)[:, self.layout.missing].reshape(-1, 6)
         return float(np.linalg.norm(wrenches, axis=1).max(initial=0.0) * self.scenario.robot.force_scale)
 
+    @cached_property
+    def derivatives(self) -> dict[str, ca.Function]:
+        """Return options of `casadi.nlpsol`: Jacobian and Hessian; none of a program in stages."""
+        if self.stages is not None:
+            return {}
+        x = self.problem["x"]
+        return derivatives(x, self.problem.get("p", ca.MX.sym("p", 0, 1)), self.costs, self.blocks)
+
+    def suffices(self, motion: Deviation) -> bool:
+        """Return whether a motion can exceed no local limit where the program does not have its rows."""
+        return self.near.is_everywhere or self.near.suffices(self.scenario, self.shares, motion)
+
     def violation(self, x: np.ndarray, g: np.ndarray) -> float:
         """Return the largest violation of the bounds by x and its constraints g; infinite if they are not numbers."""
         beyond = [self.lower - x, x - self.upper, self.lower_g - g, g - self.upper_g]
@@ -125,32 +154,34 @@ class Program:
         return columns.ravel()[self.order]
 
 
-def build(scenario: Scenario, mesh: Mesh) -> Program:
-    """Build the nonlinear program of `scenario` on `mesh`."""
+def build(scenario: Scenario, mesh: Mesh, near: Near | None = None) -> Program:
+    """Build the nonlinear program of `scenario` on `mesh`, with local limits where they are `near`; default: all."""
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
     grid, at_nodes = Grid.of(scenario, steps), scheme.balance_points(steps)
+    near = near or Near.everywhere(scenario, grid.shares)
     times = grid.shares * scenario.duration
     references, carried = _parameters(scenario, times), _carried(scenario, times[at_nodes])
-    parameters, intervals = ca.DM(references), ca.DM(grid.intervals)
-    node, node_rows = node_function(scenario, mesh, layout, references, carried)
+    node = node_of(scenario, mesh, layout, references, carried)
     interval = interval_of(scenario, mesh, layout, references, grid.intervals)
     arrange = stage_by_stage if scenario.task.solver == "fatrop" else all_at_once
     unknowns = arrange(scenario, layout, grid, interval.flow)
     X, X_end = unknowns.columns, unknowns.ends
+    columns = Columns(unknowns, scheme, references, carried, grid.intervals)
+    costs = [
+        (columns.at_nodes(node.cost), grid.weights[at_nodes]),
+        (columns.between(interval.cost), grid.steps / scenario.duration),
+    ]
+    objective = _shared_cost(scenario, layout, X)
+    for cost, weights in costs:
+        objective += ca.dot(cost.values, ca.DM(weights).T)
 
-    of_nodes = _picked(X, at_nodes), parameters[:, at_nodes.tolist()], ca.DM(carried)
-    cost, node_values = node.map(len(at_nodes))(*of_nodes)
-    weights = ca.DM(grid.weights[at_nodes]).T
-    groups, given = _groups(X, scheme.size), _groups(parameters, scheme.size)
-    given_end = parameters[:, scheme.size :: scheme.size]
-    interval_cost, interval_values = interval.function.map(steps)(groups, X_end, given, given_end, intervals)
-    lengths = ca.DM(grid.steps / scenario.duration).T
-    objective = ca.dot(cost, weights) + ca.dot(interval_cost, lengths) + _shared_cost(scenario, layout, X[:, 0])
-
+    everywhere, between = columns.at_nodes(node.function), columns.between(interval.function)
     first = interval.gaps if unknowns.gaps is not None else 0  # a program in stages has those as its gaps
+    local = _near_rows(near, scheme, node, interval, columns)
     blocks = [
-        Block(node_values, node_rows, at_nodes // scheme.size),
-        Block(interval_values[first:, :], interval.rows[first:], np.arange(steps)),
+        *local,
+        Block(everywhere.values, node.rows, at_nodes // scheme.size, everywhere),
+        Block(between.values[first:, :], interval.rows[first:], np.arange(steps), between),
         *_single_rows(scenario, layout, X, X_end, grid.steps),
     ]
     g, rows, stages = put_in_order(unknowns, blocks)
@@ -167,16 +198,28 @@ def build(scenario: Scenario, mesh: Mesh) -> Program:
         upper_g=np.array([row[2] for row in rows]),
         order=unknowns.order,
         stages=stages,
+        near=near,
+        costs=costs,
+        blocks=blocks,
+        local=len(local),
     )
 
 
-def _picked(X: ca.MX, points: np.ndarray) -> ca.MX:
-    return X if len(points) == X.shape[1] else X[:, points.tolist()]
-
-
-def _groups(values: ca.MX | ca.DM, size: int) -> ca.MX | ca.DM:
-    """Return the columns of each interval but its end's, one below the other."""
-    return ca.reshape(values[:, :-1], values.shape[0] * size, -1)
+def _near_rows(near: Near, scheme: Scheme, node: Node, interval: Interval, columns: Columns) -> list[Block]:
+    """Return the rows of local limits where they are near, at nodes and between them."""
+    blocks = []
+    for index, function, rows in node.local:
+        chosen = np.flatnonzero(near.chosen[index, columns.nodes])
+        if len(chosen):
+            mapped = columns.at_nodes(function, chosen)
+            blocks.append(Block(mapped.values, rows, columns.nodes[chosen] // scheme.size, mapped))
+    for index, function, rows in interval.local:
+        inside = np.lib.stride_tricks.sliding_window_view(near.chosen[index], scheme.size + 1)[:: scheme.size]
+        chosen = np.flatnonzero(inside.any(axis=1))
+        if len(chosen):
+            mapped = columns.between(function, chosen)
+            blocks.append(Block(mapped.values, rows, chosen, mapped))
+    return blocks
 
 
 def _parameters(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
@@ -194,9 +237,9 @@ def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
     return np.hstack([phases.loads_at(nodes), columns]).T
 
 
-def _shared_cost(scenario: Scenario, layout: Layout, x: ca.MX) -> ca.MX | float:
-    """Return the cost of the duration less the value of the margin."""
-    objective, cost = scenario.task.objective, 0.0
+def _shared_cost(scenario: Scenario, layout: Layout, X: ca.MX) -> ca.MX:
+    """Return the cost of the duration less the value of the margin; it is linear."""
+    objective, cost, x = scenario.task.objective, ca.MX(0.0), X[:, 0]
     if (place := layout.at(DURATION)) is not None and objective.time is not None:
         cost += x[place] * scenario.duration / objective.time
     if (place := layout.at(MARGIN)) is not None and objective.margin is not None:

@@ -98,7 +98,7 @@ class Solver:
 
     def _make(self, start: dict[str, Any]) -> ca.Function:
         # What its check of the inputs warns of, more equations than unknowns, is an answer here: no solution.
-        common = {"print_time": False, "error_on_fail": False, "inputs_check": False}
+        common = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
         name = self.program.scenario.task.solver
         options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
         return wait_for(lambda: _checked(ca.nlpsol, "planner", name, self.program.problem, common | options))
@@ -109,7 +109,8 @@ class Solver:
         scenario = self.program.scenario
         thrusts = any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free)
         linear = TEAM if thrusts and scenario.count > MANY else {}
-        return {"ipopt": quiet | accuracy | linear | start, "iteration_callback": self._watch}
+        options = {"ipopt": quiet | accuracy | linear | start, "iteration_callback": self._watch}
+        return options | self.program.derivatives
 
     def _fatrop(self, start: dict[str, Any]) -> dict[str, Any]:
         program = self.program
@@ -135,11 +136,13 @@ class Solver:
         progress: Progress | None = None,
         coarser: bool = False,
         seconds: float = np.inf,
+        parameters: ca.DM | None = None,
     ) -> Outcome:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
-        with the best that it has; fatrop does not. A run without a solution is a result, not an error.
+        with the best that it has; fatrop does not. A run without a solution is a result, not an error. `parameters` are
+        those of the program, if it has any.
 
         Raises
         ------
@@ -155,6 +158,8 @@ class Solver:
             "lbg": program.lower_g,
             "ubg": program.upper_g,
         }
+        if parameters is not None:
+            start["p"] = parameters
         nlp = self.prepare(guess, coarser)
         if guess is not None or self._last is None:
             if guess is None:
@@ -225,7 +230,7 @@ class _Watch(ca.Callback):
 
     def __init__(self, program: Program):
         super().__init__()
-        self._sizes = {"x": program.problem["x"].numel(), "g": program.problem["g"].numel(), "f": 1}
+        self._sizes = {name: part.numel() for name, part in program.problem.items()}
         self._program = program
         self.begin(None)
         self.construct("watch", {})
@@ -270,7 +275,7 @@ class _Watch(ca.Callback):
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         name = ca.nlpsol_out(i)
-        size = self._sizes.get({"lam_x": "x", "lam_g": "g"}.get(name, name), 0)
+        size = self._sizes.get(name.removeprefix("lam_"), 0)
         return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
 
     def has_eval_buffer(self) -> bool:

@@ -15,19 +15,12 @@ import numpy as np
 
 from ..limits import Rate
 from ..tasks.scenario import Scenario
+from .derivatives import Block
 from .grid import Grid
 from .layout import Layout
 from .rows import Row
 
-__all__ = ["Block", "Stages", "Unknowns", "all_at_once", "put_in_order", "stage_by_stage"]
-
-
-class Block(NamedTuple):
-    """Rows of the same kind, one column per stage."""
-
-    values: ca.MX  # (r, k)
-    rows: list[Row]  # r
-    stages: np.ndarray  # (k,)
+__all__ = ["Stages", "Unknowns", "all_at_once", "put_in_order", "stage_by_stage"]
 
 
 class Stages(NamedTuple):
@@ -55,6 +48,9 @@ class Unknowns(NamedTuple):
         x_{k+1} - F(x_k, u_k), (states, N); None where the interval's own rows contain it.
     controls
         The number of controls of each stage; empty where there are no stages.
+    where
+        (width, points), the place of each entry of the columns in x, -1 where there is none; None where columns contain
+        more than unknowns.
     """
 
     x: ca.MX
@@ -64,6 +60,7 @@ class Unknowns(NamedTuple):
     copies: np.ndarray
     gaps: ca.MX | None
     controls: list[int]
+    where: np.ndarray | None = None
 
 
 def _exists(scenario: Scenario, layout: Layout, steps: int) -> np.ndarray:
@@ -91,10 +88,11 @@ def all_at_once(scenario: Scenario, layout: Layout, grid: Grid, flow: ca.Functio
     order = np.flatnonzero(there)
     where = np.full(there.size, -1)
     where[order] = np.arange(len(order))
+    where = where.reshape(there.shape)
     x = ca.MX.sym("x", len(order))
-    columns = _gathered(x, where.reshape(there.shape))
+    columns = _gathered(x, where)
     size = scenario.scheme.size
-    return Unknowns(x, columns, columns[:, size::size], order, np.zeros(len(order), dtype=bool), None, [])
+    return Unknowns(x, columns, columns[:, size::size], order, np.zeros(len(order), dtype=bool), None, [], where.T)
 
 
 def stage_by_stage(scenario: Scenario, layout: Layout, grid: Grid, flow: ca.Function) -> Unknowns:

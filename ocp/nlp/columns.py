@@ -1,0 +1,74 @@
+"""`Columns`: the arguments of the functions of nodes and intervals, for all of them or for some."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..tasks.scheme import Scheme
+from .derivatives import Mapped
+from .stages import Unknowns
+
+__all__ = ["Columns"]
+
+
+class Columns:
+    """The columns of a program.
+
+    Parameters
+    ----------
+    unknowns
+        Of all points, (width, points), and of the intervals' ends.
+    scheme
+        Which selects points and groups them into intervals.
+    references
+        The reference motions at all points, (18 (1 + c), points).
+    carried
+        Loads and columns of the ground, (., nodes).
+    intervals
+        `Grid.intervals`, (2, steps).
+    """
+
+    def __init__(
+        self, unknowns: Unknowns, scheme: Scheme, references: np.ndarray, carried: np.ndarray, intervals: np.ndarray
+    ):
+        X, given, size = unknowns.columns, ca.DM(references), scheme.size
+        self.nodes = scheme.balance_points(intervals.shape[1])
+        nodes = self.nodes.tolist()
+        self._of_nodes = {"x": X[:, nodes], "p": given[:, nodes], "carried": ca.DM(carried)}
+        self._of_intervals = {
+            "x": _groups(X, size),
+            "x_end": unknowns.ends,
+            "p": _groups(given, size),
+            "p_end": given[:, size::size],
+            "grid": ca.DM(intervals),
+        }
+        self._at_nodes: np.ndarray | None = None
+        self._between: np.ndarray | None = None
+        if (where := unknowns.where) is not None:
+            self._at_nodes = where[:, nodes]
+            grouped = where[:, :-1].T.reshape(-1, len(where) * size).T
+            self._between = np.vstack([grouped, where[:, size::size]])
+
+    def at_nodes(self, function: ca.Function, chosen: np.ndarray | None = None) -> Mapped:
+        """Return a function of nodes at those `chosen` among them; default: at all."""
+        return _mapped(function, self._of_nodes, self._at_nodes, chosen)
+
+    def between(self, function: ca.Function, chosen: np.ndarray | None = None) -> Mapped:
+        """Return a function of intervals for those `chosen`; default: for all."""
+        return _mapped(function, self._of_intervals, self._between, chosen)
+
+
+def _mapped(function: ca.Function, columns: dict[str, Any], places: np.ndarray | None, chosen: Any) -> Mapped:
+    inputs = [columns[name] for name in function.name_in()]
+    if chosen is not None:
+        inputs = [each[:, chosen.tolist()] for each in inputs]
+        places = None if places is None else places[:, chosen]
+    return Mapped(function, inputs, places)
+
+
+def _groups(values: ca.MX | ca.DM, size: int) -> ca.MX | ca.DM:
+    """Return the columns of each interval but its end's, one below the other."""
+    return ca.reshape(values[:, :-1], values.shape[0] * size, -1)

@@ -1,0 +1,172 @@
+"""Put together the derivatives of a program from those of one node and one interval: `derivatives`.
+
+CasADi differentiates a mapped function along one direction after the other, each time all of it. Written out for one
+node, where all entries share their operations, a Hessian costs a fifth to a tenth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from .rows import Row
+
+__all__ = ["Block", "Mapped", "derivatives"]
+
+
+class Mapped(NamedTuple):
+    """A function of some unknowns that is evaluated for k sets of them.
+
+    Attributes
+    ----------
+    function
+        Its first inputs are unknowns, the others numbers; its one output is a column.
+    inputs
+        (., k) each.
+    places
+        (u, k), the place of each entry of the first inputs among all unknowns; -1: it is zero. None where they are
+        more than unknowns: then there are no derivatives.
+    """
+
+    function: ca.Function
+    inputs: list[Any]
+    places: np.ndarray | None
+
+    @property
+    def values(self) -> ca.MX:
+        """Return the values, (r, k)."""
+        return self.function.map(self.inputs[0].shape[1])(*self.inputs)
+
+    @property
+    def _places(self) -> np.ndarray:
+        if self.places is None:
+            raise TypeError(f"{self.function.name()} is a function of more than unknowns")
+        return self.places
+
+    def _expressions(self) -> tuple[list[ca.SX], ca.SX, ca.SX]:
+        """Return symbols for one set of inputs, those that are unknown as one column, and the values."""
+        function = self.function
+        inputs = [ca.SX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
+        unknown = ca.vertcat(*(part for k, part in enumerate(inputs) if isinstance(self.inputs[k], ca.MX)))
+        return inputs, unknown, function(*inputs)
+
+    def slopes(self, width: int) -> ca.MX:
+        """Return the derivatives of all values with respect to all unknowns, (r k, width)."""
+        inputs, unknown, values = self._expressions()
+        places = self._places
+        jacobian = ca.jacobian(values, unknown)
+        rows, columns = (np.array(part, dtype=int) for part in jacobian.sparsity().get_triplet())
+        count = places.shape[1]
+        function = ca.Function("slopes", inputs, [jacobian.nz[:]], {"cse": True})
+        entries = _Entries(
+            ca.vec(function.map(count)(*self.inputs)),
+            (rows[:, None] + values.numel() * np.arange(count)).ravel(order="F"),
+            places[columns].ravel(order="F"),
+        )
+        return _matrix([entries], values.numel() * count, width)
+
+    def curvature(self, multipliers: ca.MX) -> _Entries:
+        """Return the second derivatives of the values times `multipliers` (r, k), those above the diagonal."""
+        inputs, unknown, values = self._expressions()
+        places = self._places
+        multiplier = ca.SX.sym("multiplier", values.numel())
+        hessian = ca.triu(ca.hessian(ca.dot(multiplier, values), unknown)[0])
+        first, second = (places[np.array(part, dtype=int)] for part in hessian.sparsity().get_triplet())
+        function = ca.Function("curvature", [*inputs, multiplier], [hessian.nz[:]], {"cse": True})
+        there = np.minimum(first, second) >= 0
+        return _Entries(
+            ca.vec(function.map(places.shape[1])(*self.inputs, multipliers)),
+            np.where(there, np.minimum(first, second), -1).ravel(order="F"),
+            np.where(there, np.maximum(first, second), -1).ravel(order="F"),
+        )
+
+
+class Block(NamedTuple):
+    """Rows of the same kind, one column per stage.
+
+    Attributes
+    ----------
+    values
+        (r, k).
+    rows
+        Names and bounds, r.
+    stages
+        (k,).
+    mapped
+        What the values are computed by, where it is a function of places among the unknowns.
+    slopes
+        The derivatives of values that are linear, (r k, unknowns).
+    """
+
+    values: ca.MX
+    rows: list[Row]
+    stages: np.ndarray
+    mapped: Mapped | None = None
+    slopes: ca.MX | None = None
+
+
+class _Entries(NamedTuple):
+    """Entries of a sparse matrix, in which those of the same place add up; -1: an entry that does not count."""
+
+    values: ca.MX
+    rows: np.ndarray
+    columns: np.ndarray
+
+
+def derivatives(
+    x: ca.MX, p: ca.MX, costs: Sequence[tuple[Mapped, np.ndarray]], blocks: Sequence[Block]
+) -> dict[str, ca.Function]:
+    """Return the derivatives of a program as the options of `casadi.nlpsol` that take them.
+
+    Parameters
+    ----------
+    x, p
+        Unknowns and parameters.
+    costs
+        What the objective sums, with the weight of each set, but for linear terms.
+    blocks
+        The rows, in their order.
+    """
+    multipliers, of_objective = ca.MX.sym("lam_g", sum(block.values.numel() for block in blocks)), ca.MX.sym("lam_f")
+    curved = [cost.curvature(of_objective * ca.DM(weights).T) for cost, weights in costs]
+    others, slopes, at = [], [], 0
+    for block in blocks:
+        count = block.values.numel()
+        its = multipliers[at : at + count]
+        at += count
+        if block.mapped is not None:
+            slopes.append(block.mapped.slopes(x.numel()))
+            curved.append(block.mapped.curvature(ca.reshape(its, block.values.shape)))
+        elif block.slopes is not None:
+            slopes.append(block.slopes)
+        else:
+            values = ca.vec(block.values)
+            slopes.append(ca.jacobian(values, x))
+            others.append(ca.triu(ca.hessian(ca.dot(its, values), x)[0]))
+    hessian = sum(others, _matrix(curved, x.numel(), x.numel()))
+    values = ca.vertcat(*(ca.vec(block.values) for block in blocks))
+    return {
+        "jac_g": ca.Function("nlp_jac_g", [x, p], [values, ca.vertcat(*slopes)], ["x", "p"], ["g", "jac_g_x"]),
+        "hess_lag": ca.Function(
+            "nlp_hess_l", [x, p, of_objective, multipliers], [hessian], ["x", "p", "lam_f", "lam_g"], ["hess_gamma_x_x"]
+        ),
+    }
+
+
+def _matrix(entries: Sequence[_Entries], height: int, width: int) -> ca.MX:
+    """Return the sparse matrix of these entries."""
+    rows, columns = (np.concatenate([getattr(each, part) for each in entries]) for part in ("rows", "columns"))
+    there = np.flatnonzero(columns >= 0)
+    places, which = np.unique(columns[there] * height + rows[there], return_inverse=True)
+    values = ca.vertcat(*(each.values for each in entries))
+    if len(places) == len(there):
+        order = np.empty(len(there), dtype=int)
+        order[which] = there
+        values = values[order.tolist()]
+    else:
+        values = ca.DM(ca.Sparsity.triplet(len(places), len(rows), which.tolist(), there.tolist()), 1.0) @ values
+    starts = np.searchsorted(places, height * np.arange(width + 1))
+    return ca.MX(ca.Sparsity(height, width, starts.tolist(), (places % height).tolist()), values)

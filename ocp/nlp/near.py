@@ -1,0 +1,86 @@
+"""`Near`: the points of a program at which it keeps the distances from places: those near the motion it starts from.
+
+Most of a motion is far from most obstacles, and distances cost more than all else that a program evaluates. Those that
+it leaves out are evaluated once for its solution; if one is exceeded there, the program is solved again with more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from ..limits import Limit
+from ..tasks.deviation import Deviation
+from ..tasks.scenario import Scenario
+
+__all__ = ["Near", "is_local"]
+
+
+@dataclass(frozen=True)
+class Near:
+    """The points at which a program keeps each limit, (limits, points): of limits that are not local all."""
+
+    chosen: np.ndarray
+
+    @classmethod
+    def everywhere(cls, scenario: Scenario, shares: np.ndarray) -> Self:
+        """Return all points."""
+        return cls(np.ones((len(scenario.limits.all), len(shares)), dtype=bool))
+
+    @classmethod
+    def along(cls, scenario: Scenario, shares: np.ndarray, motion: Deviation, reach: float) -> Self:
+        """Return the points where a place is nearer than its bound and `reach`, of the motion's extent, permit.
+
+        `shares` are those of the motion's duration at the program's points.
+        """
+        there = _At(scenario, shares, motion)
+        chosen = there.slack <= reach * there.extent
+        wide = chosen.copy()
+        wide[:, 1:] |= chosen[:, :-1]
+        wide[:, :-1] |= chosen[:, 1:]
+        return cls(wide | [[not is_local(limit)] for limit in scenario.limits])
+
+    @property
+    def is_everywhere(self) -> bool:
+        """Return whether nothing is left out."""
+        return bool(self.chosen.all())
+
+    def suffices(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
+        """Return whether a motion can exceed no limit where it is left out, at the points or between them."""
+        there = _At(scenario, shares, motion)
+        left_out = ~self.chosen
+        between = left_out[:, 1:] & left_out[:, :-1] & (there.slack[:, 1:] + there.slack[:, :-1] < there.moved)
+        return not ((there.slack < 0.0) & left_out).any() and not between.any()
+
+
+def is_local(limit: Limit) -> bool:
+    """Return whether a limit is a hard distance from a place."""
+    return bool(np.isfinite(limit.thickness)) and limit.soft is None
+
+
+class _At:
+    """A motion at shares of its duration.
+
+    Attributes
+    ----------
+    slack
+        (limits, points) [m]: by how much local limits are kept; infinite for all others.
+    moved
+        (points - 1,) [m]: what any point of platform or carriers moves from one to the next.
+    extent
+        The largest distance of two places of the same point [m], at least; at most sqrt(3) times less.
+    """
+
+    def __init__(self, scenario: Scenario, shares: np.ndarray, motion: Deviation):
+        lasting = scenario.lasting(float(motion.nodes[-1]))
+        platform, carriers = lasting.motion(shares * lasting.duration, motion)
+        points = np.concatenate(scenario.dynamics.points(platform.pose, carriers.pose), axis=1)
+        self.moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
+        self.extent = float(np.ptp(points, axis=0).max())
+        self.slack = np.full((len(lasting.limits.all), len(shares)), np.inf)
+        evaluated = lasting.limits.along(platform, carriers)
+        for row, limit, values in zip(self.slack, lasting.limits, evaluated, strict=True):
+            if is_local(limit):
+                row[:] = np.minimum(values - limit.low, limit.high - values).min(axis=1)

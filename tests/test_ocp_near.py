@@ -1,0 +1,75 @@
+"""Programs with the rows of near places only, and with distances that are linear."""
+
+import numpy as np
+import pytest
+
+from towline import load, plan
+from towline.ocp import search
+from towline.ocp.nlp.guess import initial_guess
+from towline.ocp.nlp.linear import LinearDistances
+from towline.ocp.nlp.near import Near, is_local
+from towline.ocp.nlp.program import build
+from towline.ocp.nlp.rows import Mesh
+from towline.ocp.planner import Planner
+
+PLATFORM = {"platform": 0.05, "cables": None, "carriers": None}
+BALL = {"kind": "sphere", "name": "ball", "centre": [0.32, 0.12, 1.2], "radius": 0.25, **PLATFORM}
+FAR = {"kind": "box", "name": "far", "min": [3.0, 3.0, 0.0], "max": [3.2, 3.2, 2.0], **PLATFORM}
+TASK = {
+    "path": {"kind": "line", "start": [-0.4, 0, 1.2], "end": [0.8, 0, 1.2]},
+    "duration": 4,
+    "steps": 40,
+    "tube": {"position": "free"},
+    "limits": {"keep_out": [BALL, FAR]},
+}
+
+
+def scenario_of(task):
+    return Planner(load("ipanema-1"), task).scenario
+
+
+def test_rows_of_far_places_are_left_out():
+    scenario, mesh = scenario_of(TASK), Mesh(40)
+    whole = build(scenario, mesh)
+    guess = initial_guess(scenario, whole.shares * scenario.duration)
+    near = Near.along(scenario, whole.shares, guess, 0.05)
+    ball, far = (near.chosen[k] for k, limit in enumerate(scenario.limits) if is_local(limit))
+    assert not far.any() and ball.any() and not ball[0] and not ball[-1]
+    part = build(scenario, mesh, near)
+    assert len(part.lower_g) < len(whole.lower_g)
+    assert part.suffices(guess) and whole.suffices(guess)
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.05])
+def test_what_a_solution_exceeds_is_added(monkeypatch, reach):
+    expected = plan("ipanema-1", TASK)
+    monkeypatch.setattr(search, "NEAR", reach)
+    planned = plan("ipanema-1", TASK)
+    assert expected.feasible and planned.feasible
+    assert planned.objective == pytest.approx(expected.objective, rel=1e-3)
+
+
+def test_a_jump_over_a_place_between_two_points_is_noticed():
+    small = {**BALL, "centre": [0.2, 0.1, 1.2], "radius": 0.05}
+    scenario = scenario_of({**TASK, "limits": {"keep_out": [small]}})
+    shares = np.array([0.0, 0.4, 0.6, 1.0])  # the ball is halfway
+    guess = initial_guess(scenario, np.linspace(0.0, 1.0, 41) * scenario.duration)
+    nothing = np.array([[not is_local(limit)] * 4 for limit in scenario.limits])
+    assert not Near(nothing).suffices(scenario, shares, guess)
+    assert Near(nothing | (shares == 0.4)).suffices(scenario, shares, guess)  # that interval has rows
+    assert Near(nothing[:, :2]).suffices(scenario, shares[:2] / 2, guess)
+
+
+def test_a_platform_that_does_not_turn_keeps_true_distances_where_it_keeps_linear_ones():
+    # A distance from a convex body is convex: nowhere is it less than its tangent.
+    past = {**TASK, "path": {"kind": "line", "start": [-0.4, -0.35, 1.2], "end": [0.8, -0.35, 1.2]}}
+    scenario = scenario_of({**past, "objective": {"deviation": 100.0}})
+    linear = LinearDistances(build(scenario, Mesh(40)))
+    rng = np.random.default_rng(2)
+    guess = initial_guess(scenario, linear.shares * scenario.duration)
+    for _ in range(3):
+        outcome = linear.solve(guess, None, False, np.inf)
+        assert outcome.success
+        assert linear.missed(outcome.deviation) <= 1e-7
+        q = outcome.deviation.q + rng.normal(0.0, 0.05, outcome.deviation.q.shape)
+        guess = type(guess)(guess.nodes, q, guess.v, guess.a, guess.tensions)
