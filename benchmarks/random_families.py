@@ -6,6 +6,7 @@
     window     the way leads through a hole in a wall
     team       three or four quadrotors carry a load two metres, past a ball every other time
     moving     the motion begins while platform and carriers move
+    phases     a load is picked up, lifted, carried, lowered and put down; a fifth is four times the platform's weight
 
 Where a family needs places at which the platform can rest, they are chosen so that tensions exist there with the
 carriers at home. Nothing else makes a task feasible: some are not.
@@ -109,9 +110,12 @@ def _size(robot: Robot) -> float:
     return float(np.clip(np.ptp(anchors, axis=0).max(), 0.5, 3.0))
 
 
-def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray) -> bool:
+def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray, load: dict[str, Any] | None = None) -> bool:
     robot = dynamics.robot
     A, w = dynamics.wrench_matrix(pose), dynamics.required_wrench(pose, rest, rest)
+    if load is not None:
+        weight = -load["mass"] * np.array(robot.gravity)
+        w = w + np.r_[weight, np.cross(np.array(load["com"]) - robot.platform.com, weight)]  # the platform is level
     spare = 0.05 * (robot.t_max - robot.t_min)
     return solve(wrench_problem(dynamics.robot, A, w, robot.t_min + 0.1, robot.t_max - spare)).feasible
 
@@ -272,6 +276,38 @@ def _moving(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     }
 
 
+def _phases(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task that picks a load up, carries it and puts it down, which may be too heavy."""
+    name = OF_SPACE[seed % len(OF_SPACE)]
+    robot = load(name)
+    size = _size(robot)
+    start, end = _place(rng, robot, 0.2 * size), _place(rng, robot, 0.2 * size)
+    start[3:] = end[3:] = robot.home[3:]
+    end[2], up = start[2], np.array([0, 0, rng.uniform(0.05, 0.2) * size, 0, 0, 0])
+    body = {"mass": robot.platform.mass, "com": [0.0, 0.0, -float(rng.uniform(0.0, 0.2)) * size]}
+    heavy = seed % 5 == 0
+    while not heavy and not all(_can_rest(Dynamics(robot), at, np.zeros(6), body) for at in (start, end, end + up)):
+        body["mass"] *= 0.7
+    body["mass"] *= 4.0 if heavy else float(rng.uniform(0.2, 0.8))
+
+    def move(name: str, first: np.ndarray, last: np.ndarray) -> dict[str, Any]:
+        path = {"kind": "line", "start": first.tolist(), "end": last.tolist()}
+        return {"name": name, "duration": float(rng.uniform(1.5, 4.0)), "path": path, "load": body}
+
+    rest = {"kind": "rest", "pose": start.tolist()}
+    phases = [
+        {"name": "pick-up", "duration": 0.5, "path": rest, "ground": {}, "load": body},
+        move("lift", start, start + up),
+        move("carry", start + up, end + up),
+        move("lower", end + up, end),
+        {"name": "set-down", "duration": 0.5, "ground": {}, "load": body},
+    ]
+    task: dict[str, Any] = {"phases": phases, "steps": 60, "base": _base(rng, robot)}
+    if not heavy and rng.random() < 0.5:
+        task["tube"] = {"position": 0.02 * size}
+    return name, task
+
+
 Family = Callable[[np.random.Generator, int], tuple[str, dict[str, Any]]]
 
 FAMILIES: dict[str, Family] = {
@@ -281,4 +317,5 @@ FAMILIES: dict[str, Family] = {
     "window": _window,
     "team": _team,
     "moving": _moving,
+    "phases": _phases,
 }

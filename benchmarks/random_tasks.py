@@ -29,6 +29,7 @@ from .random_families import FAMILIES, random_task
 
 MOST_NOT_FOUND = 0.02
 TOUCHING = 1e-6  # [m]
+DIFFERENCES = 5e-5  # of the weight: what second differences over a millisecond miss where the jerk jumps
 
 
 class Outcome(NamedTuple):
@@ -110,8 +111,11 @@ def wrong(planned: Plan) -> str:
             return "wrong: feasible, but a tension is beyond its limits"
         A = planned.scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
         w = planned.scenario.dynamics.required_wrench(*audit.motion, *audit.carriers, wind=planned.scenario.wind)
-        short = ((np.einsum("nij,nj->ni", A, tensions) - w) * robot.dof_mask)[:, :3]
-        if np.linalg.norm(short, axis=1).max() > max(audit.tolerance, 1e-6):
+        load, known, ground = _carried(planned)
+        short = ((np.einsum("nij,nj->ni", A, tensions) - w - load) * robot.dof_mask)[known, :3]
+        short[ground[known], 2] = np.maximum(short[ground[known], 2], 0.0)
+        tolerance = DIFFERENCES * robot.force_scale if load.any() else 1e-6
+        if np.linalg.norm(short, axis=1).max() > max(audit.tolerance, tolerance):
             return "wrong: feasible, but the tensions do not give the force"
         if _touches(planned):
             return "wrong: feasible, but the platform is inside an obstacle"
@@ -126,11 +130,43 @@ def wrong(planned: Plan) -> str:
         motions = [part[row] for part in (*audit.motion, *audit.carriers)]
         wind = certificate.wind or planned.scenario.wind
         w = planned.scenario.dynamics.required_wrench(*motions, wind=wind)
-        problem = wrench_problem(planned.scenario.robot, A, w, *planned.scenario.bounds())
-        return "" if certificate.verify(problem) else "wrong: infeasible, but its certificate proves nothing"
+        load, known, ground = _carried(planned)
+        if ground[row] or not known[row]:
+            return ""
+        if not planned.scenario.task.phases:
+            proves = certificate.verify(wrench_problem(robot, A, w, *planned.scenario.bounds()))
+        else:  # to what the differences are accurate to
+            pull, direction = A.T @ certificate.direction, np.array(certificate.direction)
+            proves = direction @ (w + load[row]) > np.maximum(pull * low, pull * high).sum()
+        return "" if proves else "wrong: infeasible, but its certificate proves nothing"
     if planned.status is MotionStatus.NOT_FOUND and not planned.reason:
         return "wrong: not found, but no reason is stated"
     return ""
+
+
+def _carried(planned: Plan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what loads need beside the platform (n, 6), where that is known, and where the ground bears them, (n,).
+
+    The acceleration of a load is a difference of its positions, which needs instants of the same phase around it.
+    """
+    times, pose, task = planned.audit.times, planned.audit.motion.pose, planned.scenario.task
+    turned = Rotation.from_euler("ZYX", pose[:, 5:2:-1]).as_matrix()
+    robot = planned.scenario.robot
+    wrench, known, ground = np.zeros((len(times), 6)), np.ones(len(times), bool), np.zeros(len(times), bool)
+    for phase, laid in zip(task.phases or (), planned.scenario.phases.all, strict=True):
+        begin, end = laid.start, laid.end
+        inside = np.flatnonzero((times > begin) & (times < end))
+        known[(times >= begin) & (times <= end)] = False
+        known[inside[2:-2]] = True
+        ground[(times >= begin) & (times <= end)] |= phase.ground is not None
+        if phase.load is None:
+            continue
+        where = pose[inside, :3] + turned[inside] @ np.array(phase.load.com)
+        speed = np.gradient(where, times[inside], axis=0)
+        force = phase.load.mass * (np.gradient(speed, times[inside], axis=0) - np.array(robot.gravity))
+        arm = turned[inside] @ (np.array(phase.load.com) - np.array(robot.platform.com))
+        wrench[inside] = np.hstack([force, np.cross(arm, force)])
+    return wrench, known, ground
 
 
 def _touches(planned: Plan) -> bool:

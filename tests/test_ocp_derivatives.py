@@ -14,7 +14,10 @@ LINE = {"kind": "line", "start": [0.1, 0, 1.2], "end": [0.6, 0.2, 1.5]}
 ROUND = {"kind": "waypoints", "points": [[0.1, 0, 1.2], [0.3, 0.2, 1.6], [0.6, 0.2, 1.5]]}
 TEAM = {"path": {"kind": "line", "start": [0, 0, 0], "end": [1, 0, 0]}, "base": {"kind": "free"}, "duration": 4}
 TASKS = {
-    "obstacle": ("ipanema-1", {"path": LINE, "duration": 3, "tube": {"position": "free"}, "limits": {"keep_out": [BOX]}}),
+    "obstacle": (
+        "ipanema-1",
+        {"path": LINE, "duration": 3, "tube": {"position": "free"}, "limits": {"keep_out": [BOX]}},
+    ),
     "duration": (
         "ipanema-1",
         {"path": LINE, "duration": {"min": 1, "max": 9}, "tube": {"position": 0.1}, "objective": {"time": 1.0}},

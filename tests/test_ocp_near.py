@@ -34,10 +34,14 @@ def test_rows_of_far_places_are_left_out():
     guess = initial_guess(scenario, whole.shares * scenario.duration)
     near = Near.along(scenario, whole.shares, guess, 0.05)
     ball, far = (near.chosen[k] for k, limit in enumerate(scenario.limits) if is_local(limit))
-    assert not far.any() and ball.any() and not ball[0] and not ball[-1]
+    assert not far.any()
+    assert ball.any()
+    assert not ball[0]
+    assert not ball[-1]
     part = build(scenario, mesh, near)
     assert len(part.lower_g) < len(whole.lower_g)
-    assert part.suffices(guess) and whole.suffices(guess)
+    assert part.suffices(guess)
+    assert whole.suffices(guess)
 
 
 @pytest.mark.parametrize("reach", [0.0, 0.05])
@@ -45,7 +49,8 @@ def test_what_a_solution_exceeds_is_added(monkeypatch, reach):
     expected = plan("ipanema-1", TASK)
     monkeypatch.setattr(search, "NEAR", reach)
     planned = plan("ipanema-1", TASK)
-    assert expected.feasible and planned.feasible
+    assert expected.feasible
+    assert planned.feasible
     assert planned.objective == pytest.approx(expected.objective, rel=1e-3)
 
 
