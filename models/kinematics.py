@@ -11,6 +11,8 @@ paper C, Eqs. 1, 2, 5, 6 as corrected.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 import numpy as np
 
@@ -25,14 +27,27 @@ def transform(pose: Matrix, points: np.ndarray) -> Matrix:
 
 def anchors(points: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
     """Place anchors `points` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), in {G}: (3, m) [m]."""
-    owners = zip(points, carrier_of_cable.tolist(), strict=True)
-    return ca.horzcat(*(transform(carrier_pose[carrier, :].T, point[None]) for point, carrier in owners))
+    return _by_carrier(points, carrier_of_cable, carrier_pose, transform)
 
 
 def axes(directions: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
     """Turn axes `directions` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), into {G}: (3, m) [-]."""
-    owners = zip(directions, carrier_of_cable.tolist(), strict=True)
-    return ca.horzcat(*(rotation(carrier_pose[carrier, 3:6].T) @ ca.DM(direction) for direction, carrier in owners))
+    return _by_carrier(directions, carrier_of_cable, carrier_pose, lambda pose, its: rotation(pose[3:6]) @ ca.DM(its.T))
+
+
+def _by_carrier(
+    vectors: np.ndarray,
+    carrier_of_cable: np.ndarray,
+    carrier_pose: Matrix,
+    move: Callable[[Matrix, np.ndarray], Matrix],
+) -> Matrix:
+    """Return what a carrier's pose makes of the vectors of its cables, (3, m): one rotation a carrier."""
+    columns: dict[int, Matrix] = {}
+    for carrier in np.unique(carrier_of_cable).tolist():
+        its = np.flatnonzero(carrier_of_cable == carrier)
+        moved = move(carrier_pose[carrier, :].T, vectors[its])
+        columns |= dict(zip(its.tolist(), ca.horzsplit(moved), strict=True))
+    return ca.horzcat(*(columns[i] for i in range(len(vectors))))
 
 
 def cables(
@@ -45,5 +60,4 @@ def cables(
 def wrench_matrix(attachments: np.ndarray, com: np.ndarray, pose: Matrix, directions: Matrix) -> Matrix:
     """Return A, (6, m): force [N per N] and moment about the CoM [N m per N] of each cable, in the frame of `pose`."""
     arms = rotation(pose[3:6]) @ ca.DM((attachments - com).T)  # (3, m)
-    moments = [ca.cross(arms[:, i], directions[:, i]) for i in range(len(attachments))]
-    return ca.vertcat(directions, ca.horzcat(*moments))
+    return ca.vertcat(directions, ca.cross(arms, directions, 1))
