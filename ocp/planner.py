@@ -62,7 +62,7 @@ LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible imposs
 GLOBAL_SHARE = 0.2  # of the time limit
 SHRINK = 2e-3  # of limits beside those of the tensions
 LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
-NO_SLACK = 1e-6  # of the weight: a motion with less missing at its nodes is a start for another try
+NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
 
 
 def plan(

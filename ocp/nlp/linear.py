@@ -20,6 +20,8 @@ from .solver import Outcome, Progress, Solver
 
 __all__ = ["LinearDistances"]
 
+MOST_ITERATIONS = 150  # of a pass: those that end well take 10 to 90
+
 
 class LinearDistances:
     """The program, its solver, and the expressions that it needs about a motion.
@@ -51,7 +53,7 @@ class LinearDistances:
         first = Block(linear, rows, np.zeros(1, int), slopes=slopes)
         problem = program.problem | {"g": ca.vertcat(linear, program.problem["g"][self._count :]), "p": p}
         self._sparsity = slopes.sparsity()
-        self._solver = Solver(replace(program, problem=problem, blocks=[first, *others]))
+        self._solver = Solver(replace(program, problem=problem, blocks=[first, *others]), MOST_ITERATIONS)
 
     def solve(self, motion: Deviation, progress: Progress | None, again: bool, seconds: float) -> Outcome:
         """Solve with distances about a motion at the program's points; `again` if it solved the program before."""
