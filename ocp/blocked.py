@@ -20,6 +20,7 @@ from .audits.by_phase import distribution
 from .audits.checks import LENGTH_TOLERANCE
 from .audits.excess import Excess
 from .limits import Limit, Rate
+from .no_attitude import no_attitude
 from .tasks.ends import AT_REST, fixed_values
 from .tasks.paths import Motion
 from .tasks.scenario import ATTITUDE, Scenario
@@ -81,6 +82,8 @@ def blocked(scenario: Scenario) -> Blocked | None:
     proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
     proven += too_heavy(scenario, _resting(freedom, platform, carriers))
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
+    if not proven and certificate is None:
+        proven += _at_no_attitude(scenario, times, freedom, platform, carriers)
     return Blocked(proven, certificate) if proven or certificate is not None else None
 
 
@@ -152,6 +155,22 @@ def _exceeded(
         if not any(excess.limit == other.limit and excess.about == other.about for other in exceeded):
             exceeded.append(excess)
     return exceeded
+
+
+def _at_no_attitude(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> list[Excess]:
+    """Return the limit that the platform exceeds at an end whatever attitude the planner chooses there."""
+    if scenario.relative:
+        return []
+    for end in (0, 1):
+        angles = [i for i in ATTITUDE if freedom[end][0, 0, i] == NEAR]
+        if angles and (freedom[end][0, 0, :3] == GIVEN).all():
+            usable = ~_dependent(scenario, freedom[end])[0]
+            pose, places = platform.pose[end], carriers.pose[end]
+            if proven := no_attitude(scenario, float(times[end]), angles, pose, places, usable):
+                return proven
+    return []
 
 
 def _stretched(

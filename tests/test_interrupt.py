@@ -38,6 +38,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals are sent otherw
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "fast.yaml").write_text(TASK)
+    (tmp_path / "slow.yaml").write_text(TASK + "steps: 800\n")
     (tmp_path / "script.py").write_text(SCRIPT)
     return tmp_path
 
@@ -72,7 +73,7 @@ def test_an_interrupt_from_outside_ends_plan(folder, moment):
 @pytest.mark.parametrize("seconds", [1.0, 2.5, 4.0, 7.0])
 def test_an_interrupt_ends_the_command_with_one_line(folder, seconds):
     before = set(os.listdir(folder))
-    process = start([TOWLINE, "plan", "multi-quadrotor-3", "fast.yaml"], folder)
+    process = start([TOWLINE, "plan", "multi-quadrotor-3", "slow.yaml"], folder)
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(seconds)
     sent = time.perf_counter()
