@@ -60,3 +60,12 @@ def test_away_from_the_boundary_it_is_what_solve_finds(seed):
             for t in (solution.tensions, exact_optimum(problem, project(problem).closest))
         ]
         assert cost[1] == pytest.approx(cost[0], rel=1e-6, abs=1e-12)
+
+
+def test_a_cable_that_the_null_space_does_not_move_stays_at_its_limit():
+    """Cables 1 and 5 are opposed and unlimited; rounding gives cable 4, which alone must do more than it can, 1e-17."""
+    problem = TensionProblem(*awkward_problem(5237))
+    solution = solve(problem)
+    assert solution.status == "infeasible"
+    assert solution.certificate is not None
+    assert solution.certificate.verify(problem)

@@ -9,8 +9,7 @@ SURE_PIVOT, SURE_ZERO = 1e-9, 1e-14
 STEPS, TURNS = 5, 5
 
 SLACK = 1e-12  # how far s may pass a limit, relative to the size of s
-PARALLEL = 1e-11  # sine and length below which a slab does not cut a line
+PARALLEL = 1e-11  # length of a normal, or of its part outside the span of others, that is rounding
 STATIONARY = 1e-10  # part of the gradient that the multipliers may leave, relative to the size of s
 DECISIVE = 1e-5  # relative change of the cost if the limits move by the slack: above it rounding chose the tensions
-DEPENDENT = 1e-22  # square of the part of a normal outside the span of the active ones
 CLEAR = 4.0  # a shortfall is beyond doubt from this many tolerances

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .codes import DECISIVE, DEPENDENT, PARALLEL, SLACK, STATIONARY
+from .codes import DECISIVE, PARALLEL, SLACK, STATIONARY
 from .jit import compilable
 
 __all__ = ["dual_active_set"]
@@ -48,9 +48,6 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
                 s[i] = lower[i] if side[i] > 0.0 else upper[i]
             return 0 if _is_optimal(N, k, s, lower, upper, mm, slack, u, side, active, q) else 2
         own = 0.0  # the multiplier of p
-        size = 0.0
-        for c in range(k):
-            size += N[c * mm + p] * N[c * mm + p]
         while True:
             beyond = 0.0
             for c in range(k):
@@ -69,7 +66,7 @@ def dual_active_set(N, k, s, lower, upper, mm, slack, push, work, active):
             for j in range(q):
                 if r[j] > 0.0 and u[j] < shortest * r[j]:
                     shortest, leaving = u[j] / r[j], j
-            independent = q < k and beyond > DEPENDENT * max(size, PARALLEL * PARALLEL)
+            independent = q < k and beyond > PARALLEL * PARALLEL
             if not independent and leaving < 0:
                 push[p] = -sign
                 for j in range(q):
