@@ -5,6 +5,8 @@ BIN := .venv/bin
 export PYTHONDONTWRITEBYTECODE :=
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
+# What the extension is built from, where there is a C compiler.
+CORE := setup.py $(wildcard solvers/core/*.[ch])
 
 .PHONY: demo test setup lint types kernels unit docs errata pictures clean
 
@@ -54,18 +56,18 @@ pictures: .venv/core.stamp
 		--figures ../docs/pictures
 
 clean:
-	rm -rf .venv towline-demo build site *.egg-info
+	rm -rf .venv towline-demo build site *.egg-info solvers/core/*.so
 
 .venv/venv.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
 	touch $@
 
-.venv/core.stamp: pyproject.toml constraints.txt | .venv/venv.stamp
+.venv/core.stamp: pyproject.toml constraints.txt $(CORE) | .venv/venv.stamp
 	$(INSTALL) .
 	touch $@
 
 # One installation, not one after the core's: each builds towline anew.
-.venv/dev.stamp: pyproject.toml constraints.txt | .venv/venv.stamp
+.venv/dev.stamp: pyproject.toml constraints.txt $(CORE) | .venv/venv.stamp
 	$(INSTALL) ".[bench,cluster,dev,docs,mesh,mujoco,notebooks,timing,viewer]"
 	touch .venv/core.stamp $@

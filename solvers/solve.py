@@ -1,6 +1,6 @@
 """Solve one problem by any method: look it up, bring the problem to standard form, propose, judge."""
 
-import time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from ..inputs import shown
 from . import compiled
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
+from .core import CABLES, ROWS, solve_packed
 from .judge import judge
 from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR
 from .kernels.memory import floats
@@ -55,18 +56,22 @@ def solve(
     InputError
         If there is no such method, back end or option; the message lists those that exist.
     """
-    start = time.perf_counter()
+    start = perf_counter()
     if not isinstance(problem, TensionProblem):
         raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
     if isinstance(method, str) and method == "active-set" and backend is None and not options:
-        loaded = compiled.current()
         n, m = problem.A.shape
         tensions = np.empty(m)
-        code = loaded.one(problem.packed, n, m, tensions)
+        if n <= ROWS and m <= CABLES:
+            code, used = solve_packed(problem.packed, tensions), "c"
+        else:
+            loaded = compiled.current()
+            code, used = loaded.one(problem.packed, n, m, tensions), loaded.backend
+        if code == OPTIMAL:
+            return TensionSolution(problem, tensions, STATUSES[OPTIMAL], "active-set", used, perf_counter() - start)
         if code <= SINGULAR:
-            given, proof = (tensions, None) if code == OPTIMAL else (None, _prove)
-            spent = time.perf_counter() - start
-            return TensionSolution(problem, given, STATUSES[code], method, loaded.backend, spent, proof=proof)
+            spent = perf_counter() - start
+            return TensionSolution(problem, None, STATUSES[code], "active-set", used, spent, None, "", _prove)
     chosen, backend = _look_up(method, backend, options)
     used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the kernel was not sure
 
@@ -86,14 +91,14 @@ def solve(
         if left is None:
             break
         exact = tensions  # the method chooses from what is left
-    spent = time.perf_counter() - start
+    spent = perf_counter() - start
     return TensionSolution(
         problem, tensions, status, chosen.name, used, spent, proposal.iterations, detail, certificate
     )
 
 
 def _prove(problem: TensionProblem) -> Certificate | None:
-    """Return the sharpest certificate of what the kernel proved, or else the one along its own direction."""
+    """Return the sharpest certificate of what was proven, or else the one along the direction that proved it."""
     projection = project(problem)
     certificate = sharpest(problem, projection)
     if certificate is None and (direction := _direction_of_kernel(problem)) is not None:
@@ -102,9 +107,11 @@ def _prove(problem: TensionProblem) -> Certificate | None:
 
 
 def _direction_of_kernel(problem: TensionProblem) -> Array | None:
-    """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of the kernel rests."""
+    """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of "active-set" rests."""
     n, m = problem.A.shape
     direction = np.full(n, np.nan)
+    if n <= ROWS and m <= CABLES:
+        return direction if solve_packed(problem.packed, np.empty(m), direction) in (INFEASIBLE, SINGULAR) else None
     given: list[Any] = [problem.A.ravel(), *(problem.w, problem.t_min, problem.t_max, problem.t_ref, problem.weights)]
     outputs: list[Any] = [np.empty(m), direction, np.empty(3)]
     views = [memoryview(array) for array in (*given, *outputs)]

@@ -6,9 +6,10 @@ from .daqp import Daqp
 class ActiveSet(Daqp):
     """Weighted least squares to t_ref inside the limits, by a dual active-set method in the null space.
 
-    `solve` runs the kernel; what it is not sure of goes to the daqp package and is judged as the other methods are. The
-    kernel runs as plain Python, some 0.4 ms a call, until a process has lost more time to that than loading its machine
-    code takes; a control loop calls `compiled.load()` first. Both give the same bits.
+    `solve` runs the C core, `towline.solvers.core`, if towline was installed where there is a C compiler. Without it a
+    kernel of our own runs as plain Python, some 0.4 ms a call, until a process has lost more time to that than loading
+    its machine code takes; a control loop calls `compiled.load()` first. What either is not sure of goes to the daqp
+    package and is judged as the other methods are.
     """
 
     name = "active-set"

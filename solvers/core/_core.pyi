@@ -1,0 +1,6 @@
+from typing import Any
+
+CABLES: int
+ROWS: int
+
+def solve_packed(packed: Any, tensions: Any, direction: Any = None) -> int: ...

@@ -1,0 +1,109 @@
+/* The problem in s, of least norm; see towline_core.c, 1 to 3. */
+#include "internal.h"
+
+/*
+ * Bring a problem to standard form: rho > 0 for a soft answer, else 0; with `all`, fixed cables count as free. Return
+ * the size of the tensions needed.
+ */
+real towline_standard_form(form *f, const towline_problem *problem, real rho, int all) {
+    const int n = problem->n, m = problem->m;
+    real t[CABLES]; /* at s = 0 */
+    real heaviest = 0, size = 0;
+    for (int c = 0; c < m; c++) {
+        heaviest = larger(heaviest, weight(problem, c));
+    }
+    f->n = n;
+    f->columns = 0;
+    for (int c = 0; c < m; c++) {
+        t[c] = problem->t_min[c];
+        if (all || problem->t_min[c] < problem->t_max[c]) {
+            const int i = f->columns++;
+            t[c] = reference(problem, c);
+            f->moving[i] = c;
+            f->unit[i] = 1;
+            f->low[i] = problem->t_min[c] - t[c];
+            f->high[i] = problem->t_max[c] - t[c];
+            if (weight(problem, c) != heaviest) {
+                f->unit[i] = root(heaviest / weight(problem, c));
+                f->low[i] /= f->unit[i];
+                f->high[i] /= f->unit[i];
+            }
+            size = larger(size, magnitude(between(f->low[i], 0, f->high[i])));
+        }
+    }
+    f->cables = f->columns;
+    for (int i = 0; rho > 0 && i < n; i++) {
+        const int c = f->columns++;
+        f->unit[c] = 1 / root(rho);
+        f->low[c] = -(real)INFINITY;
+        f->high[c] = (real)INFINITY;
+    }
+    f->width = FILLED(f->columns);
+    const real per_length = 1 / problem->length;
+    for (int i = 0; i < n; i++) {
+        const real scale = problem->n == 6 && i >= 3 ? per_length : 1;
+        real rest = problem->w[i];
+        for (int c = 0; c < m; c++) {
+            rest -= problem->A[i * m + c] * t[c];
+        }
+        f->scale[i] = scale;
+        f->b[i] = rest * scale;
+        real *row = f->B + i * f->width;
+        for (int c = 0; c < f->cables; c++) {
+            row[c] = problem->A[i * m + f->moving[c]] * scale * f->unit[c];
+        }
+        for (int c = f->cables; c < f->width; c++) {
+            row[c] = c == f->cables + i && c < f->columns ? f->unit[c] : 0;
+        }
+    }
+    for (int c = 0; c < f->width; c++) {
+        f->push[c] = 0;
+    }
+    f->steps = f->inner = 0;
+    f->margin = 0;
+    return size;
+}
+
+/*
+ * Make s the least norm without limits. Return its size, and in `worst` and `missing` the row whose part of b is
+ * farthest outside the range of B; -1 and 0 if there is none.
+ */
+real towline_least_norm(form *f, int *worst, real *missing) {
+    real square = 0;
+    *worst = -1;
+    *missing = 0;
+    for (int j = 0; j < f->n; j++) {
+        const real *row = f->L + j * ROWS;
+        real x = f->b[f->order[j]];
+        for (int i = 0; i < j && i < f->rank; i++) {
+            x -= row[i] * f->s[i];
+        }
+        if (j < f->rank) {
+            f->s[j] = x / row[j];
+            square += f->s[j] * f->s[j];
+        } else if (magnitude(x) > magnitude(*missing)) {
+            *missing = x;
+            *worst = j;
+        }
+    }
+    for (int c = f->rank; c < f->width; c++) {
+        f->s[c] = 0;
+    }
+    for (int j = f->rank - 1; j >= 0; j--) {
+        towline_reflect(f, j, f->s);
+    }
+    return root(square);
+}
+
+/* Move s to the point of least norm inside the limits. */
+outcome towline_enter_limits(form *f) {
+    int outside = 0;
+    for (int c = 0; c < f->columns; c++) {
+        outside |= f->s[c] < f->low[c] - f->slack || f->s[c] > f->high[c] + f->slack;
+    }
+    if (!outside) {
+        return REACHED;
+    }
+    towline_null_space(f);
+    return f->k <= 2 ? towline_slabs(f) : towline_dual_active_set(f);
+}

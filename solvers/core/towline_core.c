@@ -1,0 +1,181 @@
+/*
+ * How it works.
+ *
+ * 1. Standard form. S divides moments by the length. With s_i = sqrt(omega_i / max omega) (t_i - t_ref_i) for each
+ *    cable whose limits differ, the problem
+ *
+ *        minimise sum_i omega_i (t_i - t_ref_i)^2   subject to   A t = w,   t_min <= t <= t_max
+ *
+ *    becomes: the s of least norm with B s = b, low <= s <= high. The columns of B are those of S A, scaled; b is S w
+ *    less the wrench of t_ref and of the fixed cables.
+ *
+ * 2. Reduction (reduction.c). B = P^T [L 0] Q with Q orthonormal, largest row first. The pivots decide the rank; if one
+ *    lies where rounding cannot be told from data, the answer is TOWLINE_INACCURATE. L y = P b and s_0 = Q^T [y; 0] is
+ *    the least norm without limits. Columns rank, rank + 1, ... of Q^T are an orthonormal basis N of the null space:
+ *    all s = s_0 + N z give b, |s|^2 = |s_0|^2 + |z|^2, and each cable is a slab low_i <= s_0i + n_i . z <= high_i.
+ *
+ * 3. The point of least norm in these slabs. If s_0 is in all of them it is s_0. Else with m - rank of 0, 1 or 2
+ *    slabs.c takes one slab after the other: at most m steps and m (m - 1) / 2 cuts. Above, a dual active-set method
+ *    (dual_active_set.c) takes at most 10 m + 20 steps. Either ends at a point with multipliers, or at limits that
+ *    exclude each other.
+ *
+ * 4. Proof (proof.c). Tensions are optimal if, inside their limits, their wrench error is below
+ *
+ *        1e-9 (|S w| + sum_i |S a_i| |u_i|) + 1e-13 sum_i |S a_i| (|t_i| + |t_ref_i|)
+ *
+ *    with u_i the tension inside the limits that is nearest to zero, and if the multipliers are their gradient in the
+ *    null space. Limits that exclude each other give a direction: their multipliers x satisfy N^T x = 0, so that
+ *    x = B^T d has a solution d, and the shortfall
+ *
+ *        d . w - max { d . A t : t_min <= t <= t_max } > 0
+ *
+ *    is computed from A, w and the limits alone (certificate.c). What neither proves is TOWLINE_INACCURATE.
+ *
+ * 5. Soft answer. The missing wrench is S^-1 e with e as n more columns, without limits and of weight rho. That problem
+ *    always has a solution, which steps 2 and 3 compute. [A S^-1] has rank n, also in floating point: no reflector
+ *    touches a row's own column of S^-1 before the row is a pivot itself. The tensions are inside the limits to the
+ *    last bit, whatever rounding did.
+ *
+ * In float the limits are first moved inwards by a few roundings, and the tensions count as optimal only if
+ * `towline_proves_feasible` confirms that exact ones are near: a problem that is infeasible by less than rounding is
+ * TOWLINE_INACCURATE, never optimal.
+ */
+#include "internal.h"
+
+static int is_valid(const towline_problem *problem) {
+    const int n = problem->n, m = problem->m;
+    if (n < 1 || n > TOWLINE_ROWS || m < 1 || m > TOWLINE_CABLES) {
+        return 0;
+    }
+    if (!(problem->length >= 1 / HEAVIEST && problem->length <= HEAVIEST)) {
+        return 0;
+    }
+    for (int i = 0; i < n * m; i++) {
+        if (!(magnitude(problem->A[i]) < LARGEST)) {
+            return 0;
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        if (!(magnitude(problem->w[i]) < LARGEST)) {
+            return 0;
+        }
+    }
+    real heaviest = 0, lightest = HEAVIEST;
+    for (int c = 0; c < m; c++) {
+        const real low = problem->t_min[c], high = problem->t_max[c], omega = weight(problem, c);
+        if (!(low <= LARGEST && high >= -LARGEST && low <= high)) {
+            return 0;
+        }
+        if (!(magnitude(reference(problem, c)) < LARGEST && omega >= 1 / HEAVIEST && omega <= HEAVIEST)) {
+            return 0;
+        }
+        heaviest = larger(heaviest, omega);
+        lightest = smaller(lightest, omega);
+    }
+    return heaviest <= WEIGHTS_APART * lightest;
+}
+
+/* Write the tensions of s, moved inside the limits if rounding put them outside. */
+static void write_tensions(const form *f, const towline_problem *problem, real *t) {
+    for (int c = 0; c < problem->m; c++) {
+        t[c] = problem->t_min[c];
+    }
+    for (int c = 0; c < f->cables; c++) {
+        const int i = f->moving[c];
+        t[i] = between(problem->t_min[i], reference(problem, i) + f->unit[c] * f->s[c], problem->t_max[i]);
+    }
+}
+
+/*
+ * Leave space between s and its limits for the correction that exact tensions need; return 0 if a cable has no such
+ * space. The correction is estimated at the least norm, moved inside the limits; `t` is overwritten.
+ */
+static int move_limits_inwards(form *f, const towline_problem *problem, real *t) {
+    write_tensions(f, problem, t);
+    const real change = towline_correction(f, problem, t, 0);
+    f->margin = f->slack + (change < (real)INFINITY ? 3 * change : 0);
+    for (int c = 0; c < f->columns; c++) {
+        f->low[c] += f->margin;
+        f->high[c] -= f->margin;
+        if (!(f->low[c] <= f->high[c])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Return |S (A t - w)|. */
+static real wrench_error(const form *f, const towline_problem *problem, const real *t) {
+    real square = 0;
+    for (int i = 0; i < problem->n; i++) {
+        real error = -problem->w[i];
+        for (int c = 0; c < problem->m; c++) {
+            error += problem->A[i * problem->m + c] * t[c];
+        }
+        error *= f->scale[i];
+        square += error * error;
+    }
+    return root(square);
+}
+
+/* Solve a problem, all of `answer` but the status. */
+static towline_status solve_exactly(form *f, const towline_problem *problem, towline_answer *answer) {
+    int worst;
+    real missing, *t = answer->tensions;
+    answer->soft = answer->steps = answer->inner = 0;
+    answer->residual = answer->support = answer->shortfall = 0;
+    if (!is_valid(problem)) {
+        return TOWLINE_INVALID;
+    }
+    const real size = towline_standard_form(f, problem, 0, 0);
+    f->rank = towline_reduce(f, 1);
+    if (f->rank < 0) {
+        return TOWLINE_INACCURATE;
+    }
+    f->k = f->columns - f->rank;
+    f->slack = SLACK * larger(size, towline_least_norm(f, &worst, &missing));
+    if (MARGINS && !move_limits_inwards(f, problem, t)) {
+        return TOWLINE_INACCURATE;
+    }
+    const outcome met = towline_enter_limits(f);
+    answer->steps = f->steps;
+    answer->inner = f->inner;
+    write_tensions(f, problem, t);
+    const measure known = towline_measure(f, problem, t);
+    if (met == REACHED) {
+        answer->residual = wrench_error(f, problem, t);
+        if (answer->residual <= FEASIBILITY * known.required + ROUNDING * known.rounding) {
+            return !MARGINS || towline_proves_feasible(f, problem, t) ? TOWLINE_OPTIMAL : TOWLINE_INACCURATE;
+        }
+    }
+    return towline_certify(f, problem, &known, met, worst, missing, answer);
+}
+
+towline_status towline_solve(const towline_problem *problem, towline_answer *answer) {
+    form f;
+    return answer->status = solve_exactly(&f, problem, answer);
+}
+
+towline_status towline_solve_always(const towline_problem *problem, towline_real rho, towline_answer *answer) {
+    form f;
+    int worst;
+    real missing;
+    answer->status = solve_exactly(&f, problem, answer);
+    if (!(rho >= 1 / HEAVIEST && rho <= HEAVIEST)) {
+        answer->status = TOWLINE_INVALID;
+    }
+    if (answer->status == TOWLINE_OPTIMAL || answer->status == TOWLINE_INVALID) {
+        return answer->status;
+    }
+    const real size = towline_standard_form(&f, problem, rho, 0);
+    f.rank = towline_reduce(&f, 0);
+    f.k = f.columns - f.rank;
+    f.slack = SLACK * larger(size, towline_least_norm(&f, &worst, &missing));
+    towline_enter_limits(&f); /* without proof: these tensions are what there is */
+    answer->soft = 1;
+    answer->steps += f.steps;
+    answer->inner += f.inner;
+    write_tensions(&f, problem, answer->tensions);
+    answer->residual = wrench_error(&f, problem, answer->tensions);
+    return answer->status;
+}
