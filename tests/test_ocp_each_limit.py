@@ -234,7 +234,7 @@ CASES = {
         "ipanema-1",
         OUT,
         lambda p: 0.3 + np.linalg.norm(platform(p)[:, :3] - MIDDLE, axis=1),
-        lambda b: place("sphere", "platform", b - 0.3, centre=MIDDLE.tolist(), radius=1e-6),
+        lambda b: place("sphere", "platform", b - 0.3 - 1e-5, centre=MIDDLE.tolist(), radius=1e-5),
         share=1.15,
         least=True,
     ),
