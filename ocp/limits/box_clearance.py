@@ -6,10 +6,12 @@ a program differentiates some twenty products, however many pairs of faces there
 
 from __future__ import annotations
 
-from functools import cache, reduce
+from functools import cache
 from typing import Any, TypeAlias
 
 import casadi as ca
+
+from .piecewise import largest, within_segment
 
 __all__ = ["segment_outside_box"]
 
@@ -41,7 +43,7 @@ def _beyond_at_nearest(low: Point, high: Point, p: Point, p_end: Point) -> Point
     along = p_end - p
     fixed = along == 0
     kinks = [(face - p) / ca.if_else(fixed, 1.0, along) for face in (low, high)]
-    shares = [0.0, 1.0, *(_within(kink[i]) for kink in kinks for i in range(3))]
+    shares = [0.0, 1.0, *(within_segment(kink[i]) for kink in kinks for i in range(3))]
     before, after = ca.SX(0.0), ca.SX(1.0)
     for share in shares:
         at = p + share * along
@@ -54,7 +56,7 @@ def _beyond_at_nearest(low: Point, high: Point, p: Point, p_end: Point) -> Point
     from_faces = over * (p - high) + under * (p - low)
     counting = ca.dot(along**2, over + under)
     bent = counting > _FLAT * ca.sumsqr(along)
-    nearest = _within(-ca.dot(along, from_faces) / ca.if_else(bent, counting, 1.0))
+    nearest = within_segment(-ca.dot(along, from_faces) / ca.if_else(bent, counting, 1.0))
     # Along a segment beside the box all places are as near: a rounded number has no derivative.
     share = ca.if_else(bent, nearest, ca.floor(middle / _FINE) * _FINE)
     return from_faces + share * (over + under) * along
@@ -72,8 +74,8 @@ def _depth(low: Point, high: Point, p: Point, p_end: Point) -> Any:
     falling = [(-(before + half)[i], -slope[i]) for i in range(3)]
     rising = [((before - half)[i], slope[i]) for i in range(3)]
     meetings = [[_meeting(fall, rise) for rise in rising] for fall in falling]
-    deepest = _largest([value for row in meetings for value in row])
-    left = _first([_largest(row) >= deepest for row in meetings])
+    deepest = largest([value for row in meetings for value in row])
+    left = _first([largest(row) >= deepest for row in meetings])
     of_left = [sum(chosen * row[j] for chosen, row in zip(left, meetings, strict=True)) for j in range(3)]
     right = _first([value >= deepest for value in of_left])
     return _meeting(_weighted(left, falling), _weighted(right, rising))
@@ -83,7 +85,7 @@ def _meeting(falling: _Line, rising: _Line) -> Any:
     """Return the least of the larger of two heights, value and slope at the start, over a segment [m]."""
     (fall, down), (rise, up) = falling, rising
     change = up - down
-    share = _within((fall - rise) / ca.if_else(change > 0, change, 1.0))
+    share = within_segment((fall - rise) / ca.if_else(change > 0, change, 1.0))
     return ca.fmax(fall + share * down, rise + share * up)
 
 
@@ -99,11 +101,3 @@ def _first(holds: list[Any]) -> list[Any]:
 def _weighted(chosen: list[Any], lines: list[_Line]) -> _Line:
     value, slope = (sum(one * line[k] for one, line in zip(chosen, lines, strict=True)) for k in range(2))
     return value, slope
-
-
-def _within(share: Any) -> Any:
-    return ca.fmin(ca.fmax(share, 0.0), 1.0)
-
-
-def _largest(values: list[Any]) -> Any:
-    return reduce(ca.fmax, values)

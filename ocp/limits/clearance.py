@@ -13,6 +13,7 @@ import casadi as ca
 from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
 from .box_clearance import segment_outside_box
 from .convex_clearance import cable_outside_mesh, point_outside_mesh
+from .piecewise import largest, within_segment
 
 __all__ = ["between_cables", "between_points", "cable_outside", "point_outside"]
 
@@ -36,10 +37,10 @@ def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
     a, e, f = ca.sumsqr(along), ca.sumsqr(across), ca.dot(across, between)
     b, c = ca.dot(along, across), ca.dot(along, between)
     # On parallel lines every s will do; what is added to the denominator picks one.
-    s = _within((b * f - c * e) / (a * e - b * b + 1e-9 * a * e))
+    s = within_segment((b * f - c * e) / (a * e - b * b + 1e-9 * a * e))
     t = (b * s + f) / e
-    s = ca.if_else(t < 0, _within(-c / a), ca.if_else(t > 1, _within((b - c) / a), s))
-    return between_points(p + s * along, q + _within(t) * across)
+    s = ca.if_else(t < 0, within_segment(-c / a), ca.if_else(t > 1, within_segment((b - c) / a), s))
+    return between_points(p + s * along, q + within_segment(t) * across)
 
 
 def point_outside(place: Place, p: Point) -> Any:
@@ -50,7 +51,7 @@ def point_outside(place: Place, p: Point) -> Any:
         return _from_segment(p, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
         beyond = _beyond(ca.DM(place.min), ca.DM(place.max), _before_turn(place, p))
-        return ca.if_else(_largest(beyond) <= 0, _largest(beyond), ca.sqrt(_squared(beyond) + _TINY))
+        return ca.if_else(largest(beyond) <= 0, largest(beyond), ca.sqrt(_squared(beyond) + _TINY))
     if isinstance(place, ConvexMesh):
         return point_outside_mesh(place, p)
     raise TypeError(f"{type(place).__name__} is not an obstacle")
@@ -91,16 +92,5 @@ def _squared(beyond: list[Any]) -> Any:
 
 def _from_segment(p: Point, start: Point, end: Point) -> Any:
     along = end - start
-    share = _within(ca.dot(p - start, along) / (ca.sumsqr(along) + _TINY))
+    share = within_segment(ca.dot(p - start, along) / (ca.sumsqr(along) + _TINY))
     return between_points(p, start + share * along)
-
-
-def _within(share: Any) -> Any:
-    return ca.fmin(ca.fmax(share, 0.0), 1.0)
-
-
-def _largest(values: list[Any]) -> Any:
-    largest = values[0]
-    for value in values[1:]:
-        largest = ca.fmax(largest, value)
-    return largest

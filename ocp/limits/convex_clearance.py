@@ -15,6 +15,7 @@ import numpy as np
 from ...models.part import Pose, Vector3
 from ...models.polyhedron import Polyhedron
 from ...models.shapes import ConvexMesh
+from .piecewise import within_segment
 
 __all__ = ["cable_outside_mesh", "point_outside_mesh"]
 
@@ -173,12 +174,8 @@ def _squared(p: Any, p_end: Any, starts: Any, edges: Any) -> Any:
     b, c, f = ca.mtimes(edges, along), ca.mtimes(between, along), ca.sum2(edges * between)
     beside = a * e - b * b
     cross = beside > _PARALLEL * a * e
-    s = ca.if_else(cross, _within((b * f - c * e) / ca.if_else(cross, beside, 1.0)), 0.0)
+    s = ca.if_else(cross, within_segment((b * f - c * e) / ca.if_else(cross, beside, 1.0)), 0.0)
     t = (b * s + f) / e
-    s = ca.if_else(t < 0, _within(-c / a), ca.if_else(t > 1, _within((b - c) / a), s))
-    gap = between + ca.mtimes(s, along.T) - ca.repmat(_within(t), 1, 3) * edges
+    s = ca.if_else(t < 0, within_segment(-c / a), ca.if_else(t > 1, within_segment((b - c) / a), s))
+    gap = between + ca.mtimes(s, along.T) - ca.repmat(within_segment(t), 1, 3) * edges
     return ca.sum2(gap**2)
-
-
-def _within(share: Any) -> Any:
-    return ca.fmin(ca.fmax(share, 0.0), 1.0)
