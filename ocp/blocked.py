@@ -20,7 +20,7 @@ from .audits.by_phase import distribution
 from .audits.checks import LENGTH_TOLERANCE
 from .audits.excess import Excess
 from .limits import Limit, Rate
-from .no_attitude import no_attitude
+from .no_attitude import CERTAIN, no_attitude
 from .tasks.ends import AT_REST, fixed_values
 from .tasks.paths import Motion
 from .tasks.scenario import ATTITUDE, Scenario
@@ -30,7 +30,6 @@ from .too_heavy import OF_WEIGHT, too_heavy
 __all__ = ["Blocked", "blocked"]
 
 PLACES = 41  # along the path
-CERTAIN = 1e-5  # [m], of distances from places, whose formulas are rounded where things touch
 GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
 
 

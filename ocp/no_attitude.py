@@ -13,7 +13,7 @@ from .audits.excess import Excess
 from .tasks.paths import Motion
 from .tasks.scenario import ATTITUDE, Scenario
 
-__all__ = ["no_attitude"]
+__all__ = ["CERTAIN", "no_attitude"]
 
 MOST = 30_000  # boxes
 CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things touch
@@ -72,8 +72,8 @@ def no_attitude(
         centres = (unproven[:, None] + half * corners).reshape(-1, len(angles))
         half /= 2
     k, limit = limits[int(middle[0].argmax())]
-    low, high = limit.low - values[k][0], values[k][0] - limit.high
-    which = int(np.maximum(low, high).argmax())
-    side, bound = ("at least", limit.low) if low[which] > high[which] else ("at most", limit.high)
+    which = int(np.maximum(limit.low - values[k][0], values[k][0] - limit.high).argmax())
+    value = float(values[k][0, which])
+    side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
     why = "no attitude in the tube keeps all distances"
-    return [Excess(limit.name, limit.about(which), time, float(values[k][0, which]), bound, limit.unit, side, why)]
+    return [Excess(limit.name, limit.about(which), time, value, bound, limit.unit, side, why)]

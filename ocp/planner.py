@@ -279,28 +279,28 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
-def _global_path(search: Search, balance: bool) -> Deviation | None:
-    """Return a motion past what the usual guess collides with, or the best guess; None if it collides with nothing.
+def _global_path(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
+    """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
 
     With `balance` a place without tensions at rest counts as a collision.
     """
     scenario = search.scenario
     if scenario.count == 0 or not is_open(scenario):
-        return None
+        return None, False
     with search.stage("global path") as stage:
         exceeded = guess_exceeds(scenario, partial(usual_guess, scenario), balance)
         if not exceeded:
-            return None
+            return None, False
         nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
         formation = formation_guess(scenario)
         if formation is not None and not guess_exceeds(scenario, formation, balance):
             stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
-            return formation(nodes)
+            return formation(nodes), True
         path, message = find_global_path(scenario, GLOBAL_SHARE * scenario.task.time_limit)
         stage.message = f"the direct motion exceeds {exceeded}: {message}"
         if path is not None:
-            return path.guess(scenario)
-        return None if formation is None else formation(nodes)
+            return path.guess(scenario), True
+        return None if formation is None else formation(nodes), True
 
 
 def _coarse(search: Search, start: Deviation | None) -> Deviation | None:
@@ -319,11 +319,12 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     guessed = start is None and not search.knows(mesh)
     # The program alone gets past most places without tensions at rest, unless another formation is what they need.
     team = bool(Space(scenario).loose)
+    collides = False
     if guessed:
-        start = _global_path(search, balance=team)
+        start, collides = _global_path(search, balance=team)
     outcome = _from_near(search, mesh, start, guessed)
-    if not outcome.success and guessed and not team and search.seconds_left > 0:
-        path = _global_path(search, balance=True)
+    if not outcome.success and guessed and not (team or collides) and search.seconds_left > 0:
+        path, _ = _global_path(search, balance=True)
         if path is not None:
             start, outcome = path, search.solve("nonlinear program", mesh, path)
     if not outcome.success and search.seconds_left > 0:

@@ -138,7 +138,8 @@ class Search:
         """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""
         start = time.perf_counter()
         known = self._solvers.get(mesh)
-        if known is None or (guess is not None and not np.isfinite(reach) and not known.program.near.is_everywhere):
+        again = known is not None and guess is None and known.has_solution  # goes on from there, with its own rows
+        if known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
             self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
         solver = self._solvers[mesh]
         solver.prepare(guess, coarser)

@@ -387,7 +387,7 @@ def test_a_copy_with_other_phases_has_their_path():
 
 
 def test_tasks_with_phases_are_equal_whatever_was_computed_from_them():
-    """What a path has computed stays in it, as arrays, which have no single truth value."""
+    """Compare what was given: a path keeps what it computed, arrays, which have no single truth value."""
     ours, theirs = (Task.model_validate({"phases": [line(HIGH, LOW, name="down")]}) for _ in range(2))
     assert plan(COGIRO, ours).feasible
     assert ours == theirs
@@ -425,7 +425,7 @@ def test_the_path_of_a_phase_is_named_like_that_of_a_task(path, message):
 
 
 def test_a_phase_that_an_infeasible_motion_steps_over_has_no_tensions():
-    """What is proven impossible is only shown, at the samples of the output: here every tenth of a second."""
+    """Show what is proven impossible at the samples of the output only: here every tenth of a second."""
     short = line(HIGH, [0, 0, 2.3], name="short", duration=0.02)
     phases = [line(LOW, HIGH, name="up", duration=1.01), short, line([0, 0, 2.3], HIGH, name="down", duration=0.97)]
     limits = {"platform_speed": 0.1}

@@ -115,7 +115,7 @@ def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
 
 
 def test_no_longer_duration_is_tried_where_an_end_is_in_the_way(monkeypatch):
-    """That would be a program or two for nothing: whether an end is inside a ball does not depend on time."""
+    """Spare a program or two for nothing: whether an end is inside a ball does not depend on time."""
     durations = []
     monkeypatch.setattr(relaxations, "_longer_duration", lambda search: durations.append(search) or [])
     for limits in ({"keep_out": [{**BALL, "centre": [0.5, 0.3, 1.2], "cables": None}]}, {"platform_speed": 0.2}):
@@ -137,7 +137,7 @@ def test_tension_rates_of_more_cables_than_needed_are_offered_by_their_least():
 
 
 def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relaxations():
-    """What computes them holds programs, which no pickle takes."""
+    """Pickle a plan whose relaxations are not computed yet: what computes them holds programs, which no pickle has."""
     task = TASK | {"tube": {"position": 0.02}, "steps": 12, "limits": {"tension_rate": 3}}
     planned = plan(ROBOT, task)
     assert planned.status is MotionStatus.NOT_FOUND

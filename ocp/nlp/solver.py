@@ -88,6 +88,11 @@ class Solver:
         self._last: dict[str, ca.DM] | None = None
         self.interrupted: Outcome | None = None  # the best of a run that was interrupted
 
+    @property
+    def has_solution(self) -> bool:
+        """Return whether a run without a guess starts from the solution of the last one."""
+        return self._last is not None
+
     def prepare(self, guess: Deviation | None, coarser: bool = False) -> ca.Function:
         """Return the solver for a run from `guess`, made at the first call."""
         own = "motion" if self._last is None else "solution"
