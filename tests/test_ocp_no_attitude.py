@@ -20,8 +20,8 @@ def clearance(robot, pose, turns, centre, radius):
     return np.linalg.norm(at - centre, axis=2).min(axis=1) - radius
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_proofs_are_those_of_sampled_attitudes(seed):
+def case(seed):
+    """Return the proof of a random task if a ball is its reason, and the best clearance of each end [arms]."""
     rng = np.random.default_rng(seed)
     robot = load(ROBOTS[seed % len(ROBOTS)])
     start, end = robot.home.copy(), robot.home.copy()
@@ -39,28 +39,21 @@ def test_proofs_are_those_of_sampled_attitudes(seed):
         "limits": {"keep_out": [{"name": "ball", "platform": 0.0, **ball}]},
     }
     turns = rng.uniform(-TURN, TURN, (20_000, 3))
-    best = [clearance(robot, pose, turns, centre, radius).max() for pose in (start, end)]
+    best = [clearance(robot, pose, turns, centre, radius).max() / arm for pose in (start, end)]
     proof = blocked(Planner(robot, task).scenario)
     by_ball = proof is not None and any(excess.limit == "keep_out" for excess in proof.excess)
+    return proof if by_ball else None, best
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_proofs_are_those_of_sampled_attitudes(seed):
+    proof, best = case(seed)
     if min(best) > 0.0:
-        assert not by_ball
-    elif min(best) < -0.05 * arm:  # so many samples come nearer than that to the best attitude
-        assert by_ball
+        assert proof is None
+    elif min(best) < -0.05:  # so many samples come nearer than that to the best attitude
+        assert proof is not None
 
 
-def test_a_ball_about_the_point_that_turning_does_not_move_is_in_the_way_at_every_attitude():
-    """Prove it although the other points of the platform could leave the ball: the CoM is the platform's origin."""
-    robot = load("caroca")
-    end = robot.home.copy()
-    assert robot.platform.com == (0.0, 0.0, 0.0)
-    start = end[:3] - np.array([0.5, 0.0, 0.0])
-    ball = {"kind": "sphere", "name": "ball", "centre": end[:3].tolist(), "radius": 0.05, "cables": None}
-    task = {
-        "path": {"kind": "line", "start": start.tolist(), "end": end[:3].tolist()},
-        "duration": 9,
-        "tube": {"position": "free", "attitude": 0.2},
-        "limits": {"keep_out": [{**ball, "platform": 0.0}]},
-    }
-    proof = blocked(Planner(robot, task).scenario)
-    assert proof is not None
-    assert "is -0.05 m at t = 9.000 s (no attitude in the tube keeps all distances)" in proof.describe()
+def test_the_reason_is_stated():
+    proofs = [proof.describe() for proof in (case(seed)[0] for seed in range(24)) if proof is not None]
+    assert sum("no attitude in the tube keeps all distances" in proof for proof in proofs) >= 2
