@@ -21,7 +21,7 @@ RANK = 1e-12
 
 # Directions with singular values between RANK and this part of the largest are required only if w would be missed
 # without them: geometry written with twelve digits makes them out of nothing, and tensions that serve them serve the
-# rounding. It is below the pivots of which `kernel` is sure, so that the kernel leaves such problems alone.
+# rounding. The C core, which looks at pivots, does the same below 4e-11 and leaves those up to 1e-9 alone.
 DOUBTFUL = 1e-10
 
 # A cable pulls along a direction d only if |d . a_i| exceeds this part of the largest column norm. Smaller products are

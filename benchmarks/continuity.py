@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import TensionProblem, TensionSolution, compiled, methods, solve
+from ..solvers import TensionProblem, TensionSolution, methods, solve
 
 __all__ = ["JUMP", "KINDS", "Leaving", "Motion", "Result", "continuity", "jump", "leaving", "smoothness"]
 
@@ -229,7 +229,6 @@ def main() -> None:
     if options.count < 1 or options.start < 0:
         parser.error("--count must be 1 or more, --start 0 or more")
     seeds = range(options.start, options.start + options.count)
-    compiled.load()  # so that "active-set" is the kernel from the first call
     results: list[tuple[str, Result]] = []
     for name, method in methods().items():
         if method.continuous:

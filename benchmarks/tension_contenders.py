@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import TensionProblem, compiled, methods, solve, solve_batch
+from ..solvers import TensionProblem, core, methods, solve, solve_batch
 from .tension_tasks import KINDS, STIFFNESS, Task
 
 __all__ = ["REFERENCE", "Contender", "contenders"]
@@ -81,7 +81,8 @@ def contenders() -> list[Contender]:
     entries = [Contender(REFERENCE, required, _daqp)]
     for name in methods():
         entries.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
-    entries.append(Contender("towline kernel alone", "its own, 1e-9", _towline_kernel))
+    if core.CABLES:
+        entries.append(Contender("towline core alone", "its own, 1e-9", _towline_core))
     entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
     entries.append(
         Contender("towline solve_batch, rho", "its own, 3e-14", _towline_soft_batch, batch=True, kinds=("soft",))
@@ -164,14 +165,13 @@ def _towline_soft_batch(task: Task) -> Batch:
     return run
 
 
-def _towline_kernel(task: Task) -> Single:
-    kernel = compiled.load().one
+def _towline_core(task: Task) -> Single:
     packed = [problem.packed for problem in task.problems]
-    n, size = task.problems[0].A.shape
+    size = task.problems[0].m
 
     def run(i: int) -> Array | None:
         tensions = np.empty(size)
-        return tensions if kernel(packed[i], n, size, tensions) == 0 else None
+        return tensions if core.solve_packed(packed[i], tensions) == 0 else None
 
     return run
 

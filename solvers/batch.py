@@ -12,6 +12,7 @@ from .. import processors
 from ..errors import InputError
 from ..inputs import number, real_array, shown, whole_number
 from . import compiled
+from .core import CABLES, ROWS, solve_rows
 from .kernels.codes import INACCURATE, INVALID, OPTIMAL, UNSURE
 from .problem import TensionProblem
 from .solution import TensionSolution
@@ -117,11 +118,12 @@ def solve_batch(
     """Distribute the tensions of many problems, each as `solve` does with the method "active-set".
 
     Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. A row whose numbers are no problem
-    (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved. What the
-    kernel is not sure of, near the boundary of the available wrench set or of the rank cut, goes through `solve`.
+    (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved. The C core
+    solves the rows of which the kernel is not sure, and `solve` those of which the core is not sure either: they lie
+    near the boundary of the available wrench set or of the rank cut. Without the C core `solve` takes both.
 
     The kernels run as NumPy operations, some 0.1 s for 10,000 rows, until a process has spent as much time on them as
-    loading their machine code takes (1 s; compiling it, once on a machine, 30 s). Neither form, nor the number of
+    loading their machine code takes (1 s; compiling it, once on a machine, 15 s). Neither form, nor the number of
     threads, nor what was solved before, changes a bit of the result. A program that is going to solve millions of rows
     saves time by calling `towline.solvers.compiled.load()` first.
 
@@ -198,6 +200,11 @@ def solve_batch(
     def work(first: int) -> None:
         stop = min(first + block, rows)
         kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, status)
+        part = slice(first, stop)
+        if n <= ROWS and m <= CABLES and (status[part] == UNSURE).any():
+            given = (array[first * int(size) :] for array, size in zip(flat, per, strict=True))
+            got = (tensions[first * m : stop * m], direction[first * n : stop * n], info[2 * first : 2 * stop])
+            solve_rows(n, m, rho or 0.0, *given, per.astype(np.float64), *got, residual[part], status[part])
 
     if share == 1:
         work(0)
@@ -217,11 +224,16 @@ def solve_batch(
         d[unproven], proof[unproven] = np.nan, np.nan
         for row in np.flatnonzero(code == UNSURE):
             index = tuple(int(i) for i in np.unravel_index(row, lead))
-            solution = _alone(_row(problem, index), rho)
+            t[row], residual[row] = np.nan, np.nan
+            d[row], proof[row] = np.nan, np.nan
+            try:
+                solution = _alone(_row(problem, index), rho)
+            except InputError:
+                code[row] = INVALID
+                continue
             code[row] = STATUSES.index(solution.status)
             if solution.tensions is not None:
                 t[row], residual[row] = solution.tensions, solution.residual
-            d[row], proof[row] = np.nan, np.nan
             if (certificate := solution.certificate) is not None:
                 d[row], proof[row] = certificate.direction, (certificate.support, certificate.shortfall)
     else:

@@ -1,8 +1,7 @@
-"""Run the kernels as plain Python until machine code pays; both give the same bits.
+"""Run the kernel of batches as plain NumPy until machine code pays; both give the same bits.
 
 Importing Numba and loading the machine code from the disk takes about a second, compiling it (once on a machine) some
-30 s. A process pays for that once it has lost as much time to plain Python, or has solved 200 problems one by one and
-the machine code is on the disk, or when it calls `load`, as a control loop does before it starts. It looks at the disk
+15 s. A process pays for that once it has lost as much time to NumPy, or when it calls `load`. It looks at the disk
 again from time to time: another process may have compiled it.
 """
 
@@ -24,45 +23,38 @@ import numpy as np
 
 from .. import tolerances
 from ..writing import whole_file
-from .kernels import memory, rows, single
-from .kernels.codes import UNSURE
+from .kernels import rows
 
 COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
 
 _SECONDS_TO_LOAD = 1.0
-_SECONDS_TO_COMPILE = 30.0
-_LOOP = 200  # single problems: what solves so many one by one is a loop that goes on, half a millisecond each
+_SECONDS_TO_COMPILE = 15.0
 _DISK_SPACE = 50_000_000  # bytes; the machine code takes about 5 MB
 
 _FOLDER = Path(__file__).parent / "kernels"
 _SHARED = Path(tolerances.__file__)  # its numbers are in the machine code
-_MODULES = (
-    *("codes", "dual_active_set", "lanes", "lanes_newton", "lanes_proof", "lanes_slabs", "memory", "proof"),
-    *("reduction", "row_alone", "rows", "single"),
-)
+_MODULES = ("codes", "lanes", "lanes_newton", "lanes_proof", "lanes_slabs", "rows")
 
 _lock = threading.Lock()
-_lost = 0.0  # seconds spent in plain Python so far
-_alone = 0  # single problems solved in plain Python since the disk was last looked at
-_patience = _SECONDS_TO_LOAD  # seconds of plain Python until the disk is looked at for machine code
+_lost = 0.0  # seconds spent in NumPy so far
+_patience = _SECONDS_TO_LOAD  # seconds of NumPy until the disk is looked at for machine code
 
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """The two kernels in one of their forms.
+    """The kernel in one of its forms.
 
     Attributes
     ----------
     backend :
         `COMPILED` or `INTERPRETED`.
-    one, many :
-        `solve_packed` of `kernels.single` and `solve_rows` of `kernels.rows`.
+    many :
+        `solve_rows` of `kernels.rows`.
     rows_at_once :
         How many rows `many` takes together; threads share multiples of it. None if threads gain nothing.
     """
 
     backend: str
-    one: Callable[..., int]
     many: Callable[..., None]
     rows_at_once: int | None
 
@@ -89,17 +81,6 @@ def keep() -> None:
         load()
 
 
-def _one_in_python(data: Any, n: int, m: int, t: Any) -> int:
-    """Solve one problem in plain Python; see `kernels.single.solve_packed`."""
-    start = perf_counter()
-    try:
-        return single.solve_packed(memoryview(data), n, m, memoryview(t))
-    except ZeroDivisionError:  # machine code goes on with inf and nan, and ends at the same answer
-        return UNSURE
-    finally:
-        _lose(perf_counter() - start, problems=1)
-
-
 def _many_in_numpy(*arguments: Any) -> None:
     """Solve the rows of a batch on NumPy arrays; see `kernels.rows.solve_rows`."""
     start = perf_counter()
@@ -108,37 +89,31 @@ def _many_in_numpy(*arguments: Any) -> None:
     _lose(perf_counter() - start)
 
 
-PLAIN = Kernels(INTERPRETED, _one_in_python, _many_in_numpy, None)
+PLAIN = Kernels(INTERPRETED, _many_in_numpy, None)
 _kernels = PLAIN
 
 
-def _lose(seconds: float, problems: int = 0) -> None:
-    """Count the time and the single problems spent in plain Python, and load the machine code once it pays."""
-    global _lost, _alone, _patience
+def _lose(seconds: float) -> None:
+    """Count the time spent in NumPy, and load the machine code once it pays."""
+    global _lost, _patience
     _lost += seconds
-    _alone += problems
-    if _lost <= _patience and _alone <= _LOOP:
+    if _lost <= _patience:
         return
     _forget_old_code()
     if _on_disk() or _lost > _SECONDS_TO_COMPILE:
         load()
     else:
-        _patience, _alone = min(2.0 * _patience, _SECONDS_TO_COMPILE), 0
+        _patience = min(2.0 * _patience, _SECONDS_TO_COMPILE)
 
 
 def _compile() -> Kernels:
     """Hand copies of the marked functions to Numba; the plain ones stay as they are."""
-    import numba
-
     from .kernels import simd, simd_llvm
 
     spaces = [dict(vars(import_module(f"{__package__}.kernels.{name}"))) for name in _MODULES]
     machine: dict[Any, Any] = {
         getattr(simd, name): getattr(simd_llvm, name) for name in simd.__all__ if callable(getattr(simd, name))
     }
-    machine[memory.floats] = numba.njit(lambda size: np.zeros(size))
-    machine[memory.view] = numba.njit(lambda array: array)
-    machine[memory.integers] = numba.njit(lambda size: np.zeros(size, np.int64))
     signatures = []
     for space in spaces:
         for function in list(space.values()):
@@ -157,7 +132,7 @@ def _compile() -> Kernels:
     for function, signature in signatures:
         function.compile(signature)
         function.disable_compile()
-    return Kernels(COMPILED, machine[single.solve_packed], machine[rows.solve_rows], simd_llvm.WIDTH)
+    return Kernels(COMPILED, machine[rows.solve_rows], simd_llvm.WIDTH)
 
 
 def machine_code(function: FunctionType) -> Any:

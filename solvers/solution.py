@@ -28,9 +28,9 @@ class TensionSolution:
     status :
         See `Status`.
     method, backend :
-        The method and the code that answered. `backend` of "active-set" is "c" where towline was installed with its C
-        core, otherwise "compiled" or "interpreted", the two forms of a kernel in Python, which give the same bits; and
-        "daqp" where that was not sure. Of "qp" it is the package. It is None for methods that have none.
+        The method and the code that answered. `backend` of "active-set" is "c" where the C core answered, or "daqp"
+        where it was not sure or towline was installed without it; of "qp" it is the package. It is None for methods
+        that have none.
     time :
         Wall time of the call [s].
     iterations :

@@ -7,14 +7,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs import shown
-from . import compiled
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
 from .core import CABLES, ROWS, solve_packed
 from .judge import judge
-from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR
-from .kernels.memory import floats
-from .kernels.single import solve_one, work_size
+from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR, UNSURE
 from .methods import METHODS
 from .methods.active_set import ActiveSet
 from .methods.method import Method, Proposal
@@ -62,18 +59,14 @@ def solve(
     if isinstance(method, str) and method == "active-set" and backend is None and not options:
         n, m = problem.A.shape
         tensions = np.empty(m)
-        if n <= ROWS and m <= CABLES:
-            code, used = solve_packed(problem.packed, tensions), "c"
-        else:
-            loaded = compiled.current()
-            code, used = loaded.one(problem.packed, n, m, tensions), loaded.backend
+        code = solve_packed(problem.packed, tensions) if n <= ROWS and m <= CABLES else UNSURE
         if code == OPTIMAL:
-            return TensionSolution(problem, tensions, STATUSES[OPTIMAL], "active-set", used, perf_counter() - start)
+            return TensionSolution(problem, tensions, STATUSES[OPTIMAL], "active-set", "c", perf_counter() - start)
         if code <= SINGULAR:
             spent = perf_counter() - start
-            return TensionSolution(problem, None, STATUSES[code], "active-set", used, spent, None, "", _prove)
+            return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _prove)
     chosen, backend = _look_up(method, backend, options)
-    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the kernel was not sure
+    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core is not there, or was not sure
 
     left, exact, forms = problem, None, list[StandardForm]()
     while True:
@@ -101,22 +94,16 @@ def _prove(problem: TensionProblem) -> Certificate | None:
     """Return the sharpest certificate of what was proven, or else the one along the direction that proved it."""
     projection = project(problem)
     certificate = sharpest(problem, projection)
-    if certificate is None and (direction := _direction_of_kernel(problem)) is not None:
+    if certificate is None and (direction := _direction_of_core(problem)) is not None:
         certificate = certificate_along(problem, direction, projection)
     return certificate
 
 
-def _direction_of_kernel(problem: TensionProblem) -> Array | None:
-    """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of "active-set" rests."""
+def _direction_of_core(problem: TensionProblem) -> Array | None:
+    """Return the direction, (n,) [1 and 1/m], on which "infeasible" or "singular" of the core rests."""
     n, m = problem.A.shape
     direction = np.full(n, np.nan)
-    if n <= ROWS and m <= CABLES:
-        return direction if solve_packed(problem.packed, np.empty(m), direction) in (INFEASIBLE, SINGULAR) else None
-    given: list[Any] = [problem.A.ravel(), *(problem.w, problem.t_min, problem.t_max, problem.t_ref, problem.weights)]
-    outputs: list[Any] = [np.empty(m), direction, np.empty(3)]
-    views = [memoryview(array) for array in (*given, *outputs)]
-    code = solve_one(*views[:6], problem.length, n, m, *views[6:], floats(work_size(n, m)))
-    return direction if code in (INFEASIBLE, SINGULAR) else None
+    return direction if solve_packed(problem.packed, np.empty(m), direction) in (INFEASIBLE, SINGULAR) else None
 
 
 def _look_up(name: str | Method, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:

@@ -1,6 +1,7 @@
 """Check that lanes answer as single problems do, machine code as plain Python, and old machine code is not used."""
 
 import os
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from hypothesis import strategies as st
 from towline import tolerances
 from towline.errors import InputError
 from towline.solvers import Status, TensionProblem, compiled, solve, solve_batch
-from towline.solvers.kernels import rows
 
 from .problems import random_feasible, random_infeasible
 
@@ -107,11 +107,10 @@ def shortfall_along(problem, d):
 def test_lanes_answer_as_single_problems_do(kernels, m):
     problems = mixture(np.random.default_rng(m), m, 203)  # no multiple of sixteen
     batch = solve_batch(**stacked(problems), threads=1)
-    tensions = np.empty(m)
     for row, problem in enumerate(problems):
-        if kernels.one(problem.packed, *problem.A.shape, tensions) == 0:
+        if (single := solve(problem)).feasible:
             assert batch.feasible[row]
-            np.testing.assert_allclose(batch.tensions[row], tensions, rtol=0, atol=1e-9 * problem.t_max.max())
+            np.testing.assert_allclose(batch.tensions[row], single.tensions, rtol=0, atol=1e-9 * problem.t_max.max())
             assert np.isnan(batch.direction[row]).all()
         else:
             assert batch.status[row] == Status.INFEASIBLE
@@ -119,7 +118,7 @@ def test_lanes_answer_as_single_problems_do(kernels, m):
             assert shortfall > 0
             assert shortfall == pytest.approx(batch.shortfall[row], rel=1e-6)
             assert norm == pytest.approx(1.0)
-            assert shortfall <= solve(problem).certificate.shortfall * (1 + 1e-9)
+            assert shortfall <= single.certificate.shortfall * (1 + 1e-9)
             assert np.isnan(batch.tensions[row]).all()
     assert 50 < batch.feasible.sum() < 150
 
@@ -127,8 +126,9 @@ def test_lanes_answer_as_single_problems_do(kernels, m):
 @pytest.mark.parametrize("m", [6, 7, 8])
 def test_lanes_prove_by_themselves_that_wrenches_are_out_of_reach(monkeypatch, m):
     """Count the rows that leave the lanes: one by one they take ten times as long."""
-    alone, solve_row = [], rows.solve_row
-    monkeypatch.setattr(rows, "solve_row", lambda *arguments: alone.append(solve_row(*arguments)))
+    alone, module = [], import_module("towline.solvers.batch")
+    monkeypatch.setattr(module, "CABLES", 0)
+    monkeypatch.setattr(module, "_alone", lambda problem, rho: alone.append(problem) or solve(problem))
     monkeypatch.setattr(compiled, "_kernels", compiled.PLAIN)
     rng = np.random.default_rng(m)
     batch = solve_batch(**stacked([random_infeasible(rng, m) for _ in range(100)]))

@@ -1,16 +1,17 @@
 """The C core as an extension module, where one was built when towline was installed.
 
-`solve_packed` takes problems of at most `ROWS` wrench rows and `CABLES` cables; both are zero without the extension.
+`solve_packed` and `solve_rows` take problems of at most `ROWS` wrench rows and `CABLES` cables; both numbers are zero
+without the extension.
 """
 
 from typing import Any
 
 from ..kernels.codes import UNSURE
 
-__all__ = ["CABLES", "ROWS", "solve_packed"]
+__all__ = ["CABLES", "ROWS", "solve_packed", "solve_rows"]
 
 try:
-    from ._core import CABLES, ROWS, solve_packed
+    from ._core import CABLES, ROWS, solve_packed, solve_rows
 except ImportError:
     ROWS = CABLES = 0
 
@@ -27,3 +28,17 @@ except ImportError:
             Gets the direction that proves the problem infeasible or singular, shape (n,), if it is.
         """
         return UNSURE
+
+    def solve_rows(n: int, m: int, rho: float, *arrays: Any) -> None:
+        """Solve the rows of a batch whose status is `UNSURE`; those that stay so need another method.
+
+        Parameters
+        ----------
+        n, m :
+            Wrench rows and cables.
+        rho :
+            As in `solve_batch`; 0 if the wrench must be met.
+        *arrays :
+            A, w, lower, upper, ref, weights, length, per, t, d, info, residual and status of `kernels.rows.solve_rows`,
+            but `per` of float64.
+        """

@@ -1,8 +1,9 @@
 /*
- * The Python module `towline.solvers.core._core`: one function, `solve_packed`, on the memory of arrays. It keeps to
- * Python's limited API of 3.11, so that one wheel serves this version and all later ones.
+ * The Python module `towline.solvers.core._core`: functions on the memory of arrays. It keeps to Python's
+ * limited API of 3.11, so that one wheel serves this version and all later ones.
  */
 #include <Python.h>
+#include <math.h>
 
 #include "towline_core.h"
 
@@ -75,10 +76,102 @@ static PyObject *solve_packed(PyObject *module, PyObject *const *arguments, Py_s
     return PyLong_FromLong(status);
 }
 
+enum { A, W, T_MIN, T_MAX, T_REF, WEIGHTS, LENGTH, PER, GIVEN };      /* arrays of a batch, */
+enum { TENSIONS = GIVEN, DIRECTION, INFO, RESIDUAL, STATUS, ARRAYS }; /* and what it gets */
+
+enum { UNSURE = 6 }; /* of kernels/codes.py */
+
+/* Solve each row of a batch whose status is UNSURE; see `towline_solve_soft` if rho > 0. */
+static void solve_batch(double *const *array, Py_ssize_t rows, int n, int m, double rho) {
+    for (Py_ssize_t row = 0; row < rows; row++) {
+        const double *given[PER];
+        if (array[STATUS][row] < UNSURE) {
+            continue;
+        }
+        for (int i = 0; i < PER; i++) {
+            given[i] = array[i] ? array[i] + row * (Py_ssize_t)array[PER][i] : NULL;
+        }
+        const towline_problem problem = {
+            n, m, given[A], given[W], given[T_MIN], given[T_MAX], given[T_REF], given[WEIGHTS], *given[LENGTH]};
+        towline_answer answer;
+        const towline_status status =
+            rho > 0 ? towline_solve_soft(&problem, rho, &answer) : towline_solve(&problem, &answer);
+        const int proven = status == TOWLINE_INFEASIBLE || status == TOWLINE_SINGULAR;
+        int code = (int)status;
+        if (rho > 0 && status != TOWLINE_INVALID && status != TOWLINE_OPTIMAL) {
+            code = TOWLINE_INACCURATE;
+        }
+        if (rho > 0 ? status != TOWLINE_INVALID && !answer.soft_is_proven : status == TOWLINE_INACCURATE) {
+            code = UNSURE;
+        }
+        array[STATUS][row] = code;
+        array[RESIDUAL][row] = answer.residual;
+        array[INFO][2 * row] = answer.support;
+        array[INFO][2 * row + 1] = proven ? answer.shortfall : (double)NAN;
+        for (int c = 0; c < m && code != UNSURE && (status == TOWLINE_OPTIMAL || answer.soft); c++) {
+            array[TENSIONS][row * m + c] = answer.tensions[c];
+        }
+        for (int i = 0; i < n && proven; i++) {
+            array[DIRECTION][row * n + i] = answer.direction[i];
+        }
+    }
+}
+
+static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    Py_buffer views[ARRAYS];
+    double *array[ARRAYS];
+    int taken = 0, fits = 0;
+    if (count != ARRAYS + 3) {
+        PyErr_SetString(PyExc_TypeError, "solve_rows takes n, m, rho and thirteen arrays");
+        return NULL;
+    }
+    const long n = PyLong_AsLong(arguments[0]), m = PyLong_AsLong(arguments[1]);
+    const double rho = PyFloat_AsDouble(arguments[2]);
+    while (!PyErr_Occurred() && taken < ARRAYS) {
+        Py_ssize_t size;
+        array[taken] = numbers_of(arguments[3 + taken], &views[taken], taken >= TENSIONS, &size);
+        taken += array[taken] != NULL;
+    }
+    if (taken == ARRAYS && n >= 1 && n <= TOWLINE_ROWS && m >= 1 && m <= TOWLINE_CABLES &&
+        views[PER].len == PER * DOUBLE) {
+        const Py_ssize_t rows = views[STATUS].len / DOUBLE;
+        const long sizes[ARRAYS] = {n * m, n, m, m, m, m, 1, 0, m, n, 2, 1, 1};
+        fits = 1;
+        for (int i = 0; i < ARRAYS; i++) {
+            const Py_ssize_t per = i < PER ? (Py_ssize_t)array[PER][i] : sizes[i];
+            const Py_ssize_t least =
+                i == PER || rows == 0 || (i == WEIGHTS && views[i].len == 0) ? 0 : per * (rows - 1) + sizes[i];
+            fits = fits && (per == 0 || per == sizes[i]) && views[i].len >= least * DOUBLE;
+            if (i == WEIGHTS && views[i].len == 0) {
+                array[i] = NULL; /* all are equal */
+                fits = fits && per == 0;
+            }
+        }
+        if (fits) {
+            Py_BEGIN_ALLOW_THREADS solve_batch(array, rows, (int)n, (int)m, rho);
+            Py_END_ALLOW_THREADS
+        }
+    }
+    while (taken > 0) {
+        PyBuffer_Release(&views[--taken]);
+    }
+    if (!fits) {
+        if (!PyErr_Occurred()) {
+            PyErr_SetString(PyExc_ValueError, "the arrays must be those of one batch, of a size that the core has");
+        }
+        return NULL;
+    }
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef functions[] = {
     {"solve_packed", (PyCFunction)(void (*)(void))solve_packed, METH_FASTCALL,
      "solve_packed(packed, tensions, direction=None)\n--\n\n"
      "Solve a packed problem; return its status and fill tensions (m,) if optimal, direction (n,) if out of reach."},
+    {"solve_rows", (PyCFunction)(void (*)(void))solve_rows, METH_FASTCALL,
+     "solve_rows(n, m, rho, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, residual, "
+     "status)\n--\n\nSolve the rows of a batch whose status is UNSURE; see `kernels.rows.solve_rows`."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -75,6 +75,8 @@ static int is_valid(const towline_problem *problem) {
     return heaviest <= WEIGHTS_APART * lightest;
 }
 
+static int is_in_range(real weight) { return weight >= 1 / HEAVIEST && weight <= HEAVIEST; }
+
 /* Write the tensions of s, moved inside the limits if rounding put them outside. */
 static void write_tensions(const form *f, const towline_problem *problem, real *t) {
     for (int c = 0; c < problem->m; c++) {
@@ -122,7 +124,7 @@ static real wrench_error(const form *f, const towline_problem *problem, const re
 static towline_status solve_exactly(form *f, const towline_problem *problem, towline_answer *answer) {
     int worst;
     real missing, *t = answer->tensions;
-    answer->soft = answer->steps = answer->inner = 0;
+    answer->soft = answer->soft_is_proven = answer->steps = answer->inner = 0;
     answer->residual = answer->support = answer->shortfall = 0;
     if (!is_valid(problem)) {
         return TOWLINE_INVALID;
@@ -156,26 +158,53 @@ towline_status towline_solve(const towline_problem *problem, towline_answer *ans
     return answer->status = solve_exactly(&f, problem, answer);
 }
 
-towline_status towline_solve_always(const towline_problem *problem, towline_real rho, towline_answer *answer) {
-    form f;
+/* Fill tensions and residual of a soft answer. */
+static outcome solve_softly(form *f, const towline_problem *problem, real rho, towline_answer *answer) {
     int worst;
     real missing;
+    const real size = towline_standard_form(f, problem, rho, 0);
+    f->rank = towline_reduce(f, 0);
+    f->k = f->columns - f->rank;
+    f->slack = SLACK * larger(size, towline_least_norm(f, &worst, &missing));
+    const outcome met = towline_enter_limits(f);
+    answer->soft = 1;
+    answer->steps += f->steps;
+    answer->inner += f->inner;
+    write_tensions(f, problem, answer->tensions);
+    answer->residual = wrench_error(f, problem, answer->tensions);
+    return met;
+}
+
+towline_status towline_solve_always(const towline_problem *problem, towline_real rho, towline_answer *answer) {
+    form f;
     answer->status = solve_exactly(&f, problem, answer);
-    if (!(rho >= 1 / HEAVIEST && rho <= HEAVIEST)) {
+    if (!is_in_range(rho)) {
         answer->status = TOWLINE_INVALID;
     }
-    if (answer->status == TOWLINE_OPTIMAL || answer->status == TOWLINE_INVALID) {
-        return answer->status;
+    if (answer->status != TOWLINE_OPTIMAL && answer->status != TOWLINE_INVALID) {
+        solve_softly(&f, problem, rho, answer); /* without proof: these tensions are what there is */
     }
-    const real size = towline_standard_form(&f, problem, rho, 0);
-    f.rank = towline_reduce(&f, 0);
-    f.k = f.columns - f.rank;
-    f.slack = SLACK * larger(size, towline_least_norm(&f, &worst, &missing));
-    towline_enter_limits(&f); /* without proof: these tensions are what there is */
-    answer->soft = 1;
-    answer->steps += f.steps;
-    answer->inner += f.inner;
-    write_tensions(&f, problem, answer->tensions);
-    answer->residual = wrench_error(&f, problem, answer->tensions);
+    return answer->status;
+}
+
+towline_status towline_solve_soft(const towline_problem *problem, towline_real rho, towline_answer *answer) {
+    form f;
+    answer->soft = answer->soft_is_proven = answer->steps = answer->inner = 0;
+    answer->residual = answer->support = answer->shortfall = 0;
+    if (!is_valid(problem) || !is_in_range(rho)) {
+        return answer->status = TOWLINE_INVALID;
+    }
+    answer->soft_is_proven = solve_softly(&f, problem, rho, answer) == REACHED;
+    const measure known = towline_measure(&f, problem, answer->tensions);
+    if (answer->residual <= FEASIBILITY * known.required + ROUNDING * known.rounding) {
+        return answer->status = TOWLINE_OPTIMAL;
+    }
+    for (int i = 0; i < problem->n; i++) { /* what is missing is the direction */
+        answer->direction[i] = f.s[f.cables + i];
+    }
+    answer->status = towline_proves_infeasible(&f, problem, &known, answer);
+    if (answer->status == TOWLINE_SINGULAR) {
+        answer->status = TOWLINE_INACCURATE;
+    }
     return answer->status;
 }

@@ -61,9 +61,10 @@ typedef struct {
 
 typedef struct {
     towline_status status;
-    int soft;  /* 1 if the tensions are a soft answer, which need not give w */
-    int steps; /* limits that the method added to its set, in both solves of a soft answer */
-    int inner; /* cuts of an edge (m - rank <= 2), else projections on the null space */
+    int soft;           /* 1 if the tensions are a soft answer, which need not give w */
+    int soft_is_proven; /* by `towline_solve_soft`: 1 if multipliers prove the minimum */
+    int steps;          /* limits that the method added to its set, in both solves of a soft answer */
+    int inner;          /* cuts of an edge (m - rank <= 2), else projections on the null space */
     towline_real tensions[TOWLINE_CABLES]; /* [N], inside the limits; only if optimal or soft */
     towline_real residual;                 /* wrench error |S (A t - w)| of those tensions [N], S dividing moments */
     towline_real direction[TOWLINE_ROWS];  /* only if infeasible or singular: d with d . A t <= support < d . w */
@@ -83,6 +84,12 @@ towline_status towline_solve(const towline_problem *problem, towline_answer *ans
  * float from 1e-10 to 1e10; see TOWLINE_RHO.
  */
 towline_status towline_solve_always(const towline_problem *problem, towline_real rho, towline_answer *answer);
+
+/*
+ * Minimise that cost whether or not there are tensions that give w. The status is optimal if they give it, infeasible
+ * if direction and shortfall prove that none do, else inaccurate.
+ */
+towline_status towline_solve_soft(const towline_problem *problem, towline_real rho, towline_answer *answer);
 
 #ifdef __cplusplus
 }

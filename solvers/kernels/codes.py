@@ -2,10 +2,7 @@
 
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID, FAILED, UNSURE = range(7)
 
-# Pivots above the first part of the largest are sure to count, below the second they are rounding. RANK lies between.
-SURE_PIVOT, SURE_ZERO = 1e-9, 1e-14
-
-# After so many steps of Newton's method the problems that are left are put together, so many times; then they go alone.
+# After so many steps of Newton's method the problems that are left are put together, so many times.
 STEPS, TURNS = 5, 5
 
 SLACK = 1e-12  # how far s may pass a limit, relative to the size of s

@@ -1,4 +1,4 @@
-"""Rows of a batch: many at a time where that can be trusted, else one by one.
+"""Rows of a batch, many at a time; where that cannot be trusted they stay unsure.
 
 As plain Python a vector has thousands of rows, as machine code sixteen; see `simd`. The rows do not depend on each
 other, so both give the same bits.
@@ -13,10 +13,7 @@ from .jit import GIVEN, VECTOR, compilable
 from .lanes import GOOD, PROVEN, ROUNDED, S_, SHORTFALL, SUPPORT, D, cable, judge, lane_size, prepare, wrench
 from .lanes_newton import newton_in_lanes, newton_size
 from .lanes_slabs import reduce_lanes, slabs_in_lanes, slabs_size
-from .memory import floats, view
-from .row_alone import solve_row
 from .simd import TOGETHER, WIDTH, any_of, gather, load, places, scatter, splat, store, vectors, where
-from .single import work_size
 
 __all__ = ["solve_rows"]
 
@@ -84,7 +81,7 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
     W, V = vectors(lane_size(n, m)), vectors(max(newton_size(n, m), slabs_size(n, m)))
     shared = per[0] == 0 and per[5] == 0 and per[6] == 0
     slabs = soft == 0.0 and 0 <= m - n <= 2
-    # How often the problems that are left are put together, before they are solved alone.
+    # How often the problems that are left are put together.
     turns = 1 if slabs else TURNS if m > n or soft > 0.0 else 0
     left = np.arange(start, stop)
     y = np.zeros(0 if slabs else (stop - start) * n)
@@ -98,13 +95,3 @@ def solve_rows(A, w, lower, upper, ref, weights, length, per, soft, n, m, start,
                 given, per, soft, slabs, n, m, members, turn, keep, start, y, W, V, t, d, info, residual, status
             )
         left = left[status[left] == UNSURE]
-    if turns == 0:
-        left = left[status[left] == UNSURE]
-    given = (view(A), view(w), view(lower), view(upper), view(ref), view(weights), view(length))
-    answers = (view(t), view(d), view(info), view(residual), view(status))
-    equal = floats(m)
-    for c in range(m):
-        equal[c] = 1.0
-    work, numbers = floats(work_size(n, m if soft == 0.0 else m + n)), floats(3)
-    for row in left:
-        solve_row(given, view(per), soft, n, m, int(row), equal, work, numbers, answers)
