@@ -2,8 +2,9 @@
 
     python -m towline.benchmarks.exactness [--count 1000000] [--start 0]
 
-Each problem is named by its seed. `solve_batch` answers; the references are a linear program (HiGHS) for the status and
-the optimality conditions for the tensions. Where both sides differ, both are shown, and the exit code is 1.
+Each problem is named by its seed. `solve_batch` answers, by its lanes and by the C core: each problem counts twice
+where towline was installed with that. The references are a linear program (HiGHS) for the status and the optimality
+conditions for the tensions. Where both sides differ, both are shown, and the exit code is 1.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solvers import BatchSolution, Status, TensionProblem, certify, compiled, solve_batch
+from ..solvers.core import CABLES
 
 Array = NDArray[np.float64]
 
@@ -93,10 +95,11 @@ def check(seeds: range) -> Report:
     report = Report(Counter(), [], 0.0)
     for members in shapes.values():
         arrays = [np.array(column) for column in zip(*(problems[seed] for seed in members), strict=True)]
-        answer = solve_batch(*arrays, threads=1)
-        report.statuses.update(answer.status.tolist())
-        for row, seed in enumerate(members):
-            report = report.plus(_compare(seed, problems[seed], answer, row))
+        for backend in ("lanes", "c") if CABLES else ("lanes",):
+            answer = solve_batch(*arrays, threads=1, backend=backend)
+            report.statuses.update(answer.status.tolist())
+            for row, seed in enumerate(members):
+                report = report.plus(_compare(seed, problems[seed], answer, row))
     return report
 
 

@@ -24,6 +24,9 @@ __all__ = ["BatchSolution", "solve_batch"]
 Array = NDArray[np.float64]
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond
+# The C core takes half a microsecond to two for a row, the lanes ten times as much in NumPy, and a third of it in machine
+# code, which takes seconds to load. That pays for larger batches only, among them the blocks of workspaces.
+MOST_ROWS_OF_CORE = 8000
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,8 @@ class BatchSolution:
     rho :
         As it was given.
     backend :
-        The form in which the kernels ran, "compiled" or "interpreted"; the numbers do not depend on it.
+        "c" if the C core solved all rows, else the form in which the lanes ran, "compiled" or "interpreted", on which
+        the numbers do not depend.
     """
 
     tensions: Array  # (..., m)
@@ -114,15 +118,19 @@ def solve_batch(
     *,
     rho: float | None = None,
     threads: int | None = None,
+    backend: str | None = None,
 ) -> BatchSolution:
     """Distribute the tensions of many problems, each as `solve` does with the method "active-set".
 
     Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. A row whose numbers are no problem
-    (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved. The C core
-    solves the rows of which the kernel is not sure, and `solve` those of which the core is not sure either: they lie
-    near the boundary of the available wrench set or of the rank cut. Without the C core `solve` takes both.
+    (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved.
 
-    The kernels run as NumPy operations, some 0.1 s for 10,000 rows, until a process has spent as much time on them as
+    Batches of at most 8000 rows are solved by the C core, row by row, where towline was installed with it. Larger ones
+    go through lanes, which solve many rows together: their statuses are the same, and their tensions but for rounding.
+    The core solves the rows of which the lanes are not sure, and `solve` those of which the core is not sure either:
+    they lie near the boundary of the available wrench set or of the rank cut. Without the C core `solve` takes both.
+
+    The lanes run as NumPy operations, some 0.1 s for 10,000 rows, until a process has spent as much time on them as
     loading their machine code takes (1 s; compiling it, once on a machine, 15 s). Neither form, nor the number of
     threads, nor what was solved before, changes a bit of the result. A program that is going to solve millions of rows
     saves time by calling `towline.solvers.compiled.load()` first.
@@ -148,6 +156,9 @@ def solve_batch(
     threads :
         How many threads share the rows; None = one for each 2000 rows, at most as many as there are processors. The
         result does not depend on it.
+    backend :
+        "c" or "lanes" for all rows; None = as stated above. Machine code solves a batch of 1000 to 8000 rows in half of
+        the time of the C core: a program that has loaded it and solves thousands of such batches states "lanes".
 
     Raises
     ------
@@ -191,15 +202,18 @@ def solve_batch(
     tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
     status = np.full(rows, float(UNSURE))
     kernels = compiled.current()
-    share, together = 1, max(rows, 1)
-    if kernels.rows_at_once is not None:
+    core_alone = _is_for_core(backend, rows, n, m)
+    share, together = 1, 1 if core_alone else kernels.rows_at_once
+    if together is None:  # NumPy takes all rows together
+        together = max(rows, 1)
+    else:
         share = threads or min(processors.available(), max(1, rows // ROWS_WORTH_A_THREAD))
-        together = kernels.rows_at_once
     block = max(together, -(-rows // (together * share)) * together)
 
     def work(first: int) -> None:
         stop = min(first + block, rows)
-        kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, status)
+        if not core_alone:
+            kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, status)
         part = slice(first, stop)
         if n <= ROWS and m <= CABLES and (status[part] == UNSURE).any():
             given = (array[first * int(size) :] for array, size in zip(flat, per, strict=True))
@@ -248,8 +262,21 @@ def solve_batch(
         time.perf_counter() - start,
         problem,
         rho,
-        kernels.backend,
+        "c" if core_alone else kernels.backend,
     )
+
+
+def _is_for_core(backend: str | None, rows: int, n: int, m: int) -> bool:
+    """Return whether the C core is to solve all rows, or raise InputError."""
+    fits = n <= ROWS and m <= CABLES
+    if backend is None:
+        return fits and rows <= MOST_ROWS_OF_CORE
+    if not isinstance(backend, str) or backend not in (("c", "lanes") if fits else ("lanes",)):
+        accepted = "c, lanes or None"
+        if not fits:
+            accepted = f"lanes or None for {n} wrench rows and {m} cables, which the C core does not take"
+        raise InputError(f"backend must be {accepted}, got {shown(backend)}")
+    return backend == "c"
 
 
 def _alone(problem: TensionProblem, rho: float | None) -> TensionSolution:

@@ -13,7 +13,7 @@ from towline.solvers import Status, TensionProblem, certify, solve, solve_batch
 from towline.solvers.core import CABLES
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
-from .references import linear_program_status, optimum_by_enumeration
+from .references import linear_program_status, optimum_by_enumeration, support_value
 
 
 def stacked(problems):
@@ -46,7 +46,7 @@ ONCE_WRONG = (
 def test_optimal_is_what_multipliers_prove(seed):
     report = check(range(seed, seed + 1))
     assert report.disagreements == []
-    assert dict(report.statuses) == {"optimal": 1}
+    assert set(report.statuses) == {"optimal"}
 
 
 @pytest.mark.parametrize("seed", range(150))
@@ -118,10 +118,11 @@ def test_mixed_ranks_wishes_and_weights_in_one_batch():
         np.testing.assert_allclose(batch.tensions[row], expected, rtol=0, atol=1e-8 * T_MAX)
 
 
+@pytest.mark.parametrize("backend", ["lanes", None])
 @pytest.mark.parametrize("m", [5, 8, 11])
-def test_threads_change_no_bit(m):
+def test_threads_change_no_bit(m, backend):
     A, w = stacked(mixture(333, m))
-    one, two = solve_batch(A, w, T_MIN, T_MAX, threads=1), solve_batch(A, w, T_MIN, T_MAX, threads=2)
+    one, two = (solve_batch(A, w, T_MIN, T_MAX, threads=threads, backend=backend) for threads in (1, 2))
     for name in ("tensions", "code", "residual", "direction", "shortfall", "support"):
         assert getattr(one, name).tobytes() == getattr(two, name).tobytes(), name
 
@@ -178,6 +179,12 @@ def test_bad_rows_are_flagged_and_the_rest_solved():
         ({"t_min": np.ones(6)}, r"t_min must be of shape \(\.\.\., 8\) .*, got shape \(6,\)"),
         ({"t_max": None}, r"t_max must be an array of real numbers, got None"),
         ({"threads": 0}, "threads must be a whole number from 1 to 1024, got 0"),
+        ({"backend": "numba"}, "backend must be .*lanes or None.*, got 'numba'"),
+        ({"backend": ["c"]}, r"backend must be .*lanes or None.*, got \['c'\]"),
+        (
+            {"A": np.ones((2, 6, 40)), "backend": "c"},
+            "backend must be lanes or None for 6 wrench rows and 40 cables, .*, got 'c'",
+        ),
     ],
 )
 def test_wrong_arguments_are_told(change, message):
@@ -243,6 +250,46 @@ def test_no_infeasible_answer_is_without_its_certificate():
                 assert solution.certificate.singular is (solution.status is Status.SINGULAR)
     print("proven and not:", counts)
     assert min(counts.values()) > 160
+
+
+def in_shapes(seeds):
+    """Return awkward problems of equal shapes as arrays, one list of arrays a shape."""
+    shapes = {}
+    for seed in seeds:
+        problem = awkward_problem(seed)
+        shapes.setdefault(problem[0].shape, []).append(problem)
+    return [[np.array(column) for column in zip(*members, strict=True)] for members in shapes.values()]
+
+
+@pytest.mark.skipif(CABLES == 0, reason="towline was installed without a C compiler, and has no C core")
+@pytest.mark.parametrize(("rho", "accuracy"), [(None, 1e-8), (1e3, 1e-8), (1e10, 1e-7)])
+def test_the_core_answers_as_the_lanes_do(rho, accuracy):
+    """Statuses are equal and tensions nearly; both prove the same rows infeasible, along directions that may differ."""
+    rows = proven = 0
+    for arrays in in_shapes(range(6_000_000, 6_001_500)):
+        core, lanes = (solve_batch(*arrays, rho=rho, backend=backend) for backend in ("c", "lanes"))
+        assert core.backend == "c" != lanes.backend
+        np.testing.assert_array_equal(core.code, lanes.code)
+        size = np.maximum(np.abs(lanes.tensions).max(axis=1, keepdims=True), 1e-300)
+        np.testing.assert_allclose(core.tensions / size, lanes.tensions / size, rtol=0, atol=accuracy)
+        np.testing.assert_array_equal(np.isfinite(core.shortfall), np.isfinite(lanes.shortfall))
+        for row in np.flatnonzero(np.isfinite(core.shortfall)):
+            A, w, low, high, *_ = (array[row] for array in arrays)
+            d = core.direction[row]
+            reach = support_value(A, d, low, high, negligible=1e-11)
+            assert 0.0 < core.shortfall[row] <= (d @ w - reach) * (1.0 + 1e-6) + 1e-9 * abs(reach)
+        rows += len(core.code)
+        proven += np.isfinite(core.shortfall).sum()
+    assert rows == 1500
+    assert proven > 200
+
+
+@pytest.mark.skipif(CABLES == 0, reason="towline was installed without a C compiler, and has no C core")
+def test_the_size_of_a_batch_decides_who_solves_it():
+    A = np.random.default_rng(0).normal(size=(3, 4))
+    for rows, backends in ((1, {"c"}), (8000, {"c"}), (8001, {"compiled", "interpreted"})):
+        assert solve_batch(A, np.tile(A.sum(axis=1), (rows, 1)), 0.0, 2.0).backend in backends
+    assert solve_batch(np.ones((1, 40)), [20.0], 0.0, 1.0).backend != "c"
 
 
 @pytest.mark.skipif(CABLES == 0, reason="towline was installed without a C compiler: the judge has certificates only")

@@ -37,6 +37,7 @@ CALLS = [
     ("tolerance", PROBLEM.tolerance, {"tensions": np.ones(3)}),
     ("solve", solve, {"problem": PROBLEM, "method": "active-set", "backend": None}),
     ("solve_batch", solve_batch, {"A": A, "w": [1, 1], "t_min": 0, "t_max": 9, "t_ref": 1, "weights": 1, "length": 1}),
+    ("solve_batch", solve_batch, {"A": A, "w": [1, 1], "t_min": 0, "t_max": 9, "rho": 1, "backend": None}),
     ("certify", certify, {"problem": PROBLEM}),
     ("verify", BEYOND.certificate.verify, {"problem": PROBLEM}),
     ("capacity_margin", capacity_margin, {"problem": PROBLEM}),

@@ -1,6 +1,7 @@
 """Check that lanes answer as single problems do, machine code as plain Python, and old machine code is not used."""
 
 import os
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -11,9 +12,12 @@ from hypothesis import strategies as st
 
 from towline import tolerances
 from towline.errors import InputError
-from towline.solvers import Status, TensionProblem, compiled, solve, solve_batch
+from towline.solvers import Status, TensionProblem, compiled, solve
+from towline.solvers import solve_batch as solve_by_core_or_lanes
 
 from .problems import random_feasible, random_infeasible
+
+solve_batch = partial(solve_by_core_or_lanes, backend="lanes")
 
 
 @pytest.fixture(scope="module", autouse=True)
