@@ -24,8 +24,8 @@ __all__ = ["BatchSolution", "solve_batch"]
 Array = NDArray[np.float64]
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond
-# The C core takes half a microsecond to two for a row, the lanes ten times as much in NumPy, and a third of it in machine
-# code, which takes seconds to load. That pays for larger batches only, among them the blocks of workspaces.
+# The C core takes half a microsecond to two for a row, the lanes ten times as much in NumPy, and a third of it in
+# machine code, which takes seconds to load. That pays for larger batches only, among them the blocks of workspaces.
 MOST_ROWS_OF_CORE = 8000
 
 
