@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import TensionProblem, core, methods, solve, solve_batch
+from ..solvers import TensionProblem, compiled, core, methods, solve, solve_batch
 from .tension_tasks import KINDS, STIFFNESS, Task
 
 __all__ = ["REFERENCE", "Contender", "contenders"]
@@ -139,6 +139,7 @@ def _towline(method: str) -> Callable[[Task], Single]:
 
 
 def _towline_batch(task: Task) -> Batch:
+    compiled.load()
     A, w, t_min, t_max, weights = (
         _over_and_over(np.array([getattr(problem, name) for problem in task.problems]))
         for name in ("A", "w", "t_min", "t_max", "weights")
@@ -152,6 +153,7 @@ def _towline_batch(task: Task) -> Batch:
 
 
 def _towline_soft_batch(task: Task) -> Batch:
+    compiled.load()
     m = task.m
     A, w, t_min, t_max = (
         _over_and_over(np.array([values(problem) for problem in task.problems]))
