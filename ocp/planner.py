@@ -34,7 +34,8 @@ from .durations import Durations, durations
 from .global_path.global_path import find_global_path
 from .global_path.need import guess_exceeds, is_open
 from .global_path.space import Space
-from .nlp.guess import formation_guess, usual_guess
+from .nlp.guess import balanced, formation_guess, usual_guess
+from .nlp.near import is_local
 from .nlp.rows import Mesh
 from .nlp.solver import MANY, Outcome, Progress, Solver
 from .relaxations import near_fixed_motion, near_motion
@@ -57,6 +58,7 @@ REFINEMENTS = 4  # each with twice the nodes and a little more distance from the
 MOST_STEPS = 1600
 COARSE = 50  # steps: from four times as many on, the program of so few is solved first
 COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 100 steps then takes a third of the time
+SLOWER = 3.0  # than the duration that the planner starts from
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 GLOBAL_SHARE = 0.2  # of the time limit
@@ -303,13 +305,13 @@ def _global_path(search: Search, balance: bool) -> tuple[Deviation | None, bool]
         return None if formation is None else formation(nodes), True
 
 
-def _coarse(search: Search, start: Deviation | None) -> Deviation | None:
-    """Return the optimum on a coarse mesh, to start a fine one from; None if that would save no time."""
-    steps, coarse = search.scenario.task.steps, COARSE_OF_MANY if search.scenario.count > MANY else COARSE
-    if steps < 4 * coarse:
-        return None
-    outcome = search.solve("coarse program", Mesh(coarse), start)
-    return outcome.deviation if outcome.success else None
+def _coarse(search: Search) -> Mesh | None:
+    """Return the mesh whose optimum the program of the task's own starts from; None if that would save no time."""
+    scenario = search.scenario
+    steps, coarse, times = scenario.task.steps, COARSE, 4
+    if scenario.count > MANY:
+        coarse, times = COARSE_OF_MANY, 2 if any(is_local(limit) for limit in scenario.limits) else 4
+    return Mesh(coarse) if steps >= times * coarse else None
 
 
 def _free_motion(search: Search, start: Deviation | None) -> Plan:
@@ -339,13 +341,33 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
 
 def _from_near(search: Search, mesh: Mesh, start: Deviation | None, guessed: bool) -> Outcome:
     """Solve the program from a motion that is nearer to its solution than `start`, if there is one."""
-    near = None if search.knows(mesh) else search.approach(mesh, start)
-    if near is None and guessed:
-        near = _coarse(search, start)
+    if search.knows(mesh):
+        return search.solve("nonlinear program", mesh, start)
+    coarse = _coarse(search) if guessed else None
+    near = _slowly(search, coarse or mesh, start) if guessed else None
+    near = search.approach(coarse or mesh, near or start) or near
+    if coarse is not None:
+        outcome = search.solve("coarse program", coarse, near or start)
+        near = outcome.deviation if outcome.success else near
     outcome = search.solve("nonlinear program", mesh, near or start, coarser=near is not None)
     if outcome.success or near is None or search.seconds_left <= 0:
         return outcome
     return search.solve("nonlinear program", mesh, start)
+
+
+def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | None:
+    """Return a team's motion past obstacles that begins with a slower one; None if there is none.
+
+    The slower a motion is, the less must its carriers tilt, and a guess that is balanced at rest is nearly balanced.
+    """
+    scenario, span = search.scenario, search.scenario.duration_range
+    if scenario.count <= MANY:
+        return None
+    slow = scenario.held(SLOWER * scenario.duration if span is None else min(SLOWER * scenario.duration, span.max))
+    if start is not None:
+        start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]))
+    motion = search.approach(mesh, start, slow)
+    return motion.stretched(scenario.duration / slow.duration) if motion is not None and span is None else motion
 
 
 def _closest(search: Search, reason: str) -> Plan:

@@ -57,7 +57,7 @@ class Search:
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
-        self._linear: dict[Mesh, LinearDistances] = {}
+        self._linear: dict[tuple[Mesh, float], LinearDistances] = {}
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
@@ -103,19 +103,22 @@ class Search:
                 stage.message += f", short by {quantity(outcome.slack, 'N')}"
         return outcome
 
-    def approach(self, mesh: Mesh, guess: Deviation | None) -> Deviation | None:
+    def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
         """Return a motion past the places that are in the way, from which the program of `mesh` soon ends, or None.
 
-        It results from passes with linear distances, each about the motion of the one before.
+        It results from passes with linear distances, each about the motion of the one before. The motion is one of
+        `scenario`; default: of the search's own.
         """
-        scenario = self.scenario
+        slower = "" if scenario is None else f" from {quantity(scenario.duration, 's')}"
+        scenario = scenario or self.scenario
         if not any(is_local(limit) for limit in scenario.limits) or scenario.task.solver == "fatrop":
             return None
-        with self.stage(f"program with linear distances, {mesh.steps} steps") as stage:
+        with self.stage(f"program with linear distances, {mesh.steps} steps{slower}") as stage:
             start = time.perf_counter()
-            if mesh not in self._linear:
-                self._linear[mesh] = wait_for(lambda: LinearDistances(build(scenario, mesh)))
-            linear = self._linear[mesh]
+            key = mesh, scenario.duration
+            if key not in self._linear:
+                self._linear[key] = wait_for(lambda: LinearDistances(build(scenario, mesh)))
+            linear = self._linear[key]
             self.build_s += time.perf_counter() - start
             motion = initial_guess(scenario, linear.shares * scenario.duration) if guess is None else guess
             motion = motion.at(linear.shares * motion.nodes[-1])

@@ -120,6 +120,25 @@ class ClearSpace:
             first, batch = first + batch, BATCH
         return end if last == 1.0 else start + last * (end - start) if last > 0.0 else start
 
+    def is_clear(self, corners: np.ndarray) -> bool:
+        """Return whether the straight pieces between configurations (k, count) are clear, of which the ends are.
+
+        All pieces are halved at once: where one is not clear, few configurations show it.
+        """
+        slack, points = self._evaluate(corners)
+        slack[[0, -1]] = np.maximum(slack[[0, -1]], 0.0)
+        while slack.min() >= 0.0:
+            long = np.linalg.norm(np.diff(corners, axis=0) * self.space.scale, axis=1) > self._longest
+            halved = np.union1d(np.flatnonzero(long), unsure(slack, points, 1 + RISE))
+            if not halved.size:
+                return True
+            middle = (corners[halved] + corners[halved + 1]) / 2
+            more, more_points = self._evaluate(middle)
+            corners = np.insert(corners, halved + 1, middle, axis=0)
+            slack = np.insert(slack, halved + 1, more)
+            points = np.insert(points, halved + 1, more_points, axis=0)
+        return False
+
     def _clear_until(self, start: np.ndarray, end: np.ndarray, shares: np.ndarray) -> float:
         """Return the largest of `shares` of a straight line, or one between, up to which it is clear from the first."""
         slack, points = self._evaluate(start + shares[:, None] * (end - start))

@@ -136,5 +136,5 @@ def _connected(
     )
     if path is None:
         return None
-    path = shortened(path, space.scale, space.groups, clear.advance, rng, in_time)
-    return GlobalPath(space, rounded(path, clear.advance))
+    path = shortened(path, space.scale, space.groups, clear.is_clear, rng, in_time)
+    return GlobalPath(space, rounded(path, clear.is_clear))

@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 
-from .tree import Advance
-
 __all__ = ["rounded", "shortened"]
+
+Clear = Callable[[np.ndarray], bool]
+"""Return whether the straight pieces between configurations (k, count) are clear."""
 
 SHORTCUTS = 150
 ROUNDS = 2  # of cutting corners
@@ -21,7 +22,7 @@ def shortened(
     path: np.ndarray,
     scale: np.ndarray,
     groups: list[np.ndarray],
-    advance: Advance,
+    is_clear: Clear,
     rng: Generator,
     go_on: Callable[[], bool],
 ) -> np.ndarray:
@@ -42,7 +43,7 @@ def shortened(
         piece = np.vstack([p, *([] if group.all() else path[i:j]), q])
         share = (np.r_[ends[0], at[i:j] if len(piece) > 2 else [], ends[1]] - ends[0]) / (ends[1] - ends[0])
         piece[:, group] = p[group] + share[:, None] * (q - p)[group]
-        if all(np.array_equal(advance(a, b), b) for a, b in pairwise(piece)):
+        if is_clear(piece):
             path = _without_idle(np.vstack([path[:i], piece, path[j:]]), scale)
     return path
 
@@ -58,12 +59,12 @@ def _without_idle(path: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return np.vstack([*kept, path[-1]])
 
 
-def rounded(path: np.ndarray, advance: Advance) -> np.ndarray:
+def rounded(path: np.ndarray, is_clear: Clear) -> np.ndarray:
     """Return a path whose corners are cut where that is possible, again and again (Chaikin)."""
     for _ in range(ROUNDS):
         new = [path[0]]
         for before, corner, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
             p, q = corner + CUT * (before - corner), corner + CUT * (after - corner)
-            new += [p, q] if np.array_equal(advance(p, q), q) else [corner]
+            new += [p, q] if is_clear(np.stack([p, q])) else [corner]
         path = np.vstack([*new, path[-1]])
     return path

@@ -12,7 +12,7 @@ from ..tasks.ends import fixed_values
 from ..tasks.scenario import POSITION, Scenario
 from .formation import clear_formation
 
-__all__ = ["formation_guess", "guess_through", "initial_guess", "usual_guess"]
+__all__ = ["balanced", "formation_guess", "guess_through", "initial_guess", "usual_guess"]
 
 ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
 
@@ -36,15 +36,15 @@ def formation_guess(scenario: Scenario) -> Callable[[np.ndarray], Deviation] | N
 
 def usual_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
     """Return the guess whose platform is on its path, and whose carriers keep their places, whatever is in the way."""
-    return _balanced(scenario, _about_home(scenario, nodes))
+    return balanced(scenario, _about_home(scenario, nodes))
 
 
 def guess_through(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], nodes: np.ndarray) -> Deviation:
     """Return the guess that brings platform (n, 6) and carriers (n, c, 6) to `poses` at `nodes`."""
-    return _balanced(scenario, _in_formation(scenario, poses, nodes))
+    return balanced(scenario, _in_formation(scenario, poses, nodes))
 
 
-def _balanced(scenario: Scenario, guess: Deviation) -> Deviation:
+def balanced(scenario: Scenario, guess: Deviation) -> Deviation:
     """Return the same motion with carriers tilted as they must be, and tensions."""
     if any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free):
         for _ in range(ATTITUDES_MEET):

@@ -100,6 +100,10 @@ class Scenario:
         """Return the scenario with another duration [s]."""
         return replace(self, duration=seconds)
 
+    def held(self, seconds: float) -> Scenario:
+        """Return the scenario of the task whose duration is given [s]."""
+        return replace(self, task=self.task.model_copy(update={"duration": seconds}), duration=seconds)
+
     def along(self, path: AnyPath, seconds: float) -> Scenario:
         """Return the scenario with another path of the platform, in the same frame, and its duration [s]."""
         return replace(self, path=path, duration=seconds)
