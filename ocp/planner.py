@@ -27,20 +27,21 @@ from ..models import Robot
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..text import quantity
-from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
+from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
 from .global_path.global_path import find_global_path
 from .global_path.need import guess_exceeds, is_open
 from .global_path.space import Space
-from .nlp.guess import balanced, formation_guess, usual_guess
-from .nlp.near import is_local
+from .homotopy import from_easier
+from .nlp.guess import formation_guess, usual_guess
 from .nlp.rows import Mesh
-from .nlp.solver import MANY, Outcome, Progress, Solver
+from .nlp.solver import Progress, Solver
+from .refinement import refine
 from .relaxations import near_fixed_motion, near_motion
 from .result import Plan
-from .search import Search, ended
+from .search import Search
 from .start import deviation_from
 from .status import MotionStatus
 from .tasks.deviation import Deviation
@@ -54,16 +55,7 @@ from .time_law import BOUND, fastest
 from .timing.timing import Timing
 from .violation import relative_violation
 
-REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
-MOST_STEPS = 1600
-COARSE = 50  # steps: from four times as many on, the program of so few is solved first
-COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 100 steps then takes a third of the time
-SLOWER = 3.0  # than the duration that the planner starts from
-RESERVE = 1e-3  # of the weight, from the tension limits
-LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 GLOBAL_SHARE = 0.2  # of the time limit
-SHRINK = 2e-3  # of limits beside those of the tensions
-LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
 
 
@@ -305,15 +297,6 @@ def _global_path(search: Search, balance: bool) -> tuple[Deviation | None, bool]
         return None if formation is None else formation(nodes), True
 
 
-def _coarse(search: Search) -> Mesh | None:
-    """Return the mesh whose optimum the program of the task's own starts from; None if that would save no time."""
-    scenario = search.scenario
-    steps, coarse, times = scenario.task.steps, COARSE, 4
-    if scenario.count > MANY:
-        coarse, times = COARSE_OF_MANY, 2 if any(is_local(limit) for limit in scenario.limits) else 4
-    return Mesh(coarse) if steps >= times * coarse else None
-
-
 def _free_motion(search: Search, start: Deviation | None) -> Plan:
     """Solve, audit and refine; if the program has no solution, search for the closest motion first."""
     scenario = search.scenario
@@ -324,7 +307,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     collides = False
     if guessed:
         start, collides = _global_path(search, balance=team)
-    outcome = _from_near(search, mesh, start, guessed)
+    outcome = from_easier(search, mesh, start, guessed)
     if not outcome.success and guessed and not (team or collides) and search.seconds_left > 0:
         path, _ = _global_path(search, balance=True)
         if path is not None:
@@ -336,38 +319,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
             short = quantity(closest.slack, "N")
             return _closest(search, f"the motion with the least missing wrench is short by {short} at its nodes")
         outcome = search.solve("nonlinear program", mesh, closest.deviation)
-    return _closest(search, _refine(search, outcome))
-
-
-def _from_near(search: Search, mesh: Mesh, start: Deviation | None, guessed: bool) -> Outcome:
-    """Solve the program from a motion that is nearer to its solution than `start`, if there is one."""
-    if search.knows(mesh):
-        return search.solve("nonlinear program", mesh, start)
-    coarse = _coarse(search) if guessed else None
-    near = _slowly(search, coarse or mesh, start) if guessed else None
-    near = search.approach(coarse or mesh, near or start) or near
-    if coarse is not None:
-        outcome = search.solve("coarse program", coarse, near or start)
-        near = outcome.deviation if outcome.success else near
-    outcome = search.solve("nonlinear program", mesh, near or start, coarser=near is not None)
-    if outcome.success or near is None or search.seconds_left <= 0:
-        return outcome
-    return search.solve("nonlinear program", mesh, start)
-
-
-def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | None:
-    """Return a team's motion past obstacles that begins with a slower one; None if there is none.
-
-    The slower a motion is, the less must its carriers tilt, and a guess that is balanced at rest is nearly balanced.
-    """
-    scenario, span = search.scenario, search.scenario.duration_range
-    if scenario.count <= MANY:
-        return None
-    slow = scenario.held(SLOWER * scenario.duration if span is None else min(SLOWER * scenario.duration, span.max))
-    if start is not None:
-        start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]))
-    motion = search.approach(mesh, start, slow)
-    return motion.stretched(scenario.duration / slow.duration) if motion is not None and span is None else motion
+    return _closest(search, refine(search, outcome))
 
 
 def _closest(search: Search, reason: str) -> Plan:
@@ -376,41 +328,3 @@ def _closest(search: Search, reason: str) -> Plan:
     if plan.feasible:
         return plan
     return replace(plan, offers=partial(near_motion, search, plan.scenario, plan.deviation, plan.audit))
-
-
-def _refine(search: Search, outcome: Outcome) -> str:
-    """Audit a solution, and solve again with more nodes as long as the audit reports violations; return why it ends."""
-    scenario, steps = search.scenario, search.scenario.task.steps
-    audit = search.audit(outcome)
-    reserve, shrink, further = 0.0, 0.0, ()
-    for attempt in range(1, REFINEMENTS + 1):
-        if audit.passed or not (outcome.success or further) or search.seconds_left <= 0:
-            break
-        # Between finer nodes less can happen; a little distance from the limits takes care of what still does.
-        steps = min(2 * steps, MOST_STEPS)
-        missed = float(audit.violation.max()) / scenario.robot.force_scale
-        reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
-        shrink = SHRINK * attempt if audit.excess else shrink
-        further = _missed(scenario, audit, further) if outcome.success else ()  # not again what had no solution
-        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
-        outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
-        audit = search.audit(outcome)
-    if outcome.success:
-        return f"the audit reports violations up to the finest mesh, {steps} steps"
-    return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
-
-
-def _missed(
-    scenario: Scenario, audit: Audit, before: tuple[tuple[str, str, float], ...]
-) -> tuple[tuple[str, str, float], ...]:
-    """Return the share by which each limit is reduced on a mesh twice as fine as that which the audit objects to.
-
-    What happens between nodes falls at least as their distance does, and with it half of what was reduced before.
-    """
-    shares = {(name, about): share / 2 for name, about, share in before}
-    for excess in audit.excess:
-        for limit in scenario.limits:
-            if limit.name == excess.limit and limit.is_about(excess.about):
-                share = shares.get((excess.limit, excess.about), 0.0) + limit.share_beyond(excess.value)
-                shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
-    return tuple((*key, share) for key, share in shares.items())

@@ -69,7 +69,7 @@ def _other_duration(search: Search, scenario: Scenario, left: Durations | None, 
     """
     if left is not None and not left.exist:
         return []
-    if not all(path.stretches for path in (scenario.path, *scenario.carrier_paths.values())):
+    if not scenario.stretches:
         return []
     missing = audit.violation.max() > audit.tolerance
     if left is None and missing:
@@ -172,7 +172,7 @@ def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
 def _longer_duration(search: Search) -> list[Relaxed]:
     """Return a longer duration at which a scenario's motion, which the planner chooses, is possible, if it is shown."""
     scenario, task = search.scenario, search.scenario.task
-    if not all(path.stretches for path in (scenario.path, *scenario.carrier_paths.values())):
+    if not scenario.stretches:
         return []
     requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
     open_task = task.model_copy(

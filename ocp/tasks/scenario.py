@@ -71,6 +71,11 @@ class Scenario:
         return self.task.duration if isinstance(self.task.duration, PositiveRange) else None
 
     @property
+    def stretches(self) -> bool:
+        """Return whether another duration means the same places of all paths, later or sooner."""
+        return all(path.stretches for path in (self.path, *self.carrier_paths.values()))
+
+    @property
     def wind(self) -> Vector3 | None:
         """Return the wind of the planned tensions in {G} [m/s], of a box its middle, or None without air."""
         return self.task.wind.middle if isinstance(self.task.wind, WindBox) else self.task.wind
