@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 from .audits.audit import Audit
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome
@@ -15,25 +17,33 @@ MOST_STEPS = 1600
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
 SHRINK = 2e-3  # of limits beside those of the tensions
+TIGHTENINGS = 3  # on the same mesh
 LITTLE = 0.05  # of a limit: what a motion exceeds between nodes where the same mesh does
 TIGHTENED = 1.1  # times what the audit reports, on the same mesh
 LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
+
+Shares: TypeAlias = tuple[tuple[str, str, float], ...]
+"""Name of a limit, what it is about, and the share by which it is reduced (`Mesh.further`)."""
 
 
 def refine(search: Search, outcome: Outcome) -> str:
     """Audit a solution, and solve again as long as the audit reports violations; return why it ends.
 
-    Limits that are exceeded a little between the nodes are tightened by that, on the same mesh the first time. Else the
+    Limits that are exceeded a little between the nodes are tightened by that on the same mesh, a few times. Else the
     mesh gets finer each time.
     """
     scenario, steps = search.scenario, search.scenario.task.steps
     audit = search.audit(outcome)
-    if outcome.success and search.seconds_left > 0 and _exceeds_little(scenario, audit):
-        tightened = Mesh(steps, further=_tightened(scenario, audit, {}, TIGHTENED))
-        again = search.solve("nonlinear program", tightened, outcome.deviation, coarser=True)
-        if again.success:
-            outcome, audit = again, search.audit(again)
-    reserve, shrink, further = 0.0, 0.0, ()
+    further: Shares = ()
+    for _ in range(TIGHTENINGS):
+        if not (outcome.success and search.seconds_left > 0 and _exceeds_little(scenario, audit)):
+            break
+        further = _tightened(scenario, audit, further, TIGHTENED)
+        again = search.solve("nonlinear program", Mesh(steps, further=further), outcome.deviation, coarser=True)
+        if not again.success:
+            break
+        outcome, audit = again, search.audit(again)
+    reserve, shrink = 0.0, 0.0
     for attempt in range(1, REFINEMENTS + 1):
         if audit.passed or not (outcome.success or further) or search.seconds_left <= 0:
             break
@@ -44,7 +54,7 @@ def refine(search: Search, outcome: Outcome) -> str:
         reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
         shrink = SHRINK * attempt if audit.excess else shrink
         if outcome.success:  # else not again what had no solution
-            further = _tightened(scenario, audit, {(name, about): share / 2 for name, about, share in further})
+            further = _tightened(scenario, audit, tuple((name, about, share / 2) for name, about, share in further))
         else:
             further = ()
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
@@ -57,14 +67,13 @@ def refine(search: Search, outcome: Outcome) -> str:
 
 def _exceeds_little(scenario: Scenario, audit: Audit) -> bool:
     """Return whether an audit reports nothing but limits that are exceeded by a small share."""
-    shares = _tightened(scenario, audit, {})
+    shares = _tightened(scenario, audit, ())
     return bool(shares) and audit.violation.max() <= audit.tolerance and max(share for *_, share in shares) <= LITTLE
 
 
-def _tightened(
-    scenario: Scenario, audit: Audit, shares: dict[tuple[str, str], float], factor: float = 1.0
-) -> tuple[tuple[str, str, float], ...]:
-    """Return the share by which each limit is reduced: as in `shares`, and by `factor` times what the audit reports."""
+def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float = 1.0) -> Shares:
+    """Return the share by which each limit is reduced: as `before`, and by `factor` times what the audit reports."""
+    shares = {(name, about): share for name, about, share in before}
     for excess in audit.excess:
         for limit in scenario.limits:
             if limit.name == excess.limit and limit.is_about(excess.about):
