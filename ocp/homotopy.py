@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .nlp.guess import balanced
 from .nlp.near import is_local
 from .nlp.rows import MANY, Mesh
@@ -42,7 +44,9 @@ def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | 
         return None
     slow = scenario.held(SLOWER * scenario.duration if span is None else min(SLOWER * scenario.duration, span.max))
     if start is not None:
-        start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]))
+        # Nodes as few as those of the mesh: what is sharp between them would tilt carriers as no limit lets them.
+        nodes = np.linspace(0.0, slow.duration, mesh.steps + 1)
+        start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]).at(nodes))
     motion = search.approach(mesh, start, slow)
     return motion.stretched(scenario.duration / slow.duration) if motion is not None and span is None else motion
 

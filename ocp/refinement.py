@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+import numpy as np
+
 from .audits.audit import Audit
 from .nlp.rows import Mesh
 from .nlp.solver import Outcome
@@ -35,10 +37,12 @@ def refine(search: Search, outcome: Outcome) -> str:
     scenario, steps = search.scenario, search.scenario.task.steps
     audit = search.audit(outcome)
     further: Shares = ()
+    little = LITTLE
     for _ in range(TIGHTENINGS):
-        if not (outcome.success and search.seconds_left > 0 and _exceeds_little(scenario, audit)):
+        beyond = _beyond(scenario, audit)
+        if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
             break
-        further = _tightened(scenario, audit, further, TIGHTENED)
+        further, little = _tightened(scenario, audit, further, TIGHTENED), beyond / 2
         again = search.solve("nonlinear program", Mesh(steps, further=further), outcome.deviation, coarser=True)
         if not again.success:
             break
@@ -65,10 +69,12 @@ def refine(search: Search, outcome: Outcome) -> str:
     return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
 
 
-def _exceeds_little(scenario: Scenario, audit: Audit) -> bool:
-    """Return whether an audit reports nothing but limits that are exceeded by a small share."""
-    shares = _tightened(scenario, audit, ())
-    return bool(shares) and audit.violation.max() <= audit.tolerance and max(share for *_, share in shares) <= LITTLE
+def _beyond(scenario: Scenario, audit: Audit) -> float:
+    """Return the largest share of a limit by which an audit reports it exceeded; inf if less of a limit is no help."""
+    if audit.violation.max() > audit.tolerance:
+        return np.inf
+    shares = [share for *_, share in _tightened(scenario, audit, ())]
+    return max(shares, default=0.0) if all(shares) and len(shares) == len(audit.excess) else np.inf
 
 
 def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float = 1.0) -> Shares:

@@ -79,7 +79,7 @@ def clear_formation(scenario: Scenario) -> Formation | None:
         shape = _best(scenario, references, beyond, _tried(shape, span, attempt), span)
     from scipy.ndimage import gaussian_filter1d  # loads for longer than a plan takes that does not need it
 
-    return Formation(scenario, finer, gaussian_filter1d(shape, PLACES / 30, axis=0, mode="nearest"))
+    return Formation(scenario, finer, gaussian_filter1d(shape, PLACES / 60, axis=0, mode="nearest"))
 
 
 @dataclass(frozen=True)

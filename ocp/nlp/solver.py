@@ -15,6 +15,7 @@ import numpy as np
 from ...errors import SolverError
 from ..tasks.deviation import Deviation
 from .guess import initial_guess
+from .one_thread import run_in_one_thread
 from .program import Program
 from .rows import MANY
 from .waiting import Errands, wait_for
@@ -106,7 +107,9 @@ class Solver:
         common = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
         name = self.program.scenario.task.solver
         options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
-        return wait_for(lambda: _checked(ca.nlpsol, "planner", name, self.program.problem, common | options))
+        made = wait_for(lambda: _checked(ca.nlpsol, "planner", name, self.program.problem, common | options))
+        run_in_one_thread()
+        return made
 
     def _ipopt(self, start: dict[str, Any]) -> dict[str, Any]:
         quiet = {"print_level": 0, "sb": "yes"}
@@ -292,7 +295,8 @@ class _Watch(ca.Callback):
         self._keep(x, g, objective)
         # What making up for what g misses would change, to first order.
         missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
-        if objective + lam_g @ missed < self._better():
+        # A product of such long vectors by `@` would start a thread of BLAS, which then waits at full load.
+        if objective + (lam_g * missed).sum() < self._better():
             self._since = self.iteration
         if self._progress is not None:
             self.errands.put(partial(self._progress, self.iteration, objective, self.infeasibility(g)))
