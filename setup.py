@@ -27,11 +27,12 @@ def main() -> None:
         include_dirs=[CORE],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
         # The same bits on every processor: no multiplication and addition in one.
-        extra_compile_args=[] if sys.platform == "win32" else ["-O3", "-ffp-contract=off"],
+        extra_compile_args=[] if sys.platform == "win32" else ["-O3", "-ffp-contract=off", "-g0"],
         py_limited_api=True,
         optional=True,
     )
-    setup(ext_modules=[core], options={"bdist_wheel": {"py_limited_api": "cp311"}})
+    # Named as the script, this file is no module of the package, whichever program runs it.
+    setup(script_name="setup.py", ext_modules=[core], options={"bdist_wheel": {"py_limited_api": "cp311"}})
 
 
 if __name__ == "__main__":  # the root of the repository is the package: this file can be imported

@@ -10,7 +10,8 @@ import pytest
 from towline.benchmarks.exactness import awkward_problem
 from towline.solvers import TensionProblem, compiled, solve, solve_batch
 from towline.solvers.core import CABLES
-from towline.tests.problems import ZOO
+
+from .problems import ZOO
 
 KEYS = ("A", "w", "t_min", "t_max", "t_ref", "weights", "length")
 
