@@ -25,10 +25,13 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
     coarse = _coarse(search) if guessed else None
     near = _slowly(search, coarse or mesh, start) if guessed else None
     near = search.approach(coarse or mesh, near or start) or near
+    optimal = False
     if coarse is not None:
-        outcome = search.solve("coarse program", coarse, near or start)
-        near = outcome.deviation if outcome.success else near
-    outcome = search.solve("nonlinear program", mesh, near or start, coarser=near is not None)
+        outcome = search.solve("coarse program", coarse, near or start, clear=near is not None)
+        optimal = outcome.success
+        near = outcome.deviation if optimal else near
+    # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
+    outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
     if outcome.success or near is None or search.seconds_left <= 0:
         return outcome
     return search.solve("nonlinear program", mesh, start)

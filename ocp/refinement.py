@@ -43,7 +43,7 @@ def refine(search: Search, outcome: Outcome) -> str:
         if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
             break
         further, little = _tightened(scenario, audit, further, TIGHTENED), beyond / 2
-        again = search.solve("nonlinear program", Mesh(steps, further=further), outcome.deviation, coarser=True)
+        again = search.solve("nonlinear program", Mesh(steps, further=further), outcome.deviation, clear=True)
         if not again.success:
             break
         outcome, audit = again, search.audit(again)

@@ -84,13 +84,16 @@ class Search:
         """Return whether the program of `mesh` exists: it may have a solution to start from."""
         return mesh in self._solvers
 
-    def solve(self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False) -> Outcome:
+    def solve(
+        self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False, clear: bool = False
+    ) -> Outcome:
         """Solve the program of `mesh` from `guess`; default: from its last solution, or else from a guess of its own.
 
-        A guess is `coarser` if it is the same task's optimum on a coarser mesh.
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh, and `clear` if it is past all places
+        that are in the way, as such an optimum is.
         """
         with self.stage(f"{name}, {mesh.steps} steps") as stage:
-            outcome = self._run(mesh, guess, coarser, NEAR if coarser else np.inf)
+            outcome = self._run(mesh, guess, coarser, NEAR if coarser or clear else np.inf)
             if (
                 outcome.success
                 and self.seconds_left > 0
@@ -125,7 +128,7 @@ class Search:
             objective, iterations, missed = np.inf, 0, np.inf
             for passed in range(PASSES):
                 start = time.perf_counter()
-                outcome = linear.solve(motion, self._iteration, passed > 0, self.seconds_left)
+                outcome = linear.solve(motion, self._iteration, self.seconds_left)
                 self.solve_s += time.perf_counter() - start
                 iterations += outcome.iterations
                 stage.message = f"{ended(outcome.message)} after {iterations} iterations in pass {passed + 1}"

@@ -1,6 +1,7 @@
 """Paths past obstacles before any program is solved: through holes, round walls; checked by distances of our own."""
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from towline.benchmarks.scenes import APART, GATE, LENGTH, QUADROTOR, window
 from towline.models import load
 from towline.ocp import plan
+from towline.ocp.global_path.at_rest import AtRest
+from towline.ocp.global_path.clear_space import ClearSpace
 from towline.ocp.global_path.global_path import find_global_path
 from towline.ocp.global_path.need import guess_exceeds, is_open
 from towline.ocp.global_path.space import Space
@@ -79,6 +82,27 @@ def test_a_path_past_walls_is_clear_between_its_places_too(places, through_the_h
     tensions = np.linalg.solve(directions.swapaxes(1, 2), np.tile([0, 0, ROBOT.weight], (FINE, 1))[..., None])
     assert tensions.min() >= ROBOT.t_min.min()
     assert tensions.max() <= ROBOT.t_max.max()
+
+
+def test_pieces_are_clear_only_where_no_place_of_them_is_too_near():
+    """Sheets with a distance of 4 mm about them, which is less than the steps of the check."""
+    reserve = 0.004
+    sheets = [box([x, -FAR, -FAR], [x + 1e-4, y, FAR], platform=0.0) for x, y in ((-0.1, 0.1), (0.1, 0.3))]
+    space = Space(scenario_of(sheets))
+    clear = ClearSpace(space, AtRest(space.scenario, space.size), reserve)
+    rng = np.random.default_rng(3)
+    counts = {True: 0, False: 0}
+    for _ in range(200):
+        points = rng.uniform([-0.4, -0.3, 0.9], [0.4, 0.6, 1.1], (3, 3))
+        ends_clear = clear.rest(*space.poses(points[[0, -1]])).slack.min() >= reserve
+        dense = np.concatenate([a + np.linspace(0, 1, FINE)[:, None] * (b - a) for a, b in pairwise(points)])
+        nearest = min(outside(sheet, dense).min() for sheet in sheets)
+        if not ends_clear or abs(nearest - reserve) < 1e-3:
+            continue  # as the slope of the reserve and the finest pieces decide
+        answer = clear.is_clear(points)
+        counts[answer] += 1
+        assert answer == (nearest > reserve)
+    assert min(counts.values()) >= 20
 
 
 def test_the_same_task_has_the_same_path(through_the_hole):

@@ -74,6 +74,6 @@ def test_a_platform_that_does_not_turn_keeps_true_distances_where_it_keeps_linea
     for shift in (np.zeros(3), np.array([0.0, -0.04, 0.0]), np.array([0.02, -0.03, 0.03])):
         motion = type(guess)(guess.nodes, guess.q + shift, guess.v, guess.a, guess.tensions)
         assert linear.missed(motion) > 0.01
-        outcome = linear.solve(motion, None, False, np.inf)
+        outcome = linear.solve(motion, None, np.inf)
         assert outcome.success
         assert linear.missed(outcome.deviation) <= 1e-7

@@ -55,12 +55,12 @@ class LinearDistances:
         self._sparsity = slopes.sparsity()
         self._solver = Solver(replace(program, problem=problem, blocks=[first, *others]), MOST_ITERATIONS)
 
-    def solve(self, motion: Deviation, progress: Progress | None, again: bool, seconds: float) -> Outcome:
-        """Solve with distances about a motion at the program's points; `again` if it solved the program before."""
+    def solve(self, motion: Deviation, progress: Progress | None, seconds: float) -> Outcome:
+        """Solve with distances about a motion at the program's points."""
         x = ca.DM(self._program.pack(motion))
         values, slopes = self._expressions(x)
         offsets = values - ca.DM(self._sparsity, slopes) @ x
-        return self._solver.solve(motion, progress, again, seconds, ca.vertcat(slopes, offsets))
+        return self._solver.solve(motion, progress, False, seconds, ca.vertcat(slopes, offsets))
 
     def missed(self, motion: Deviation) -> float:
         """Return by how much a motion at the program's points exceeds its true distances, in units of their scales."""
