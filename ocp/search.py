@@ -112,7 +112,7 @@ class Search:
         It results from passes with linear distances, each about the motion of the one before. The motion is one of
         `scenario`; default: of the search's own.
         """
-        slower = "" if scenario is None else f" from {quantity(scenario.duration, 's')}"
+        slower = "" if scenario is None else f", in {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario
         if not any(is_local(limit) for limit in scenario.limits) or scenario.task.solver == "fatrop":
             return None
