@@ -108,7 +108,8 @@ class Solver:
         name = self.program.scenario.task.solver
         options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
         made = wait_for(lambda: _checked(ca.nlpsol, "planner", name, self.program.problem, common | options))
-        run_in_one_thread()
+        if name == "ipopt":
+            run_in_one_thread()
         return made
 
     def _ipopt(self, start: dict[str, Any]) -> dict[str, Any]:
