@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .nlp.guess import balanced
-from .nlp.near import is_local
+from .nlp.near import has_places
 from .nlp.rows import MANY, Mesh
 from .nlp.solver import Outcome
 from .search import Search
@@ -59,5 +59,5 @@ def _coarse(search: Search) -> Mesh | None:
     scenario = search.scenario
     steps, coarse, times = scenario.task.steps, COARSE, 4
     if scenario.count > MANY:
-        coarse, times = COARSE_OF_MANY, 2 if any(is_local(limit) for limit in scenario.limits) else 4
+        coarse, times = COARSE_OF_MANY, 2 if has_places(scenario) else 4
     return Mesh(coarse) if steps >= times * coarse else None

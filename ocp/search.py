@@ -14,7 +14,7 @@ from .audits.audit import Audit, audit
 from .nlp.grid import Grid
 from .nlp.guess import initial_guess
 from .nlp.linear import LinearDistances
-from .nlp.near import Near, is_local
+from .nlp.near import Near, has_places
 from .nlp.program import Program, build
 from .nlp.rows import Mesh
 from .nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
@@ -57,7 +57,6 @@ class Search:
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
-        self._linear: dict[tuple[Mesh, float], LinearDistances] = {}
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
@@ -114,14 +113,11 @@ class Search:
         """
         slower = "" if scenario is None else f", in {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario
-        if not any(is_local(limit) for limit in scenario.limits) or scenario.task.solver == "fatrop":
+        if not has_places(scenario) or scenario.task.solver == "fatrop":
             return None
         with self.stage(f"program with linear distances, {mesh.steps} steps{slower}") as stage:
             start = time.perf_counter()
-            key = mesh, scenario.duration
-            if key not in self._linear:
-                self._linear[key] = wait_for(lambda: LinearDistances(build(scenario, mesh)))
-            linear = self._linear[key]
+            linear = wait_for(lambda: LinearDistances(build(scenario, mesh)))
             self.build_s += time.perf_counter() - start
             motion = initial_guess(scenario, linear.shares * scenario.duration) if guess is None else guess
             motion = motion.at(linear.shares * motion.nodes[-1])
@@ -163,7 +159,7 @@ class Search:
     def _built(self, mesh: Mesh, guess: Deviation | None, reach: float) -> Program:
         """Return the program of `mesh`, without the rows of places that are farther than `reach` from the guess."""
         scenario = self.scenario
-        if not any(is_local(limit) for limit in scenario.limits) or not np.isfinite(reach):
+        if not has_places(scenario) or not np.isfinite(reach):
             return build(scenario, mesh)
         shares = Grid.of(scenario, mesh.steps).shares
         motion = initial_guess(scenario, shares * scenario.duration) if guess is None else guess

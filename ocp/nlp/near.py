@@ -15,7 +15,7 @@ from ..limits import Limit
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 
-__all__ = ["Near", "is_local"]
+__all__ = ["Near", "has_places", "is_local"]
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,11 @@ class Near:
 def is_local(limit: Limit) -> bool:
     """Return whether a limit is a hard distance from a place."""
     return bool(np.isfinite(limit.thickness)) and limit.soft is None
+
+
+def has_places(scenario: Scenario) -> bool:
+    """Return whether any limit of a scenario is local."""
+    return any(is_local(limit) for limit in scenario.limits)
 
 
 class _At:
