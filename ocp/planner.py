@@ -5,8 +5,10 @@ The planner works in stages, and ends with the first that decides:
 1. ends and path (`blocked`): what is impossible whatever the planner chooses, proven at once;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
 3. a path past obstacles (`global_path`), where the usual guess exceeds a limit at rest: the next stages start from it;
-4. the program with linear distances from obstacles (`linear`), to start the next one from;
-5. the nonlinear program (`program`), audited, and refined where the audit reports violations;
+4. easier programs to start the next one from: linear distances from obstacles (`linear`) and, for teams, more time
+   and fewer steps (`homotopy`);
+5. the nonlinear program (`program`), audited; where the audit reports violations, tightened or on a finer mesh
+   (`refinement`);
 6. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
    result.
 """
