@@ -29,6 +29,7 @@ SAMPLE_TIMES = tuple(np.linspace(0, 4, 9))
 PATHS = {
     "rest": RestPath(kind="rest", pose=(1, 2, 3)),
     "smooth line": LinePath(kind="line", start=(0, 0, 1), end=(1, -2, 3, 0.1, 0.2, -0.3)),
+    "smoother line": LinePath(kind="line", start=(0, 0, 1), end=(1, -2, 3), timing="smoother"),
     "uniform line": LinePath(kind="line", start=(0, 0, 1), end=(1, -2, 3), timing="uniform"),
     "helix": CirclePath(kind="circle", centre=(1, 2, 3), radius=0.5, rate=-0.7, phase=0.3, drift=(0.1, 0.2, 0.3)),
     "waypoints": WaypointPath(kind="waypoints", points=((0, 0, 1), (1, 0, 2, 0, 0, 0.5), (1, 1, 1))),

@@ -161,3 +161,19 @@ def test_a_wall_across_a_path_that_must_be_followed_is_a_proof_and_in_a_wide_tub
     late = plan(ROBOT, task | {"tube": {"position": 2.0}})
     assert late.status is MotionStatus.NOT_FOUND
     assert "time limit of 0.001 s is reached" in late.report().splitlines()[0]
+
+
+def test_a_team_that_carries_its_load_on_an_exact_line_rests_at_its_ends_at_the_same_cost_on_every_mesh():
+    """By the law of degree 7 the directions of the cables must move at rest: the cost grew with the mesh, 2.7 to 5.7."""
+    home = load("multi-quadrotor-3").home.tolist()
+    line = {"kind": "line", "start": home, "end": [home[0] + 2, *home[1:]]}
+    plans = [
+        plan("multi-quadrotor-3", {"path": line, "base": {"kind": "free"}, "duration": 4, "steps": steps})
+        for steps in (25, 50)
+    ]
+    assert all(each.feasible for each in plans)
+    assert plans[1].objective == pytest.approx(plans[0].objective, rel=0.05)
+    assert np.abs(plans[1].trajectory["carrier_velocity"].values[[0, -1]]).max() < 1e-6
+    tilt = np.arccos(np.cos(plans[1].trajectory["carrier_pose"].values[..., 3:5]).prod(axis=-1))
+    assert tilt.max() < np.radians(20), "34 degrees, the limit, by the law of degree 7"
+    assert plans[1].scenario.task.path.timing == "smoother"

@@ -24,7 +24,7 @@ __all__ = ["Outcome", "Progress", "Solver"]
 
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
-PATIENCE = 30  # iterations without a better one
+PATIENCE = 10  # iterations without a better one
 # Of the pivot tolerances of MUMPS the larger one refactorises less where thrust directions are equations: teams of
 # quadrotors then take half of the time. Of other robots each iteration takes 10 % longer.
 TEAM = {"mumps_pivtol": 1e-4}

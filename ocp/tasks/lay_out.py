@@ -20,7 +20,7 @@ from .ends import carrier_ends
 from .initial import check_initial
 from .lay_out_phases import lay_out_phases
 from .limit_list import limit_list
-from .paths import WaypointPath
+from .paths import LinePath, WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
 from .scheme import SCHEMES
 from .task import FreeBase, GivenBase, HoldBase, Task
@@ -42,6 +42,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         Naming the field of the task that does not fit, its value and what would.
     """
     where = f"task {task.name!r}"
+    task = _timed(robot, task)
     relative = _frame(robot, task, where)
     check_margin(robot, task)
     if task.wind is not None and robot.platform.aero is None:
@@ -71,6 +72,18 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     _check_waypoints(task, where)
     _check_transcription(task, limits, where)
     return replace(scenario, phases=lay_out_phases(scenario))
+
+
+def _timed(robot: Robot, task: Task) -> Task:
+    """Choose the timing of a line that leaves it open: smoother where balance then determines the motion of a team."""
+    path = task.path
+    if not isinstance(path, LinePath) or path.timing is not None:
+        return task
+    exact = task.tube.radius == task.tube.turn == 0 and isinstance(task.base, FreeBase)
+    team = robot.m < len(robot.platform.dof) and any(carrier.efforts for carrier in robot.carriers)
+    if not (exact and team and carrier_ends(task) == "rest"):
+        return task
+    return task.model_copy(update={"path": path.model_copy(update={"timing": "smoother"})})
 
 
 def _feels_no_tensions(robot: Robot, where: str) -> None:

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from .base import PathBase, PoseOrPosition
 from .motion import Motion
-from .rest_to_rest import rest_to_rest
+from .rest_to_rest import rest_to_rest, smoother_rest_to_rest
 
 __all__ = ["LinePath"]
 
@@ -21,9 +21,11 @@ class LinePath(PathBase):
     kind: Literal["line"]
     start: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
     end: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
-    timing: Literal["smooth", "uniform"] = Field(
-        default="smooth",
-        description="smooth: from rest to rest, acceleration and jerk zero there; uniform: constant speed",
+    timing: Literal["smooth", "smoother", "uniform"] | None = Field(
+        default=None,
+        description="smooth: from rest to rest, acceleration and jerk zero there; smoother: three more derivatives zero "
+        "there; uniform: constant speed; default: smoother where it lets quadrotors rest at the ends (an exact path of "
+        "a platform under fewer than six cables), else smooth",
     )
 
     @override
@@ -32,5 +34,6 @@ class LinePath(PathBase):
         s = (times / duration)[:, None]
         if self.timing == "uniform":
             return Motion(start + s * change, np.ones_like(s) * change / duration, np.zeros_like(s) * change)
-        done, rate, rate_rate = (part * change for part in rest_to_rest(s))
+        law = smoother_rest_to_rest if self.timing == "smoother" else rest_to_rest
+        done, rate, rate_rate = (part * change for part in law(s))
         return Motion(start + done, rate / duration, rate_rate / duration**2)

@@ -1,14 +1,16 @@
-"""`rest_to_rest`: the law of a motion from rest to rest, and its inverse.
+"""`rest_to_rest`: the law of a motion from rest to rest, and its inverse; `smoother_rest_to_rest`: the law for teams.
 
 Acceleration and jerk are zero at both ends: where carriers must be depends on the platform's acceleration, so they can
-start and end at rest only if its acceleration and jerk are zero there.
+start and end at rest only if its acceleration and jerk are zero there. The smoother law is zero up to the fifth
+derivative: where fewer than six cables hold a platform on an exact path, its acceleration determines the directions of
+the cables, hence the places of the quadrotors; and these rest only if their jerk, which turns their thrust, is zero.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["inverse", "rest_to_rest"]
+__all__ = ["inverse", "rest_to_rest", "smoother_rest_to_rest"]
 
 STEPS = 10  # of Newton's method: more than double precision needs
 
@@ -22,6 +24,14 @@ def rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     left = 1 - s
     done = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
     return done, 140 * (s * left) ** 3, 420 * (s * left) ** 2 * (1 - 2 * s)
+
+
+def smoother_rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what `rest_to_rest` does, by the law of degree 11 with five derivatives that are zero at both ends."""
+    s = np.clip(s, 0.0, 1.0)
+    left = 1 - s
+    done = s**6 * (462 - 1980 * s + 3465 * s**2 - 3080 * s**3 + 1386 * s**4 - 252 * s**5)
+    return done, 2772 * (s * left) ** 5, 13860 * (s * left) ** 4 * (1 - 2 * s)
 
 
 def inverse(done: np.ndarray) -> np.ndarray:
