@@ -164,7 +164,7 @@ def test_a_wall_across_a_path_that_must_be_followed_is_a_proof_and_in_a_wide_tub
 
 
 def test_a_team_that_carries_its_load_on_an_exact_line_rests_at_its_ends_at_the_same_cost_on_every_mesh():
-    """By the law of degree 7 the directions of the cables must move at rest: the cost grew with the mesh, 2.7 to 5.7."""
+    """By the law of degree 7 the directions of the cables must move at rest, and the cost grew with the mesh."""
     home = load("multi-quadrotor-3").home.tolist()
     line = {"kind": "line", "start": home, "end": [home[0] + 2, *home[1:]]}
     plans = [

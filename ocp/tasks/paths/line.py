@@ -23,9 +23,9 @@ class LinePath(PathBase):
     end: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
     timing: Literal["smooth", "smoother", "uniform"] | None = Field(
         default=None,
-        description="smooth: from rest to rest, acceleration and jerk zero there; smoother: three more derivatives zero "
-        "there; uniform: constant speed; default: smoother where it lets quadrotors rest at the ends (an exact path of "
-        "a platform under fewer than six cables), else smooth",
+        description="smooth: from rest to rest, acceleration and jerk zero there; smoother: the next two derivatives "
+        "zero too; uniform: constant speed; default: smoother where quadrotors can rest at the ends only so (an exact "
+        "path of a platform under fewer than six cables), else smooth",
     )
 
     @override
