@@ -3,7 +3,8 @@
 `import towline` costs nothing: each name below loads its package when it is first used (PEP 562). Packages, from the
 ground up: `towline.models` (robots and their mechanics), `towline.solvers` (tension distribution on plain arrays),
 `towline.figures` (matplotlib), `towline.distribution` (one instant of a robot as a tension problem),
-`towline.workspace` (reachable poses), `towline.ocp` (planning), `towline.studies` (the papers), `towline.cli`.
+`towline.workspace` (reachable poses), `towline.embedded` (a control step as C), `towline.ocp` (planning),
+`towline.studies` (the papers), `towline.cli`.
 """
 
 from importlib import import_module
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .distribution import tensions
+    from .embedded import export_step
     from .errors import InputError, SolverError, TowlineError
     from .models import Dynamics, Robot, available, load
     from .ocp import Plan, Planner, Sweep, Task, Timing, plan, read_task, sweep, time_along
@@ -25,6 +27,7 @@ _HOMES = {
     "distribution": ("tensions",),
     "ocp": ("Plan", "Planner", "Sweep", "Task", "Timing", "plan", "read_task", "sweep", "time_along"),
     "workspace": ("sample",),
+    "embedded": ("export_step",),
     "errors": ("InputError", "SolverError", "TowlineError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -44,6 +47,7 @@ __all__ = [
     "Timing",
     "TowlineError",
     "available",
+    "export_step",
     "load",
     "methods",
     "plan",

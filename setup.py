@@ -11,7 +11,7 @@ SOURCES = (
     "standard_form",
     "towline_core",
 )
-HEADERS = ("internal.h", "tolerances.h", "towline_core.h")
+HEADERS = ("internal.h", "tolerances.h", "towline_core.h", "towline_types.h")
 
 
 def main() -> None:

@@ -16,6 +16,13 @@ def export(
     c_code: Annotated[
         bool, typer.Option("--c", help="Write the functions of the dynamics as C code without dependencies.")
     ] = False,
+    step: Annotated[
+        Path | None,
+        typer.Option(
+            "--step", metavar="DIR", help="Write a control step as C, from state to tensions, into this new folder."
+        ),
+    ] = None,
+    single: Annotated[bool, typer.Option("--float", help="With --step: compute in float instead of double.")] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -26,14 +33,27 @@ def export(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Export a robot as a MuJoCo model (--mjcf) or as C code (--c)."""
+    """Export a robot as a MuJoCo model (--mjcf), its dynamics as C code (--c), or a control step as C code (--step)."""
     from ..errors import InputError
     from ..models import load
     from ..writing import check_writable, whole_file
 
-    if mjcf == c_code:
-        raise InputError("export requires exactly one of --mjcf and --c")
+    if mjcf + c_code + (step is not None) != 1:
+        raise InputError("export requires exactly one of --mjcf, --c and --step")
+    if single and step is None:
+        raise InputError("--float must be left out without --step")
+    if out is not None and step is not None:
+        raise InputError("--out must be left out with --step, which names the folder")
     loaded = load(robot)
+    if step is not None:
+        from ..embedded import export_step
+
+        folder = export_step(loaded, step, "float" if single else "double")
+        if as_json:
+            print_json({"robot": loaded.name, "folder": folder, "files": sorted(folder.iterdir())})
+        else:
+            typer.echo(str(folder))
+        return
     path = out or Path(f"{loaded.name}{'.xml' if mjcf else '.c'}")
     check_writable(path)
     if mjcf:

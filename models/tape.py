@@ -8,6 +8,7 @@ rounds where CasADi does.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import casadi as ca
@@ -97,13 +98,65 @@ def translate(function: ca.Function) -> str:
     InputError
         If an MX Function cannot be expanded, the tape has an operation that is not known here, or is too long.
     """
-    tape = _scalar(function)
+    tape = scalar(function)
     if tape.n_instructions() > LONGEST:
         raise InputError(
             f"{function.name()} must have at most {LONGEST} instructions for a kernel, got {tape.n_instructions()}"
         )
+    variables, stores = straight_line(tape, _OPERATIONS, "x{0}[k, {1}, {2}]".format, _literal)
+    arguments = [f"x{i}" for i in range(tape.n_in())] + [f"y{i}" for i in range(tape.n_out())]
+    lines = [f"def kernel(start, stop, {', '.join(arguments)}):", "    for k in range(start, stop):"]
+    lines += [f"        {variable} = {expression}" for expression, variable in variables.items()]
+    # Row by row, as they lie in memory; the tape stores column by column.
+    lines += [f"        y{i}[k, {row}, {column}] = {value}" for (i, row, column), value in sorted(stores.items())]
+    return "\n".join([*lines, "        pass", ""])  # for a Function without outputs
+
+
+def scalar(function: ca.Function) -> ca.Function:
+    """Return the Function as one of scalar instructions; an MX Function is expanded.
+
+    Raises
+    ------
+    InputError
+        If it cannot be expanded.
+    """
+    if function.is_a("SXFunction"):
+        return function
+    try:
+        return function.expand()
+    except RuntimeError:
+        raise InputError(f"{function.name()} must have only SX operations, got one that cannot be expanded") from None
+
+
+def straight_line(
+    tape: ca.Function,
+    operations: Mapping[str, str],
+    load: Callable[[int, int, int], str],
+    literal: Callable[[float], str],
+) -> tuple[dict[str, str], dict[tuple[int, int, int], str]]:
+    """Translate a Function of scalar instructions to one variable for each distinct value, in the tape's order.
+
+    Parameters
+    ----------
+    tape
+        From `scalar`, with dense inputs and outputs.
+    operations
+        The expression of each operation, with {0} and {1} for its operands.
+    load, literal
+        Return the expression of an input's element (input, row, column), and that of a constant.
+
+    Returns
+    -------
+    variables, stores
+        The name of each expression's variable, and that of each output's element (output, row, column).
+
+    Raises
+    ------
+    InputError
+        If the tape has an operation that is not among `operations`.
+    """
     work: dict[int, str] = {}  # what each slot of the work vector holds now
-    variables: dict[str, str] = {}  # of each expression on the tape
+    variables: dict[str, str] = {}
     stores: dict[tuple[int, int, int], str] = {}
     for k in range(tape.n_instructions()):
         operation = _NAMES[tape.instruction_id(k)]
@@ -114,31 +167,15 @@ def translate(function: ca.Function) -> str:
             continue
         if operation == "INPUT":
             column, row = divmod(inputs[1], tape.size1_in(inputs[0]))
-            expression = f"x{inputs[0]}[k, {row}, {column}]"
+            expression = load(inputs[0], row, column)
         elif operation == "CONST":
-            expression = _literal(tape.instruction_constant(k))
-        elif operation in _OPERATIONS:
-            expression = _OPERATIONS[operation].format(*(work[i] for i in inputs))
+            expression = literal(tape.instruction_constant(k))
+        elif operation in operations:
+            expression = operations[operation].format(*(work[i] for i in inputs))
         else:
-            raise InputError(
-                f"{function.name()} must have only the operations {', '.join(_OPERATIONS)}, got {operation}"
-            )
+            raise InputError(f"{tape.name()} must have only the operations {', '.join(operations)}, got {operation}")
         work[outputs[0]] = variables.setdefault(expression, f"v{len(variables)}")
-    arguments = [f"x{i}" for i in range(tape.n_in())] + [f"y{i}" for i in range(tape.n_out())]
-    lines = [f"def kernel(start, stop, {', '.join(arguments)}):", "    for k in range(start, stop):"]
-    lines += [f"        {variable} = {expression}" for expression, variable in variables.items()]
-    # Row by row, as they lie in memory; the tape stores column by column.
-    lines += [f"        y{i}[k, {row}, {column}] = {value}" for (i, row, column), value in sorted(stores.items())]
-    return "\n".join([*lines, "        pass", ""])  # for a Function without outputs
-
-
-def _scalar(function: ca.Function) -> ca.Function:
-    if function.is_a("SXFunction"):
-        return function
-    try:
-        return function.expand()
-    except RuntimeError:
-        raise InputError(f"{function.name()} must have only SX operations, got one that cannot be expanded") from None
+    return variables, stores
 
 
 def _literal(value: float) -> str:

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = [
     {"models", "solvers", "figures"},
     {"distribution"},
-    {"workspace", "ocp"},
+    {"workspace", "ocp", "embedded"},
     {"studies"},
     {"benchmarks"},
     {"viewer"},

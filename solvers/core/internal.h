@@ -97,32 +97,33 @@ static inline real reference(const towline_problem *problem, int i) { return pro
 static inline real weight(const towline_problem *problem, int i) { return problem->weights ? problem->weights[i] : 1; }
 
 /* standard_form.c */
-real towline_standard_form(form *f, const towline_problem *problem, real rho, int all);
-real towline_least_norm(form *f, int *worst, real *missing);
-outcome towline_enter_limits(form *f);
+TOWLINE_LINKAGE real towline_standard_form(form *f, const towline_problem *problem, real rho, int all);
+TOWLINE_LINKAGE real towline_least_norm(form *f, int *worst, real *missing);
+TOWLINE_LINKAGE outcome towline_enter_limits(form *f);
 
 /* reduction.c */
-int towline_reduce(form *f, int cut);
-void towline_reflect(const form *f, int j, real *x);
-void towline_null_space(form *f);
+TOWLINE_LINKAGE int towline_reduce(form *f, int cut);
+TOWLINE_LINKAGE void towline_reflect(const form *f, int j, real *x);
+TOWLINE_LINKAGE void towline_null_space(form *f);
 
 /* slabs.c and dual_active_set.c: move s to the point of least norm inside the limits. */
-outcome towline_slabs(form *f);
-outcome towline_dual_active_set(form *f);
+TOWLINE_LINKAGE outcome towline_slabs(form *f);
+TOWLINE_LINKAGE outcome towline_dual_active_set(form *f);
 
 /* proof.c */
-int towline_proves_optimum(const form *f, const int *active, const real *side, const real *multiplier, int count);
-measure towline_measure(const form *f, const towline_problem *problem, const real *t);
-real towline_correction(const form *f, const towline_problem *problem, const real *t, int exact);
-int towline_proves_feasible(const form *f, const towline_problem *problem, const real *t);
-towline_status towline_proves_infeasible(const form *f, const towline_problem *problem, const measure *known,
-                                         towline_answer *answer);
+TOWLINE_LINKAGE int towline_proves_optimum(const form *f, const int *active, const real *side, const real *multiplier,
+                                           int count);
+TOWLINE_LINKAGE measure towline_measure(const form *f, const towline_problem *problem, const real *t);
+TOWLINE_LINKAGE real towline_correction(const form *f, const towline_problem *problem, const real *t, int exact);
+TOWLINE_LINKAGE int towline_proves_feasible(const form *f, const towline_problem *problem, const real *t);
+TOWLINE_LINKAGE towline_status towline_proves_infeasible(const form *f, const towline_problem *problem,
+                                                         const measure *known, towline_answer *answer);
 
 /*
  * certificate.c: prove that w is out of reach, where the method `met` that outcome and `missing`, in row `worst`, is
  * the part of b outside the range of B.
  */
-towline_status towline_certify(form *f, const towline_problem *problem, const measure *known, outcome met, int worst,
-                               real missing, towline_answer *answer);
+TOWLINE_LINKAGE towline_status towline_certify(form *f, const towline_problem *problem, const measure *known,
+                                               outcome met, int worst, real missing, towline_answer *answer);
 
 #endif

@@ -153,10 +153,12 @@ static towline_status solve_exactly(form *f, const towline_problem *problem, tow
     return towline_certify(f, problem, &known, met, worst, missing, answer);
 }
 
+#ifndef TOWLINE_STEP
 towline_status towline_solve(const towline_problem *problem, towline_answer *answer) {
     form f;
     return answer->status = solve_exactly(&f, problem, answer);
 }
+#endif
 
 /* Fill tensions and residual of a soft answer. */
 static outcome solve_softly(form *f, const towline_problem *problem, real rho, towline_answer *answer) {
@@ -187,6 +189,7 @@ towline_status towline_solve_always(const towline_problem *problem, towline_real
     return answer->status;
 }
 
+#ifndef TOWLINE_STEP
 towline_status towline_solve_soft(const towline_problem *problem, towline_real rho, towline_answer *answer) {
     form f;
     answer->soft = answer->soft_is_proven = answer->steps = answer->inner = 0;
@@ -208,3 +211,4 @@ towline_status towline_solve_soft(const towline_problem *problem, towline_real r
     }
     return answer->status;
 }
+#endif

@@ -9,21 +9,17 @@
 #ifndef TOWLINE_CORE_H
 #define TOWLINE_CORE_H
 
+#include "towline_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#ifdef TOWLINE_FLOAT
-typedef float towline_real;
+/* Within one file that has all of the core, as `towline export --step` writes, it is static, less what is not called. */
+#ifdef TOWLINE_STEP
+#define TOWLINE_LINKAGE static
 #else
-typedef double towline_real;
-#endif
-
-#ifndef TOWLINE_CABLES
-#define TOWLINE_CABLES 16
-#endif
-#ifndef TOWLINE_ROWS
-#define TOWLINE_ROWS 6
+#define TOWLINE_LINKAGE
 #endif
 
 /* Weight of the squared wrench error in a soft answer, beside the squared tensions. */
@@ -32,14 +28,6 @@ typedef double towline_real;
 #else
 #define TOWLINE_RHO 1e8
 #endif
-
-typedef enum {
-    TOWLINE_OPTIMAL = 0,    /* the tensions give w inside the limits, and multipliers prove them optimal */
-    TOWLINE_INFEASIBLE = 1, /* the limits forbid w: see direction and shortfall */
-    TOWLINE_SINGULAR = 2,   /* no tensions of either sign, however large, give w: see direction and shortfall */
-    TOWLINE_INACCURATE = 3, /* rounding keeps the core from proving any of these */
-    TOWLINE_INVALID = 4     /* the numbers are no problem: NaN, crossed limits, a weight or a size out of range */
-} towline_status;
 
 /*
  * Minimise sum_i weights_i (t_i - t_ref_i)^2 subject to A t = w and t_min <= t <= t_max.
@@ -59,21 +47,10 @@ typedef struct {
     towline_real length;         /* characteristic length [m] */
 } towline_problem;
 
-typedef struct {
-    towline_status status;
-    int soft;           /* 1 if the tensions are a soft answer, which need not give w */
-    int soft_is_proven; /* by `towline_solve_soft`: 1 if multipliers prove the minimum */
-    int steps;          /* limits that the method added to its set, in both solves of a soft answer */
-    int inner;          /* cuts of an edge (m - rank <= 2), else projections on the null space */
-    towline_real tensions[TOWLINE_CABLES]; /* [N], inside the limits; only if optimal or soft */
-    towline_real residual;                 /* wrench error |S (A t - w)| of those tensions [N], S dividing moments */
-    towline_real direction[TOWLINE_ROWS];  /* only if infeasible or singular: d with d . A t <= support < d . w */
-    towline_real support;                  /* for all t inside the limits; d . w and support are in [N] */
-    towline_real shortfall;                /* d . w - support [N] */
-} towline_answer;
-
+#ifndef TOWLINE_STEP
 /* Solve a problem. The tensions are there only if the status is optimal. */
 towline_status towline_solve(const towline_problem *problem, towline_answer *answer);
+#endif
 
 /*
  * Solve a problem, and give tensions in any case but TOWLINE_INVALID: where the status is not optimal they minimise
@@ -83,13 +60,16 @@ towline_status towline_solve(const towline_problem *problem, towline_answer *ans
  * inside the limits. Status, direction and shortfall stay those of the problem itself. rho is from 1e-20 to 1e20, in
  * float from 1e-10 to 1e10; see TOWLINE_RHO.
  */
-towline_status towline_solve_always(const towline_problem *problem, towline_real rho, towline_answer *answer);
+TOWLINE_LINKAGE towline_status towline_solve_always(const towline_problem *problem, towline_real rho,
+                                                    towline_answer *answer);
 
+#ifndef TOWLINE_STEP
 /*
  * Minimise that cost whether or not there are tensions that give w. The status is optimal if they give it, infeasible
  * if direction and shortfall prove that none do, else inaccurate.
  */
 towline_status towline_solve_soft(const towline_problem *problem, towline_real rho, towline_answer *answer);
+#endif
 
 #ifdef __cplusplus
 }
