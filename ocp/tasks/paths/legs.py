@@ -1,9 +1,12 @@
 """Overlapped straight legs: a path through points that stays inside their box and near to the lines between them.
 
-Leg k carries the pose from point k to point k + 1 by the law from rest to rest. Each leg starts before the one before
-it has ended, so that the path does not rest at its points but passes them at a distance:
+Leg k carries the pose from point k to point k + 1 by the law phi from rest to rest (`leg_law`). Each leg starts
+before the one before it has ended, so that the path does not rest at its points but passes them at a distance:
 
-    x(t) = p_0 + sum_k phi((t - t_k) / tau_k) d_k,    tau_k ~ sqrt(|d_k|).
+    x(t) = p_0 + sum_k phi((t - t_k) / tau_k) d_k.
+
+The legs' times tau_k are such that all reach the same peak acceleration, as they would with tau_k ~ sqrt(|d_k|) if they
+did not overlap (`overlap.even_out`).
 
 At most two legs move at a time, and together less than one leg is still to do or already done, so each position is a
 mean of three successive points: it lies in the box of the points. Where one leg has r left and the next has done r, the
@@ -21,13 +24,12 @@ from functools import cached_property
 import numpy as np
 
 from .attitudes import Attitudes, nearest_turn
+from .leg_law import leg_law
 from .motion import Motion
-from .overlap import MOST, largest_left, shares_of_time
-from .rest_to_rest import rest_to_rest
+from .overlap import MOST, even_out, largest_left, shares_of_time, size, zero_between
 
 __all__ = ["Legs"]
 
-HALVINGS = 60
 LOOKS = 48  # at the angles of each leg
 
 
@@ -54,7 +56,8 @@ class Legs:
     blend
         The largest distance at which the path passes its points [m].
     times
-        (n,), the times at which it passes them [s]; default: any duration, each leg for sqrt(its length).
+        (n,), the times at which it passes them [s]; default: any duration, all legs with the same
+        peak acceleration.
     dwell
         (n,), how long it rests at each [s].
     """
@@ -97,13 +100,13 @@ class Legs:
         """Return how long each leg moves, (n - 1,), in the unit of `_between`."""
         if self.times is not None:
             return self._between / (1 - self._early - self._late)
-        return np.sqrt(self.lengths)
+        return even_out(self.steps, np.sqrt(size(self.steps)), self._early, self._late)
 
     @cached_property
     def _shares(self) -> tuple[np.ndarray, np.ndarray]:
         """Return how early each leg starts and how late it ends, (n - 1,) each, in shares of its time."""
         # With times a leg lasts at most twice the time between its points: a quarter of it longer at each end.
-        last = np.sqrt(self.lengths) if self.times is None else 2 * self._between
+        last = np.sqrt(size(self.steps)) if self.times is None else 2 * self._between
         most = MOST * np.minimum(last[1:], last[:-1]) / (1 if self.times is None else 2)
         left = largest_left(self.steps, last, most, self.blend)
         return shares_of_time(np.where(self.dwell[1:-1] > 0, 0.0, left), self.lengths)
@@ -152,8 +155,8 @@ class Legs:
         """Return s of each inner point, and where two legs begin and cease to move there, (n - 2,) each."""
         at = np.cumsum(self._weights)[:-1]
         overlaps, last, weights = self._overlaps, self._last, self._weights
-        first = at - weights[:-1] * rest_to_rest(overlaps / last[:-1])[0]
-        return at, first, at + weights[1:] * rest_to_rest(overlaps / last[1:])[0]
+        first = at - weights[:-1] * leg_law(overlaps / last[:-1])[0]
+        return at, first, at + weights[1:] * leg_law(overlaps / last[1:])[0]
 
     @property
     def places(self) -> np.ndarray:
@@ -230,7 +233,7 @@ class Legs:
 
 def _over(times: np.ndarray, start: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return what a leg has done at `times`, with two derivatives by time."""
-    done, rate, rate_rate = rest_to_rest((times - start) / last)
+    done, rate, rate_rate = leg_law((times - start) / last)
     return done, rate / last, rate_rate / last**2
 
 
@@ -245,14 +248,15 @@ def _through(
     `before` and `after` are the weight of a leg in s and how long it lasts.
     """
     (weight_before, last_before), (weight_after, last_after) = before, after
-    low, high = np.zeros_like(overlap), overlap
-    for _ in range(HALVINGS):
-        since = (low + high) / 2
-        ahead = weight_after * rest_to_rest(since / last_after)[0]
-        ahead -= weight_before * rest_to_rest((overlap - since) / last_before)[0]
-        low, high = np.where(ahead < offset, since, low), np.where(ahead < offset, high, since)
-    left, left_rate, left_rate_rate = _over(overlap - (low + high) / 2, np.zeros(1), last_before)
-    done, rate, rate_rate = _over((low + high) / 2, np.zeros(1), last_after)
+
+    def ahead(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        left, left_rate, _ = _over(overlap - since, np.zeros(1), last_before)
+        done, rate, _ = _over(since, np.zeros(1), last_after)
+        return weight_after * done - weight_before * left - offset, weight_after * rate + weight_before * left_rate
+
+    since = zero_between(ahead, np.zeros_like(overlap), overlap)
+    left, left_rate, left_rate_rate = _over(overlap - since, np.zeros(1), last_before)
+    done, rate, rate_rate = _over(since, np.zeros(1), last_after)
     s_rate = weight_before * left_rate + weight_after * rate
     s_rate_rate = weight_after * rate_rate - weight_before * left_rate_rate
     by_s, by_s_twice = 1 / s_rate, -s_rate_rate / s_rate**3

@@ -1,20 +1,31 @@
-"""Let two successive legs overlap as far as the corner allows: `largest_left`, and in time: `shares_of_time`."""
+"""Let two successive legs overlap as far as the corner allows: `largest_left`, and in time: `shares_of_time`.
+
+`even_out` then gives each leg as much time as makes all of them accelerate alike, overlaps included. Accelerations of
+positions [m/s^2] and of rotations [rad/s^2] are compared each on its own: `size` is the larger of the two.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from .rest_to_rest import inverse, rest_to_rest
+from .leg_law import PEAK, inverse, leg_law
 
-__all__ = ["MOST", "largest_left", "shares_of_time"]
+__all__ = ["MOST", "even_out", "largest_left", "shares_of_time", "size", "zero_between"]
 
 MOST = 0.5  # of the shorter of two legs
 PARTS = 12  # of that, which are compared
 LOOKS = 16  # at the acceleration of two legs together
 TOGETHER = 1.1  # of the larger peak of one leg alone: the acceleration of two together
-PEAK = 16.8 / np.sqrt(5.0)  # of the second derivative of the law from rest to rest
 BACK = 1e-3  # of the sum of the unit vectors of two legs: the path turns back, and rests there
-HALVINGS = 60
+STEPS = 16  # of `zero_between`: it needs 6
+ROUNDS = 8  # of `even_out`: more change the times by less than a hundredth
+
+
+def size(vectors: np.ndarray) -> np.ndarray:
+    """Return the larger norm of position and rotation, (...), of vectors (..., 6)."""
+    return np.maximum(np.linalg.norm(vectors[..., :3], axis=-1), np.linalg.norm(vectors[..., 3:], axis=-1))
 
 
 def largest_left(steps: np.ndarray, last: np.ndarray, most: np.ndarray, blend: float) -> np.ndarray:
@@ -32,11 +43,11 @@ def largest_left(steps: np.ndarray, last: np.ndarray, most: np.ndarray, blend: f
     most
         The longest permitted overlap at each inner point, (n - 2,).
     blend
-        The largest distance from the point [m].
+        The largest distance from the point, of the position [m] and of the attitude [rad].
     """
     lengths = np.linalg.norm(steps, axis=1)
     along = steps / np.where(lengths > 0, lengths, 1.0)[:, None]
-    turn = np.linalg.norm(np.diff(along, axis=0), axis=1)
+    turn = size(np.diff(along, axis=0))
     back = np.linalg.norm(along[1:] + along[:-1], axis=1) <= BACK
     straight = _left_at(_gentle(steps, last, most), last, lengths)
     left = np.minimum(straight, blend / np.maximum(turn, np.finfo(float).tiny)) if blend > 0 else np.zeros_like(turn)
@@ -55,34 +66,77 @@ def shares_of_time(left: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, n
     return early, late
 
 
+def even_out(steps: np.ndarray, last: np.ndarray, early: np.ndarray, late: np.ndarray) -> np.ndarray:
+    """Return how long each leg moves, (n - 1,), if all are to reach the same peak acceleration, but for their sum.
+
+    A leg that accelerates more than others, alone or together with the one before or after it, lasts longer. This
+    lowers the peak of the whole path at the same duration.
+
+    Parameters
+    ----------
+    steps
+        The legs, (n - 1, 6).
+    last
+        How long each moves at first, (n - 1,).
+    early, late
+        From `shares_of_time`: they are kept, and with them the path.
+    """
+    for _ in range(ROUNDS):
+        peak = PEAK * size(steps) / last**2
+        together = _together(steps, last, late[:-1] * last[:-1] + early[1:] * last[1:])
+        peak[:-1] = np.maximum(peak[:-1], together)
+        peak[1:] = np.maximum(peak[1:], together)
+        last = last * (peak / peak.mean()) ** 0.25
+    return last
+
+
 def _gentle(steps: np.ndarray, last: np.ndarray, most: np.ndarray) -> np.ndarray:
     """Return the longest overlap, up to `most`, in which two legs together accelerate little more than one alone."""
-    before, after = steps[:-1, None], steps[1:, None]
-    last_before, last_after = last[:-1, None], last[1:, None]
-    alone = PEAK * np.linalg.norm(steps, axis=1) / last**2
+    alone = PEAK * size(steps) / last**2
     bound = TOGETHER * np.maximum(alone[1:], alone[:-1])
     best = np.zeros_like(most)
     for part in np.arange(1, PARTS + 1) / PARTS:
-        since = part * most[:, None] * np.arange(LOOKS + 1) / LOOKS
-        slower = rest_to_rest((since[:, -1:] - since) / last_before)[2] / last_before**2
-        faster = rest_to_rest(since / last_after)[2] / last_after**2
-        acceleration = faster[..., None] * after - slower[..., None] * before
-        best = np.where(np.linalg.norm(acceleration, axis=2).max(axis=1) <= bound, part * most, best)
+        best = np.where(_together(steps, last, part * most) <= bound, part * most, best)
     return best
+
+
+def _together(steps: np.ndarray, last: np.ndarray, overlap: np.ndarray) -> np.ndarray:
+    """Return the peak acceleration while two legs overlap for so long, (n - 2,)."""
+    since = overlap[:, None] * np.arange(LOOKS + 1) / LOOKS
+    last_before, last_after = last[:-1, None], last[1:, None]
+    slower = leg_law((overlap[:, None] - since) / last_before)[2] / last_before**2
+    faster = leg_law(since / last_after)[2] / last_after**2
+    return size(faster[..., None] * steps[1:, None] - slower[..., None] * steps[:-1, None]).max(axis=1)
 
 
 def _left_at(overlap: np.ndarray, last: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Return what one leg has left and the next has done where these are equal, of legs that overlap for so long."""
-    low, high = np.zeros_like(overlap), overlap
 
-    def left(since: np.ndarray) -> np.ndarray:
-        return lengths[:-1] * rest_to_rest((overlap - since) / last[:-1])[0]
+    def ahead(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        left, left_rate, _ = leg_law((overlap - since) / last[:-1])
+        done, rate, _ = leg_law(since / last[1:])
+        slope = lengths[1:] * rate / last[1:] + lengths[:-1] * left_rate / last[:-1]
+        return lengths[1:] * done - lengths[:-1] * left, slope
 
-    def done(since: np.ndarray) -> np.ndarray:
-        return lengths[1:] * rest_to_rest(since / last[1:])[0]
+    since = zero_between(ahead, np.zeros_like(overlap), overlap)
+    done, left = leg_law(since / last[1:])[0], leg_law((overlap - since) / last[:-1])[0]
+    return np.minimum(lengths[1:] * done, lengths[:-1] * left)
 
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        early = done(middle) < left(middle)
-        low, high = np.where(early, middle, low), np.where(early, high, middle)
-    return np.minimum(done(low), left(high))
+
+def zero_between(
+    function: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return where an increasing function is zero, (n,), from `low` to `high`: by Newton's method, else by halves.
+
+    Parameters
+    ----------
+    function
+        Value and slope at (n,), (n,) each.
+    """
+    at = (low + high) / 2
+    for _ in range(STEPS):
+        value, slope = function(at)
+        low, high = np.where(value < 0, at, low), np.where(value < 0, high, at)
+        next_at = at - value / np.maximum(slope, np.finfo(float).tiny)
+        at = np.where((next_at >= low) & (next_at <= high), next_at, (low + high) / 2)
+    return at

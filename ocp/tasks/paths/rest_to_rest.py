@@ -1,4 +1,4 @@
-"""`rest_to_rest`: the law of a motion from rest to rest, and its inverse; `smoother_rest_to_rest`: the law for teams.
+"""`rest_to_rest`: the law of a motion from rest to rest; `smoother_rest_to_rest`: the law for teams.
 
 Acceleration and jerk are zero at both ends: where carriers must be depends on the platform's acceleration, so they can
 start and end at rest only if its acceleration and jerk are zero there. The smoother law is zero up to the fifth
@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["inverse", "rest_to_rest", "smoother_rest_to_rest"]
-
-STEPS = 10  # of Newton's method: more than double precision needs
+__all__ = ["rest_to_rest", "smoother_rest_to_rest"]
 
 
 def rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -32,18 +30,3 @@ def smoother_rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     left = 1 - s
     done = s**6 * (462 - 1980 * s + 3465 * s**2 - 3080 * s**3 + 1386 * s**4 - 252 * s**5)
     return done, 2772 * (s * left) ** 5, 13860 * (s * left) ** 4 * (1 - 2 * s)
-
-
-def inverse(done: np.ndarray) -> np.ndarray:
-    """Return the shares of the time at which these shares of the way are done, from 0 to 1/2.
-
-    Newton's method on the fourth root of phi, which is concave there: from the left it never goes too far.
-    """
-    target = np.asarray(done, dtype=float) ** 0.25
-    s = target / 35**0.25
-    for _ in range(STEPS):
-        inner = 35 - 84 * s + 70 * s**2 - 20 * s**3
-        root = inner**0.25
-        slope = root + s * (-84 + 140 * s - 60 * s**2) / (4 * inner / root)
-        s = s + (target - s * root) / slope
-    return s

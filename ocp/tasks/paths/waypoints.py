@@ -66,7 +66,8 @@ class WaypointPath(PathBase):
     times: tuple[Finite, ...] | None = Field(
         default=None,
         description="when the path passes each point, from 0 on, increasing [s]; default: spread over "
-        "the duration, each leg for the square root of its length",
+        "the duration so that all legs reach the same peak acceleration, of a spline by the square roots of the "
+        "distances",
     )
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
