@@ -199,12 +199,12 @@ def _hurried(
     order = np.argsort(times)
     which = np.minimum(np.arange(len(times)), 2)  # of `freedom`: start, end, between
     poses = np.concatenate([platform.pose[None], carriers.pose.swapaxes(0, 1)])[:, order]
-    spread = np.zeros((len(poses), len(times)))
-    for row, kind in enumerate(which):
-        spread[:, row] = np.where((freedom[kind][:, 0] == FREE).any(axis=1), np.inf, 0.0)
-        spread[0, row] += _reach(scenario, freedom[kind])
+    spread = np.zeros((len(poses), 3))
+    for kind, its in enumerate(freedom):
+        spread[:, kind] = np.where((its[:, 0] == FREE).any(axis=1), np.inf, 0.0)
+        spread[0, kind] += _reach(scenario, its)
     resting = np.all(_resting(freedom, platform, carriers, 3), axis=0)
-    return too_fast(scenario, times[order], poses, spread[:, order], resting)
+    return too_fast(scenario, times[order], poses, spread[:, which[order]], resting)
 
 
 def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:

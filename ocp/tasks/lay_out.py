@@ -9,7 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ...errors import InputError
-from ...models import Dynamics, Robot
+from ...models import Robot
+from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
 from ...models.ranges import PositiveRange
 from ..limits.clearance import point_outside
@@ -59,7 +60,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         robot=robot,
         task=task,
         path=task.path,
-        dynamics=Dynamics(robot),
+        dynamics=dynamics_of(robot),
         relative=relative,
         platform_free=platform_free,
         carrier_free=_free_carriers(robot, task.base, where),

@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError
-from ...models import Dynamics, Robot
+from ...models import Robot
+from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
 from ..limits.limits import Limits
 from ..tasks.paths import CirclePath, Curve, Motion, RestPath
@@ -79,7 +80,7 @@ class ParametrisedPath:
         wind: np.ndarray | None = None,
     ):
         self.robot, self.path, self.carriers, self.wind, self._until = robot, path, carriers, wind, until
-        self.dynamics = Dynamics(robot)
+        self.dynamics = dynamics_of(robot)
         self.relative = self._frame()
         for carrier in robot.carriers:
             if carrier.efforts:
