@@ -288,11 +288,12 @@ def _global_path(search: Search, balance: bool) -> tuple[Deviation | None, bool]
         if not exceeded:
             return None, False
         nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
-        formation = formation_guess(scenario)
+        formation = formation_guess(scenario) if search.seconds_left > 0 else None
         if formation is not None and not guess_exceeds(scenario, formation, balance):
             stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
             return formation(nodes), True
-        path, message = find_global_path(scenario, GLOBAL_SHARE * scenario.task.time_limit)
+        seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
+        path, message = find_global_path(scenario, seconds)
         stage.message = f"the direct motion exceeds {exceeded}: {message}"
         if path is not None:
             return path.guess(scenario), True

@@ -198,8 +198,8 @@ def _longer_duration(search: Search) -> list[Relaxed]:
 
 def _solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
     """Solve another scenario's program, in the time that the task's limit left and no longer than the search took."""
-    beside = Search(scenario, {}, search.progress)
-    beside.solve_s = max(scenario.task.time_limit - max(search.solve_s, LEAST_SECONDS), search.solve_s)
+    left = scenario.task.time_limit - search.solve_s
+    beside = Search(scenario, {}, search.progress, min(left, max(search.solve_s, LEAST_SECONDS)))
     return beside.solve("program of a relaxation", mesh, guess)
 
 

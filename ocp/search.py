@@ -12,7 +12,7 @@ import numpy as np
 from ..text import quantity
 from .audits.audit import Audit, audit
 from .nlp.grid import Grid
-from .nlp.guess import initial_guess
+from .nlp.guess import initial_guess, usual_guess
 from .nlp.linear import LinearDistances
 from .nlp.near import Near, has_places
 from .nlp.program import Program, build
@@ -33,6 +33,7 @@ NEAR = 0.3  # of a motion's extent: where a place is, of which a program has row
 PASSES = 3
 APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
 USABLE = 1e-2  # of it: what the true program makes up for
+FOR_AUDIT, MOST_FOR_AUDIT = 0.1, 2.0  # of the time limit, and [s]: what is kept for the audit of the best motion
 GAIN = 0.02  # of the objective: less of it is not worth another pass
 ENDS = {  # of a run of the solver, by its message; others are quoted
     "Solve_Succeeded": "solved",
@@ -51,10 +52,31 @@ class RunningStage:
 
 
 class Search:
-    """Solve one scenario's programs, and record the time and the message of each stage."""
+    """Solve one scenario's programs, and record the time and the message of each stage.
 
-    def __init__(self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None):
+    Parameters
+    ----------
+    scenario
+        That of the task.
+    solvers
+        Those that exist already, by mesh; new ones are added.
+    progress
+        Called with (iteration, objective, infeasibility).
+    seconds
+        For all that the search does, from now on [s]; default: the task's time limit, less what the last audit takes.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        solvers: dict[Mesh, Solver],
+        progress: Progress | None,
+        seconds: float | None = None,
+    ):
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
+        limit = scenario.task.time_limit
+        own = limit - min(FOR_AUDIT * limit, MOST_FOR_AUDIT)
+        self._deadline = time.perf_counter() + (own if seconds is None else seconds)
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
         self._iterates: list[tuple[int, float, float]] = []
@@ -76,8 +98,8 @@ class Search:
 
     @property
     def seconds_left(self) -> float:
-        """Return how much of the task's time limit is left to the solver [s]."""
-        return max(self.scenario.task.time_limit - self.solve_s, 0.0)
+        """Return how much is left of the time for the search [s]."""
+        return max(self._deadline - time.perf_counter(), 0.0)
 
     def knows(self, mesh: Mesh) -> bool:
         """Return whether the program of `mesh` exists: it may have a solution to start from."""
@@ -92,6 +114,9 @@ class Search:
         that are in the way, as such an optimum is.
         """
         with self.stage(f"{name}, {mesh.steps} steps") as stage:
+            if self.seconds_left <= 0:
+                stage.message = f"{ENDS[TIME_LIMIT]} before it began"
+                return self._unsolved(mesh, guess)
             outcome = self._run(mesh, guess, coarser, NEAR if coarser or clear else np.inf)
             if (
                 outcome.success
@@ -113,7 +138,7 @@ class Search:
         """
         slower = "" if scenario is None else f", in {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario
-        if not has_places(scenario) or scenario.task.solver == "fatrop":
+        if not has_places(scenario) or scenario.task.solver == "fatrop" or self.seconds_left <= 0:
             return None
         with self.stage(f"program with linear distances, {mesh.steps} steps{slower}") as stage:
             start = time.perf_counter()
@@ -135,6 +160,13 @@ class Search:
                     break
                 objective = outcome.objective
         return motion if missed <= USABLE else None
+
+    def _unsolved(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
+        """Return the motion from which the program of `mesh` would start, as the outcome of no iteration."""
+        scenario = self.scenario
+        motion = guess or usual_guess(scenario, Grid.of(scenario, mesh.steps).shares * scenario.duration)
+        slack = np.inf if mesh.elastic else 0.0
+        return Outcome(motion, float(motion.nodes[-1]), False, TIME_LIMIT, 0, slack, np.nan)
 
     def _run(self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float) -> Outcome:
         """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""

@@ -180,8 +180,8 @@ class Task(Part):
     objective: Objective = Objective()
     time_limit: Positive = Field(
         default=600.0,
-        description="time for all runs of the solver together [s]; after it the best motion so far is taken. fatrop "
-        "can be stopped only between its runs",
+        description="time for the whole search [s]; after it the best motion so far is audited and taken. A step that "
+        "is under way is finished, and fatrop can be stopped only between its runs",
     )
     output_rate: Positive = Field(
         default=100.0, description="samples per second of the saved trajectory, all of them audited [1/s]"
