@@ -86,7 +86,7 @@ class _Solve(NamedTuple):
     def outer(self) -> int:
         """Return the operations of an outer iteration, less those of its inner ones."""
         scan = (6 if self.k <= 2 else 2) * self.columns
-        return scan + 40 if self.k <= 2 else scan + self.k * (2 * self.width + 2) + 2 * self.width + 8
+        return scan + 40 if self.k <= 2 else scan
 
     @property
     def inner(self) -> int:
@@ -94,7 +94,8 @@ class _Solve(NamedTuple):
         k, W = self.k, self.width
         if k <= 2:
             return 14
-        return 3 * k + k * k + 2 * k * W + 2 * W + 3 * k + k * (6 + 6 * k + 3 * W)
+        rotations = 2 * k * (6 * W + 6)  # before the move, and for a slab that leaves
+        return rotations + 2 * k * k + 6 * k + 2 * W + 4
 
     @property
     def total(self) -> int:

@@ -27,7 +27,7 @@ static const real T_MIN[CABLES] = {@t_min@};
 static const real T_MAX[CABLES] = {@t_max@};
 @home@
 /* The wrench matrix and the wrench that the wanted acceleration requires, less wind and disturbance. */
-@mechanics@
+NOT_INLINE @mechanics@
 /* ---- The step. ---- */
 
 void towline_start(towline_state *state) {

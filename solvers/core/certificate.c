@@ -79,7 +79,11 @@ static towline_status prove_outside(form *f, const towline_problem *problem, con
     if (proven != TOWLINE_INFEASIBLE || f->columns == problem->m) {
         return proven;
     }
-    const towline_answer by_limits = *answer;
+    const real support = answer->support, shortfall = answer->shortfall;
+    real direction[ROWS];
+    for (int i = 0; i < f->n; i++) {
+        direction[i] = answer->direction[i];
+    }
     towline_standard_form(f, problem, 0, 1);
     f->rank = towline_reduce(f, 1);
     if (f->rank < 0) {
@@ -91,7 +95,11 @@ static towline_status prove_outside(form *f, const towline_problem *problem, con
         return towline_proves_infeasible(f, problem, known, answer) == TOWLINE_SINGULAR ? TOWLINE_SINGULAR
                                                                                         : TOWLINE_INACCURATE;
     }
-    *answer = by_limits;
+    answer->support = support;
+    answer->shortfall = shortfall;
+    for (int i = 0; i < f->n; i++) {
+        answer->direction[i] = direction[i];
+    }
     return TOWLINE_INFEASIBLE;
 }
 

@@ -3,14 +3,15 @@
  * the identity as Hessian.
  *
  * s moves through points that are optimal for the slabs in the active set, starting with none. Each step takes the most
- * violated slab p and moves s along the part of its normal n_p that the active normals N_q do not span:
+ * violated slab p and moves s along the part of its normal n_p that the active normals N_q do not span. The basis N of
+ * the null space, whose columns are the normals, is kept rotated such that the q active ones are triangular:
  *
- *     J^T n_p = d,   N_q = J_1 R,   step = J_2 d_2,   r = R^-1 d_1
+ *     N_q = [R; 0],   n_p = [d_1; d_2],   step = N^T [0; d_2],   r = R^-1 d_1
  *
- * J = [J_1 J_2] is orthonormal and R triangular, updated by a reflector for a slab that enters and by plane rotations
- * for one that leaves. While s moves by x, the multiplier of p grows by x and those of the active slabs change by -x r;
- * where one would become negative its slab leaves, and the move goes on. If no move is possible, p and the active slabs
- * exclude each other: their multipliers prove it.
+ * Plane rotations of rows bring d_2 to its first entry before the step, and make R triangular again if a slab leaves:
+ * R lies in the basis and needs no space of its own. While s moves by x, the multiplier of p grows by x and those of
+ * the active slabs change by -x r; where one would become negative its slab leaves, and the move goes on. If no move is
+ * possible, p and the active slabs exclude each other: their multipliers prove it.
  *
  * Each step ends at a point farther from the origin than the one before, so that no active set comes twice and the
  * method ends. Rounding could void that argument, and STEPS bounds it: six times what 10^6 random problems needed. A
@@ -20,80 +21,39 @@
 
 #define STEPS(columns) (10 * (columns) + 20)
 
-/* Where column j of R starts: it has j + 1 entries, and space for one more while a slab leaves. */
-#define COLUMN(j) ((j) * ((j) + 3) / 2)
-
 typedef struct {
-    int count;                       /* active slabs */
-    int active[CABLES];              /* which, */
-    real side[COLUMNS];              /* at which limit: 1 lower, -1 upper, 0 not active, */
-    real multiplier[COLUMNS];        /* and how strongly they push */
-    int width;                       /* FILLED(k): numbers from one column of J to the next */
-    real J[CABLES * FILLED(CABLES)]; /* column by column */
-    real R[COLUMN(CABLES)];
+    int count;               /* active slabs */
+    int active[CABLES];      /* which, */
+    real side[CABLES];       /* at which limit: 1 lower, -1 upper, 0 not active, */
+    real multiplier[CABLES]; /* and how strongly they push */
 } active_set;
 
-/* Rotate columns c and c + 1 of J. */
-static void rotate(active_set *set, int c, real cosine, real sine) {
-    real *x = set->J + c * set->width, *y = x + set->width;
-    for (int e = 0; e < set->width; e++) {
+/* Rotate two rows of the basis such that entry i of the second one vanishes; return 0 if that of both does. */
+static int rotate(real *x, real *y, int i, int width) {
+    const real length = root(x[i] * x[i] + y[i] * y[i]);
+    if (length == 0) {
+        return 0;
+    }
+    const real cosine = x[i] / length, sine = y[i] / length;
+    for (int e = 0; e < width; e++) {
         const real before = x[e];
         x[e] = cosine * before + sine * y[e];
         y[e] = cosine * y[e] - sine * before;
     }
-}
-
-/*
- * Add slab p with J^T n_p = d and |d_2|^2 = beyond. A reflector turns d_2 to a multiple of its first entry; J_2 d_2,
- * which it needs, is `step`.
- */
-static void add(active_set *set, int k, int p, real side, real multiplier, const real *d, real beyond,
-                const real *step) {
-    const int q = set->count;
-    const real length = root(beyond), pivot = d[q] > 0 ? -length : length, head = d[q] - pivot;
-    const real tau = -1 / (pivot * head);
-    real turned[FILLED(CABLES)]; /* J_2 times the reflector */
-    for (int e = 0; e < set->width; e++) {
-        turned[e] = tau * (step[e] - pivot * set->J[q * set->width + e]);
-    }
-    for (int c = q; c < k; c++) {
-        add_to(set->J + c * set->width, c == q ? -head : -d[c], turned, set->width);
-    }
-    for (int e = 0; e < q; e++) {
-        set->R[COLUMN(q) + e] = d[e];
-    }
-    set->R[COLUMN(q) + q] = pivot;
-    set->active[q] = p;
-    set->multiplier[q] = multiplier;
-    set->side[p] = side;
-    set->count++;
+    return 1;
 }
 
 /* Remove the slab at position `leaving`; return 0 if rounding has made R singular. */
-static int drop(active_set *set, int leaving) {
+static int drop(form *f, active_set *set, int leaving) {
+    const int width = f->width;
     set->side[set->active[leaving]] = 0;
     set->count--;
-    for (int j = leaving; j < set->count; j++) {
+    for (int j = leaving; j < set->count; j++) { /* rotate the entry below the diagonal away */
         set->active[j] = set->active[j + 1];
         set->multiplier[j] = set->multiplier[j + 1];
-        for (int e = 0; e < j + 2; e++) {
-            set->R[COLUMN(j) + e] = set->R[COLUMN(j + 1) + e];
-        }
-    }
-    for (int j = leaving; j < set->count; j++) { /* rotate the entries below the diagonal away */
-        const real top = set->R[COLUMN(j) + j], below = set->R[COLUMN(j) + j + 1];
-        const real length = root(top * top + below * below);
-        if (length == 0) {
+        if (!rotate(f->basis + j * width, f->basis + (j + 1) * width, set->active[j], width)) {
             return 0;
         }
-        const real cosine = top / length, sine = below / length;
-        for (int c = j; c < set->count; c++) {
-            real *column = set->R + COLUMN(c);
-            const real before = column[j];
-            column[j] = cosine * before + sine * column[j + 1];
-            column[j + 1] = cosine * column[j + 1] - sine * before;
-        }
-        rotate(set, j, cosine, sine);
     }
     return 1;
 }
@@ -102,7 +62,7 @@ static int drop(active_set *set, int leaving) {
 static int most_violated(const form *f, const active_set *set, real *side) {
     int worst = -1;
     real most = f->slack;
-    for (int i = 0; i < f->columns; i++) {
+    for (int i = 0; i < f->cables; i++) {
         const real below = f->low[i] - f->s[i], above = f->s[i] - f->high[i];
         if (set->side[i] == 0 && larger(below, above) > most) {
             worst = i;
@@ -115,24 +75,25 @@ static int most_violated(const form *f, const active_set *set, real *side) {
 
 /* Bring slab p into the active set, dropping those that stand in its way. */
 static outcome enter(form *f, active_set *set, int p, real side) {
-    const int k = f->k;
-    real normal[FILLED(CABLES)], own = 0;
-    for (int e = 0; e < set->width; e++) {
-        normal[e] = e < k ? f->basis[e * f->width + p] : 0;
-    }
+    const int k = f->k, width = f->width;
+    real own = 0;
     for (;;) {
-        real d[CABLES], r[CABLES], step[FILLED(CABLES)], beyond = 0;
+        real r[CABLES], beyond = 0;
+        real *along = f->basis + set->count * width; /* what of n_p the active normals do not span, once rotated */
         f->inner++;
-        for (int c = 0; c < k; c++) {
-            d[c] = side * dot(set->J + c * set->width, normal, set->width);
-            beyond += c >= set->count ? d[c] * d[c] : 0;
+        for (int c = set->count + 1; c < k; c++) {
+            rotate(along, f->basis + c * width, p, width);
         }
-        for (int j = set->count - 1; j >= 0; j--) {
-            real total = d[j];
+        if (set->count < k) {
+            beyond = along[p] * along[p];
+        }
+        for (int j = set->count - 1; j >= 0; j--) { /* of normals times their sides */
+            const real *row = f->basis + j * width;
+            real total = side * row[p];
             for (int e = j + 1; e < set->count; e++) {
-                total -= set->R[COLUMN(e) + j] * r[e];
+                total -= set->side[set->active[e]] * row[set->active[e]] * r[e];
             }
-            r[j] = total / set->R[COLUMN(j) + j];
+            r[j] = set->side[set->active[j]] * total / row[set->active[j]];
         }
         real length = (real)INFINITY;
         int leaving = -1;
@@ -142,7 +103,7 @@ static outcome enter(form *f, active_set *set, int p, real side) {
                 leaving = j;
             }
         }
-        const int independent = set->count < k && beyond > PARALLEL * PARALLEL;
+        const int independent = beyond > PARALLEL * PARALLEL;
         if (!independent && leaving < 0) {
             f->push[p] = -side;
             for (int j = 0; j < set->count; j++) {
@@ -157,25 +118,20 @@ static outcome enter(form *f, active_set *set, int p, real side) {
                 length = missing / beyond;
                 full = 1;
             }
-            for (int e = 0; e < set->width; e++) {
-                step[e] = 0;
-            }
-            for (int c = set->count; c < k; c++) {
-                add_to(step, d[c], set->J + c * set->width, set->width);
-            }
-            for (int e = 0; e < k; e++) {
-                add_to(f->s, length * step[e], f->basis + e * f->width, f->width);
-            }
+            add_to(f->s, length * side * along[p], along, width);
         }
         for (int j = 0; j < set->count; j++) {
             set->multiplier[j] -= length * r[j];
         }
         own += length;
         if (full) {
-            add(set, k, p, side, own, d, beyond, step);
+            set->active[set->count] = p;
+            set->multiplier[set->count] = own;
+            set->side[p] = side;
+            set->count++;
             return REACHED;
         }
-        if (!drop(set, leaving)) {
+        if (!drop(f, set, leaving)) {
             return DOUBTFUL;
         }
     }
@@ -184,15 +140,8 @@ static outcome enter(form *f, active_set *set, int p, real side) {
 outcome towline_dual_active_set(form *f) {
     active_set set;
     set.count = 0;
-    set.width = FILLED(f->k);
-    for (int i = 0; i < f->columns; i++) {
+    for (int i = 0; i < f->cables; i++) {
         set.side[i] = 0;
-    }
-    for (int c = 0; c < f->k * set.width; c++) {
-        set.J[c] = 0;
-    }
-    for (int c = 0; c < f->k; c++) {
-        set.J[c * set.width + c] = 1;
     }
     for (int t = 0; t < STEPS(f->columns); t++) {
         real side = 0;

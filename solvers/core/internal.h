@@ -7,6 +7,13 @@
 #include "tolerances.h"
 #include "towline_core.h"
 
+/* For functions with arrays of their own, which are to be on the stack only while they run. */
+#ifdef __GNUC__
+#define NOT_INLINE __attribute__((noinline))
+#else
+#define NOT_INLINE
+#endif
+
 typedef towline_real real;
 
 enum {
@@ -34,13 +41,14 @@ typedef struct {
     real tau[ROWS];
     real b[ROWS];
     real unit[COLUMNS]; /* newtons in one unit of s */
-    real low[COLUMNS];
-    real high[COLUMNS];
+    real low[CABLES];   /* of the cables; the missing wrench has no limits */
+    real high[CABLES];
     real s[FILLED(COLUMNS)];
-    real push[FILLED(COLUMNS)]; /* multipliers of limits that exclude each other, in the row space of B */
-    real basis[(CABLES + 1) * FILLED(COLUMNS)]; /* of the null space, by rows; its columns are normals of slabs */
-    real slack;                                 /* how far s may pass a limit */
-    real margin;                                /* how far the limits were moved inwards; 0 in double */
+    real push[FILLED(CABLES)]; /* multipliers of limits that exclude each other, in the row space of B */
+    real basis[(CABLES > 1 ? CABLES : 2) *
+               FILLED(COLUMNS)]; /* of the null space, by rows; its columns are normals of slabs */
+    real slack;                  /* how far s may pass a limit */
+    real margin;                 /* how far the limits were moved inwards; 0 in double */
     int steps;
     int inner;
 } form;
@@ -107,8 +115,8 @@ TOWLINE_LINKAGE void towline_reflect(const form *f, int j, real *x);
 TOWLINE_LINKAGE void towline_null_space(form *f);
 
 /* slabs.c and dual_active_set.c: move s to the point of least norm inside the limits. */
-TOWLINE_LINKAGE outcome towline_slabs(form *f);
-TOWLINE_LINKAGE outcome towline_dual_active_set(form *f);
+NOT_INLINE TOWLINE_LINKAGE outcome towline_slabs(form *f);
+NOT_INLINE TOWLINE_LINKAGE outcome towline_dual_active_set(form *f);
 
 /* proof.c */
 TOWLINE_LINKAGE int towline_proves_optimum(const form *f, const int *active, const real *side, const real *multiplier,

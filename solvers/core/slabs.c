@@ -41,25 +41,25 @@ static outcome exclude(form *f, int own, const real a[2], real square, const cut
 }
 
 outcome towline_slabs(form *f) {
-    const int columns = f->columns;
+    const int cables = f->cables;                            /* only they have limits */
     const real *normal[2] = {f->basis, f->basis + f->width}; /* both components of all; zero beyond k */
     real z[2] = {0, 0};
-    real side[COLUMNS]; /* 0 until the slab is taken, then 1 below the lower limit, -1 above the upper one */
-    int taken[COLUMNS];
+    real side[CABLES]; /* 0 until the slab is taken, then 1 below the lower limit, -1 above the upper one */
+    int taken[CABLES];
     int active[2] = {0, 0}; /* the slabs that z rests on, */
     real multiplier[2] = {0, 0};
-    real rests[COLUMNS]; /* and at which limit */
+    real rests[2] = {0, 0}; /* and at which limit */
     int count = 0;
-    for (int i = 0; i < columns; i++) {
-        side[i] = rests[i] = 0;
+    for (int i = 0; i < cables; i++) {
+        side[i] = 0;
     }
     for (int i = f->k * f->width; i < 2 * f->width; i++) {
         f->basis[i] = 0;
     }
-    for (int t = 0; t <= columns; t++) {
+    for (int t = 0; t <= cables; t++) {
         int worst = -1;
         real most = f->slack, value = 0;
-        for (int i = 0; i < columns; i++) {
+        for (int i = 0; i < cables; i++) {
             const real s = f->s[i] + normal[0][i] * z[0] + normal[1][i] * z[1];
             const real violation = larger(f->low[i] - s, s - f->high[i]);
             if (side[i] == 0 && violation > most) {
@@ -112,9 +112,6 @@ outcome towline_slabs(form *f) {
         taken[t] = worst;
 
         /* z is the sum of the active normals, each times its multiplier. */
-        for (int j = 0; j < count; j++) {
-            rests[active[j]] = 0;
-        }
         const cut *other = x > 0 ? &start : &stop;
         real pull = edge;
         count = 1;
@@ -124,19 +121,20 @@ outcome towline_slabs(form *f) {
             pull -= share * (normal[0][j] * a[0] + normal[1][j] * a[1]) / square;
             active[1] = j;
             multiplier[1] = share * other->side;
-            rests[j] = other->side;
+            rests[1] = other->side;
             count = 2;
         }
         active[0] = worst;
         multiplier[0] = pull * side[worst];
-        rests[worst] = side[worst];
+        rests[0] = side[worst];
     }
-    for (int i = 0; i < columns; i++) {
+    for (int i = 0; i < f->columns; i++) {
         f->s[i] += normal[0][i] * z[0] + normal[1][i] * z[1];
     }
     for (int j = 0; j < count; j++) {
         const int i = active[j];
-        f->s[i] = rests[i] > 0 ? f->low[i] : f->high[i];
+        side[i] = rests[j];
+        f->s[i] = side[i] > 0 ? f->low[i] : f->high[i];
     }
-    return towline_proves_optimum(f, active, rests, multiplier, count) ? REACHED : DOUBTFUL;
+    return towline_proves_optimum(f, active, side, multiplier, count) ? REACHED : DOUBTFUL;
 }

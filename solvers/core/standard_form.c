@@ -35,8 +35,6 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
     for (int i = 0; rho > 0 && i < n; i++) {
         const int c = f->columns++;
         f->unit[c] = 1 / root(rho);
-        f->low[c] = -(real)INFINITY;
-        f->high[c] = (real)INFINITY;
     }
     f->width = FILLED(f->columns);
     const real per_length = 1 / problem->length;
@@ -56,7 +54,7 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
             row[c] = c == f->cables + i && c < f->columns ? f->unit[c] : 0;
         }
     }
-    for (int c = 0; c < f->width; c++) {
+    for (int c = 0; c < FILLED(f->cables); c++) {
         f->push[c] = 0;
     }
     f->steps = f->inner = 0;
@@ -98,7 +96,7 @@ real towline_least_norm(form *f, int *worst, real *missing) {
 /* Move s to the point of least norm inside the limits. */
 outcome towline_enter_limits(form *f) {
     int outside = 0;
-    for (int c = 0; c < f->columns; c++) {
+    for (int c = 0; c < f->cables; c++) {
         outside |= f->s[c] < f->low[c] - f->slack || f->s[c] > f->high[c] + f->slack;
     }
     if (!outside) {

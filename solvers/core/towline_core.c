@@ -96,7 +96,7 @@ static int move_limits_inwards(form *f, const towline_problem *problem, real *t)
     write_tensions(f, problem, t);
     const real change = towline_correction(f, problem, t, 0);
     f->margin = f->slack + (change < (real)INFINITY ? 3 * change : 0);
-    for (int c = 0; c < f->columns; c++) {
+    for (int c = 0; c < f->cables; c++) {
         f->low[c] += f->margin;
         f->high[c] -= f->margin;
         if (!(f->low[c] <= f->high[c])) {
