@@ -16,7 +16,6 @@ from ....models.part import Finite, NonNegative
 from .base import PathBase, PoseOrPosition, check_times
 from .legs import Legs
 from .motion import Motion
-from .point_file import read_points
 from .waypoint_spline import WaypointSpline
 
 __all__ = ["WaypointPath"]
@@ -84,6 +83,8 @@ class WaypointPath(PathBase):
             raise ValueError(f"'timing' must be left out of waypoints: {known}")
         if not isinstance(data.get("points"), str):
             return data
+        from .point_file import read_points  # compiles patterns, which lists of points do not need
+
         read = read_points(data["points"], (info.context or {}).get("folder", Path()))
         for name in read:
             if name != "points" and data.get(name) is not None:
