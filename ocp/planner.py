@@ -131,6 +131,7 @@ class Planner:
         self.scenario = lay_out(as_robot(robot), read_task(task))
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
+        self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
 
     @property
     def interrupted(self) -> Plan | None:
@@ -158,13 +159,15 @@ class Planner:
             raise InputError(f"progress must be {accepted}, got {shown(progress)}")
         self._search = search = Search(self.scenario, self._solvers, progress)
         guess = None if start is None else deviation_from(self.scenario, start)
-        plan = replace(_climb(search, guess), stages=tuple(search.stages))
+        plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))
         self._search = None
+        if plan.feasible and plan.deviation is not None and search.mesh is not None:
+            self._last = search.mesh, plan.deviation
         return plan
 
 
-def _climb(search: Search, start: Deviation | None) -> Plan:
-    """Plan stage after stage."""
+def _climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] | None) -> Plan:
+    """Plan stage after stage, from `start`, or else from the `last` feasible plan of the same task, if there is one."""
     scenario = search.scenario
     if scenario.is_fixed:
         return _fixed_motion(search)
@@ -174,7 +177,8 @@ def _climb(search: Search, start: Deviation | None) -> Plan:
     timed, own = _time_law(search) if scenario.count == 0 else (None, True)
     if timed is not None and not (own and timed.feasible):
         return timed
-    planned = _free_motion(search, start)
+    planned = None if start is not None or last is None else _again(search, *last)
+    planned = planned or _free_motion(search, start)
     if timed is None or (planned.feasible and cost(planned) <= cost(timed)):
         return planned
     return replace(timed, build_s=search.build_s, solve_s=search.solve_s)
@@ -323,6 +327,13 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
             return _closest(search, f"the motion with the least missing wrench is short by {short} at its nodes")
         outcome = search.solve("nonlinear program", mesh, closest.deviation)
     return _closest(search, refine(search, outcome))
+
+
+def _again(search: Search, mesh: Mesh, motion: Deviation) -> Plan | None:
+    """Solve the program whose solution passed its audit before, from there; return the plan if it passes again."""
+    own = search.has_solution(mesh)  # with its multipliers
+    outcome = search.solve("nonlinear program", mesh, None if own else motion, clear=True)
+    return search.best() if outcome.success and search.audit(outcome).passed else None
 
 
 def _closest(search: Search, reason: str) -> Plan:

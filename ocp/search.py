@@ -79,6 +79,7 @@ class Search:
         self._deadline = time.perf_counter() + (own if seconds is None else seconds)
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[Stage] = []
+        self.mesh: Mesh | None = None  # of the program that was solved last
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
@@ -104,6 +105,10 @@ class Search:
     def knows(self, mesh: Mesh) -> bool:
         """Return whether the program of `mesh` exists: it may have a solution to start from."""
         return mesh in self._solvers
+
+    def has_solution(self, mesh: Mesh) -> bool:
+        """Return whether the program of `mesh` has an optimum to start from."""
+        return mesh in self._solvers and self._solvers[mesh].has_solution
 
     def solve(
         self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False, clear: bool = False
@@ -170,7 +175,7 @@ class Search:
 
     def _run(self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float) -> Outcome:
         """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""
-        start = time.perf_counter()
+        start, self.mesh = time.perf_counter(), mesh
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # goes on from there, with its own rows
         if known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):

@@ -8,7 +8,7 @@ import pytest
 
 from towline.benchmarks.scenes import APART, GATE, LENGTH, QUADROTOR, window
 from towline.models import load
-from towline.ocp import plan
+from towline.ocp import Planner, plan
 from towline.ocp.global_path.at_rest import AtRest
 from towline.ocp.global_path.clear_space import ClearSpace
 from towline.ocp.global_path.global_path import find_global_path
@@ -155,6 +155,18 @@ def test_a_plan_goes_through_the_hole():
     assert planned.feasible, planned.report()
     positions = planned.audit.motion.pose[:, :3]
     assert min(outside(place, positions).min() for place in WALL_WITH_A_HOLE) >= KEPT - 1e-5
+
+
+def test_the_same_task_is_planned_again_from_the_last_result():
+    planner = Planner(ROBOT, scenario_of(WALL_WITH_A_HOLE).task)
+    first, second = planner.plan(), planner.plan()
+    assert first.feasible
+    assert second.feasible
+    assert "global path" in [stage.name for stage in first.stages]
+    assert [stage.name.split(",")[0] for stage in second.stages] == ["ends and path", "nonlinear program", "audit"]
+    assert second.iterations <= 10
+    assert second.objective == pytest.approx(first.objective, rel=1e-3)
+    np.testing.assert_allclose(second.deviation.q, first.deviation.at(second.deviation.nodes).q, atol=0.01)
 
 
 def test_two_quadrotors_turn_to_fit_between_two_blocks():
