@@ -29,16 +29,22 @@ typedef struct {
 } active_set;
 
 /* Rotate two rows of the basis such that entry i of the second one vanishes; return 0 if that of both does. */
-static int rotate(real *x, real *y, int i, int width) {
+static int rotate(real *restrict x, real *restrict y, int i, int width) {
     const real length = root(x[i] * x[i] + y[i] * y[i]);
     if (length == 0) {
         return 0;
     }
     const real cosine = x[i] / length, sine = y[i] / length;
-    for (int e = 0; e < width; e++) {
-        const real before = x[e];
-        x[e] = cosine * before + sine * y[e];
-        y[e] = cosine * y[e] - sine * before;
+    for (int e = 0; e < width; e += 4) { /* as in `dot` */
+        const real a = x[e], b = x[e + 1], c = x[e + 2], d = x[e + 3];
+        x[e] = cosine * a + sine * y[e];
+        x[e + 1] = cosine * b + sine * y[e + 1];
+        x[e + 2] = cosine * c + sine * y[e + 2];
+        x[e + 3] = cosine * d + sine * y[e + 3];
+        y[e] = cosine * y[e] - sine * a;
+        y[e + 1] = cosine * y[e + 1] - sine * b;
+        y[e + 2] = cosine * y[e + 2] - sine * c;
+        y[e + 3] = cosine * y[e + 3] - sine * d;
     }
     return 1;
 }
