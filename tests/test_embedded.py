@@ -10,6 +10,8 @@ import pytest
 
 import towline
 from towline import Robot, TensionProblem, available, load, solve, solve_batch, tensions
+from towline.benchmarks import step as benchmark
+from towline.benchmarks import step_size
 from towline.benchmarks.step_code import FLAGS, States, StepCode
 from towline.benchmarks.step_states import random_states, twelve_cables
 from towline.embedded.export import step_files
@@ -88,7 +90,7 @@ def code(tmp_path_factory):
 
     def compiled(name, real="double"):
         if (name, real) not in kept:
-            kept[name, real] = StepCode(robot_named(name), real, tmp_path_factory.mktemp("code"))
+            kept[name, real] = StepCode(robot_named(name), real, tmp_path_factory.mktemp("code"), flags=("-O1",))
         return kept[name, real]
 
     return compiled
@@ -183,7 +185,7 @@ def line(*parts):
     return " ".join(f"{number:.17g}" for part in parts for number in np.ravel(part)) + "\n"
 
 
-@pytest.mark.parametrize("name", ["wang-flying", "wang-ctmrts-6", "cogiro", "planar-4"])
+@pytest.mark.parametrize("name", ["wang-flying", "wang-ctmrts-6", "cogiro"])
 def test_the_program_prints_what_tensions_computes(program, name):
     """With all groups of a line, and with as few as there can be."""
     robot = load(name)
@@ -399,6 +401,53 @@ def test_mechanics_take_only_carriers_that_move():
     np.testing.assert_allclose(
         np.array(w).ravel(), Dynamics(robot).required_wrench(np.zeros(6), np.zeros(6), np.ones(6))
     )
+
+
+def test_the_benchmark_reports_what_is_wrong(code):
+    """Steps are altered one by one, and each alteration is counted in its place."""
+    robot = load("cogiro")
+    states = random_states(robot, 180, seed=12)
+    A, w = states.problems(Dynamics(robot))
+    steps = code("cogiro").run(states.rows(robot))
+    row = benchmark.compare(robot, A, w, steps)
+    assert row.passed
+    assert row.steps == 180
+    assert row.certificates == np.isin(steps.status, (INFEASIBLE, SINGULAR)).sum()
+    one = np.flatnonzero(steps.status == INFEASIBLE)[0]
+    other = np.flatnonzero(steps.status == OPTIMAL)[0]
+    cases = (("status", one, OPTIMAL, "wrongly_optimal"), ("status", one, SINGULAR, "others"))
+    cases += (("status", other, INACCURATE, "unsure"), ("direction", one, 0.0, "unproven"))
+    cases += (("tensions", other, np.nan, "outside"), ("tensions", other, robot.t_max, "above"))
+    for field, index, value, count in cases:
+        altered = steps._replace(**{field: getattr(steps, field).copy()})
+        getattr(altered, field)[index] = value
+        assert getattr(benchmark.compare(robot, A, w, altered), count) == 1, count
+    single = steps._replace(status=np.where(steps.status == INFEASIBLE, SINGULAR, steps.status))
+    assert benchmark.compare(robot, A, w, single, single=True).others == 0
+
+
+def test_the_deepest_stack_is_that_of_the_longest_calls():
+    graph = """
+    node: { title: "a.c:top" label: "top\\na.c:1:1\\n100 bytes (static)" }
+    node: { title: "a.c:wide" label: "wide\\na.c:2:1\\n50 bytes (static)" }
+    node: { title: "a.c:long" label: "long\\na.c:3:1\\n20 bytes (static)" }
+    node: { title: "a.c:leaf" label: "leaf\\na.c:4:1\\n40 bytes (static)" }
+    node: { title: "sqrt" label: "sqrt\\nmath.h:1:1" shape : ellipse }
+    edge: { sourcename: "a.c:top" targetname: "a.c:wide" label: "a.c:5:5" }
+    edge: { sourcename: "a.c:top" targetname: "a.c:long" label: "a.c:6:5" }
+    edge: { sourcename: "a.c:long" targetname: "a.c:leaf" label: "a.c:7:5" }
+    edge: { sourcename: "a.c:leaf" targetname: "sqrt" }
+    """
+    assert step_size.deepest(graph, "top") == 160
+
+
+@pytest.mark.parametrize("name", ["cogiro", "twelve"])
+def test_code_and_stack_are_small(tmp_path, name):
+    """On a Cortex-M7 where there is its compiler: 25 kB of code, and 6 kB of stack for twelve cables."""
+    required("gcc")
+    size = step_size.measure_size(robot_named(name), "double", tmp_path, step_size.target())
+    assert size.text < 25_000
+    assert 2_000 < size.stack <= 6 * 1024
 
 
 def test_statuses_have_the_words_of_python(exported):
