@@ -27,9 +27,10 @@ lint: .venv/dev.stamp
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
-# The solvers' machine code, once; otherwise the tests' processes compute without it until one of them compiles it.
+# The machine code of solvers and plant, once; otherwise each of the tests' processes compiles it or computes without.
 kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
+	$(BIN)/python -c "from towline.models.plant import machine; machine.run_rows()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once.
 unit: .venv/dev.stamp

@@ -24,6 +24,9 @@ from ..writing import whole_file
 
 Kernel = Callable[..., None]  # (start, stop, *inputs (N, r, c), *outputs (N, r, c)); it releases the GIL
 
+# Types of Numba as text, so that this module does not import it: inputs in any layout, also read-only; outputs.
+GIVEN, RESULT = "Array(float64, {}, 'A', readonly=True)", "Array(float64, {}, 'C')"
+
 _LONG_AGO = 1_000_000_000  # [s]; Numba knows a source by its time and size, and two processes may write it at once
 
 _compiled: dict[str, Kernel] = {}
@@ -40,9 +43,25 @@ def compile_kernel(source: str, n_in: int, n_out: int) -> Kernel:
     n_in, n_out
         How many inputs (N, r, c) of float64 in any layout, also read-only, and outputs in C order it has.
     """
+    return compile_function(source, "kernel", _signature(n_in, n_out))
+
+
+def compile_function(source: str, name: str, signature: str) -> Kernel:
+    """Compile the function `name` of a source, in which decorators mark those that it calls, or take it from the disk.
+
+    Parameters
+    ----------
+    source
+        Python with `math`, `np` and the decorators `part` and `inlined`, and nothing else from outside. What they mark
+        allocates no memory.
+    name
+        The function that is returned.
+    signature
+        Its types in Numba's notation.
+    """
     with _compiling:
         if source not in _compiled:
-            _compiled[source] = _from_disk(source, n_in, n_out) or _compile(source, n_in, n_out)
+            _compiled[source] = _from_disk(source, name, signature) or _compile(source, name, signature)
         return _compiled[source]
 
 
@@ -53,20 +72,26 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "towline"
 
 
-def _compile(source: str, n_in: int, n_out: int, file: Path | None = None) -> Kernel:
-    """Compile the kernel, by Numba's cache beside `file` if one is given."""
+def _signature(n_in: int, n_out: int) -> str:
+    arrays = [GIVEN.format(3)] * n_in + [RESULT.format(3)] * n_out
+    return f"void(intp, intp, {', '.join(arrays)})"
+
+
+def _compile(source: str, name: str, signature: str, file: Path | None = None) -> Kernel:
+    """Compile the function, by Numba's cache beside `file` if one is given."""
     import numba
 
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    # Parts are called by compiled code alone, and allocate nothing, so that they count no references to arrays.
+    part = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False, **options}
     # When Numba loads a function it imports the module named in it.
     space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np}
+    space |= {"part": numba.njit(**part), "inlined": numba.njit(forceinline=True, **part)}
     exec(compile(source, str(file or "<kernel>"), "exec"), space)
-    given = numba.types.Array(numba.float64, 3, "A", readonly=True)
-    result = numba.types.Array(numba.float64, 3, "C")
-    signature = numba.void(numba.intp, numba.intp, *[given] * n_in, *[result] * n_out)
-    return numba.njit(signature, nogil=True, error_model="numpy", cache=file is not None)(space["kernel"])
+    return numba.njit(signature, cache=file is not None, **options)(space[name])
 
 
-def _from_disk(source: str, n_in: int, n_out: int) -> Kernel | None:
+def _from_disk(source: str, name: str, signature: str) -> Kernel | None:
     """Compile with the cache on the disk; None where there is none or it is broken beyond repair."""
     try:
         folder = cache_folder() / _key(source)
@@ -77,7 +102,7 @@ def _from_disk(source: str, n_in: int, n_out: int) -> Kernel | None:
             with whole_file(file) as place:
                 place.write_text(source)
                 os.utime(place, (_LONG_AGO, _LONG_AGO))
-        kernel = _compile(source, n_in, n_out, file)
+        kernel = _compile(source, name, signature, file)
         if not seal.exists():
             with whole_file(seal) as place:
                 place.write_text(_hash_of(folder))

@@ -121,6 +121,15 @@ class Pulley(Part):
         return axis
 
 
+class Winch(Part):
+    """A winch as its cable feels it: an inertia that the motor's force and the tension accelerate, inside limits."""
+
+    inertia: Positive = Field(description="of rotor, gear and drum, as a mass on the cable [kg]")
+    friction: NonNegative = Field(default=0.0, description="dry friction, as a force on the cable [N]")
+    speed_max: Positive = Field(description="largest speed of the cable [m/s]")
+    force_max: Positive = Field(description="largest force of the motor on the cable [N]")
+
+
 class Cable(Part):
     """One cable, from its anchor on a carrier to its attachment on the platform. It pulls and never pushes."""
 
@@ -133,6 +142,9 @@ class Cable(Part):
     damping: NonNegative | None = Field(default=None, description="C [N s/m]")
     length: Positive | None = Field(default=None, description="[m]; required where the drive is fixed-length")
     pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
+    winch: Winch | None = Field(
+        default=None, description="what moves the cable, for simulation; default: its length follows commands exactly"
+    )
 
     @model_validator(mode="after")
     def _limits_in_order(self) -> Self:

@@ -423,14 +423,15 @@ def test_a_spoiled_cache_is_made_anew(tmp_path, how, other_process):
 def test_each_file_spoiled_alone(tmp_path):
     function = ca.Function("f", [x := ca.SX.sym("x")], [x * 6.5], ["x"], ["y"])
     source = tape.translate(function)
+    how = source, "kernel", kernel._signature(1, 1)
     folder = tmp_path / kernel._key(source)
     y = np.empty((1, 1, 1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TOWLINE_CACHE", str(tmp_path))
-        kernel._from_disk(source, 1, 1)
+        kernel._from_disk(*how)
         for file in [file for file in folder.rglob("*") if file.is_file()]:
             spoil(file, "flipped")
-            kernel._from_disk(source, 1, 1)(0, 1, np.full((1, 1, 1), 2.0), y)
+            kernel._from_disk(*how)(0, 1, np.full((1, 1, 1), 2.0), y)
             assert y.item() == 13.0
             assert kernel._is_intact(folder, source)
 
