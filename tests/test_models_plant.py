@@ -8,6 +8,7 @@ import pytest
 from towline import Dynamics, Robot, SolverError, load
 from towline.errors import InputError
 from towline.models.plant import Plant
+from towline.models.points import rotations
 
 G = 9.81
 
@@ -458,3 +459,53 @@ def test_wrong_input_is_one_line():
         Plant(robot, stiffness=-1.0)
     with pytest.raises(SolverError, match=r"grows beyond all numbers in steps of 0\.1 s"):
         plant.run(plant.start(lengths=np.full(6, 0.5)), held(plant, 1000, np.full(6, 0.5)), 0.1)
+
+
+def test_states_are_read_as_they_are_made():
+    robot = load("cogiro")
+    plant, rng = Plant(robot), np.random.default_rng(7)
+    poses, velocities = rng.uniform(-1.5, 1.5, (50, 6)), rng.normal(size=(50, 6))
+    carriers = rng.uniform(-1.5, 1.5, (50, 1, 6))
+    now = plant.read(plant.start(poses, velocities, carriers, lengths=np.ones(8)))
+    assert now.pose == pytest.approx(poses, abs=1e-12)
+    assert now.velocity == pytest.approx(velocities, abs=1e-9)
+    assert now.carrier_pose == pytest.approx(carriers, abs=1e-12)
+    assert now.rotation == pytest.approx(rotations(poses[:, 3:]), abs=1e-14)
+    assert (now.lengths == 1).all()
+
+
+def test_hostile_commands_leave_finite_states():
+    """Jumps of commands, of carriers and of thrusts, cuts and stuck winches, on random robots and drives."""
+    rng = np.random.default_rng(11)
+    for name in [
+        "wang-flying",
+        "wang-flying-printed",
+        "flycrane",
+        "wang-ctmrts-5",
+        "cogiro",
+        "planar-4",
+        "point-mass-3",
+    ]:
+        for drive in ("lengths", "rates", "forces", "tensions"):
+            data = load(name).model_dump(mode="json")
+            for cable in data["cables"]:
+                cable |= {"winch": WINCH | {"friction": rng.choice([0.0, 2.0])}} if drive == "forces" else {}
+            robot = Robot.model_validate(data)
+            plant = Plant(robot, drive=drive, stiffness=rng.choice([0.0, 2e4]), damping=rng.choice([0.0, 50.0]))
+            lengths, count = lengths_at(robot), len(robot.carriers)
+            state = plant.start(
+                velocity=robot.dof_mask * rng.normal(size=6), lengths=lengths * rng.uniform(0.98, 1.02, robot.m)
+            )
+            state = plant.stick(plant.cut(state, 0), 1)
+            size = {"lengths": lengths, "rates": 0.5}.get(drive, 3 * robot.force_scale / robot.m)
+            cables = size * rng.uniform(0.95 if drive == "lengths" else -0.5, 1.05, (40, robot.m))
+            actuators = max(len(carrier.actuators) for carrier in robot.carriers)
+            commands = plant.command(
+                cables.repeat(5, axis=0),
+                actuation=rng.uniform(-1e3, 1e3, (200, count, actuators)),
+                carrier_pose=robot.carrier_home + 0.02 * rng.normal(size=(200, count, 6)),
+            )
+            run = plant.run(state, commands, 1e-3)
+            assert np.isfinite(run.states).all()
+            assert (run.tensions >= 0).all()
+            assert (run.tensions[:, 0] == 0).all()

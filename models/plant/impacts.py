@@ -7,6 +7,7 @@ from .layout import (
     BODY,
     CANDIDATE,
     CARRIER_TURN,
+    CAUGHT,
     CONDITION,
     CUT,
     E_RATE,
@@ -15,6 +16,7 @@ from .layout import (
     LENGTH_RATE,
     LENGTH_SCALE,
     MODE,
+    MOST_SHIFTS,
     OWNER,
     PARTING,
     PULLS,
@@ -73,6 +75,14 @@ def _choose_touching(cables, settings, state, on_cables, picks, places, least_ra
         picks[CANDIDATE, i] = 1 if intact and taut and on_cables[i, L] > 1e-12 else 0
 
 
+def _any_too_long(cables, settings, state, on_cables, places):
+    for i in range(cables.shape[0]):
+        intact = cables[i, STIFFNESS] == 0.0 and state[places + CONDITION * cables.shape[0] + i] != CUT
+        if intact and on_cables[i, E] > CAUGHT * settings[LENGTH_SCALE]:
+            return True
+    return False
+
+
 def resolve(robot, command, state, change, work, time):
     """Apply the impact of cables that have got taut, and choose those that pull from now on."""
     bodies, cables, settings = robot
@@ -81,14 +91,17 @@ def resolve(robot, command, state, change, work, time):
     for i in range(m):
         if cables[i, STIFFNESS] == 0.0:
             on_cables[i, MODE] = SLACK
-    for stage in range(2):
+    for stage in range(MOST_SHIFTS + 1):  # places until they fit, and then velocities
+        places_too = stage < MOST_SHIFTS and _any_too_long(cables, settings, state, on_cables, places)
         _choose_touching(cables, settings, state, on_cables, picks, places, -1e300)
         gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
         for i in range(m):
-            on_cables[i, IMPULSE] = on_cables[i, E if stage == 0 else E_RATE]
+            on_cables[i, IMPULSE] = on_cables[i, E if places_too else E_RATE]
         solve_non_negative(on_cables, square, picks)
-        shift(bodies, cables, settings, state, on_bodies, on_cables, stage == 0)
+        shift(bodies, cables, settings, state, on_bodies, on_cables, places_too)
         geometry(robot, command, state, change, work, time)
+        if not places_too:
+            break
     forces(robot, command, state, change, work, time)
     _choose_touching(cables, settings, state, on_cables, picks, places, -PARTING)
     gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)

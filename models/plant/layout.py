@@ -50,6 +50,7 @@ CAUGHT = 1e-13  # of `LENGTH_SCALE` by which it is longer when its impact is loc
 PARTING = (
     1e-6  # [m/s] with which a taut cable gets slack; a slower one is held, which ends trains of ever smaller impacts
 )
-MOST_EVENTS = 200  # in one step; those beyond are not located
+MOST_EVENTS = 40  # in one step; those beyond are not located
+MOST_SHIFTS = 10  # that bring cables without stiffness to their lengths, a few where a state is far from them
 SHORTEST = 1e-3  # [m] of cable that a winch leaves out
 ELASTIC, WITH_FRICTION, CONSTRAINED = 0, 1, 2  # what the end of a step must be checked for

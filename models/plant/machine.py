@@ -34,15 +34,23 @@ _SIGNATURE = (
 )
 
 
-def joined(modules: Iterable[Path]) -> str:
-    """Return the functions and constants of modules that import only `math`, NumPy and each other."""
+def joined(modules: Iterable[Path], entry: str) -> str:
+    """Return the functions and constants of modules that import only `math`, NumPy and each other.
+
+    Parameters
+    ----------
+    modules
+        Files, each after those that it imports.
+    entry
+        The function that calls the others, which alone may allocate memory.
+    """
     lines: list[str] = []
     for module in modules:
         for node in ast.parse(module.read_text()).body:
             if isinstance(node, ast.FunctionDef):
                 node.body = [part for part in node.body if not _is_text(part)]
-                mark = {"run_rows": "", **dict.fromkeys(INLINED, "@inlined")}.get(node.name, "@part")
-                lines += [mark, ast.unparse(node)]
+                mark = "@inlined" if node.name in INLINED else "@part"
+                lines += [ast.unparse(node)] if node.name == entry else [mark, ast.unparse(node)]
             elif isinstance(node, ast.Assign):
                 lines.append(ast.unparse(node))
     return "\n".join(lines) + "\n"
@@ -55,4 +63,4 @@ def _is_text(node: ast.stmt) -> bool:
 @cache
 def run_rows() -> Kernel:
     """Return `rows.run_rows` as machine code; compiling takes some 45 s, loading 1 s."""
-    return compile_function(joined(MODULES), "run_rows", _SIGNATURE)
+    return compile_function(joined(MODULES, "run_rows"), "run_rows", _SIGNATURE)
