@@ -364,8 +364,8 @@ class Plant:
                 list(pool.map(lambda begin, end: kernel(begin, end, *arguments), edges[:-1], edges[1:]))
         if not np.isfinite(history[:, -1]).all():
             raise SolverError(
-                f"the motion of {self.robot.name} grows beyond all numbers in steps of {period / substeps:g} s: use more "
-                "substeps, or stiffness where cables that do not stretch get lengths that no pose has"
+                f"the motion of {self.robot.name} grows beyond all numbers in steps of {period / substeps:g} s: use "
+                "more substeps, or stiffness where cables that do not stretch get lengths that no pose has"
             )
         times = period * keep * np.arange(kept)
         return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))
