@@ -18,6 +18,7 @@ class Costs(NamedTuple):
     mechanics: int  # operations without sines and cosines
     sines: int  # and cosines
     free: int  # operations of a step whose tensions reach no limit, mechanics included
+    soft_free: int  # operations of a step with a soft answer, without those of iterations
     outer: int  # operations of an outer iteration of an exact answer at full rank
     inner: int
     soft_outer: int
@@ -46,6 +47,7 @@ def costs(m: int, rank: int, mechanics: int, sines: int) -> Costs:
         mechanics=mechanics,
         sines=sines,
         free=mechanics + exact.start + proof,
+        soft_free=mechanics + 2 * exact.start + soft.start + 2 * proof + 2 * certificate,
         outer=exact.outer,
         inner=exact.inner,
         soft_outer=soft.outer,

@@ -14,6 +14,7 @@ from towline.benchmarks import step as benchmark
 from towline.benchmarks import step_size
 from towline.benchmarks.step_code import FLAGS, States, StepCode
 from towline.benchmarks.step_states import random_states, twelve_cables
+from towline.embedded.costs import costs
 from towline.embedded.export import step_files
 from towline.embedded.mechanics import mechanics, moving_carriers
 from towline.errors import InputError
@@ -349,6 +350,33 @@ def test_operations_are_those_of_the_code(name):
     header = step_files(robot)["towline_step.h"]
     total = counts.total() - counts["SIN"] - counts["COS"]
     assert re.search(rf"mechanics +{total}, and {counts['SIN'] + counts['COS']} sines and cosines", header)
+
+
+@pytest.mark.parametrize("name", ["wang-flying", "cogiro", "twelve"])
+def test_no_step_has_more_operations_than_the_bounds(tmp_path, name):
+    """Each operation is counted, by the step compiled as C++ with numbers that count."""
+    required("g++")
+    robot = robot_named(name)
+    for file, text in step_files(robot).items():
+        (tmp_path / file).write_text(text.replace("typedef double towline_real;", ""))
+    source = Path(__file__).parent / "counted_step.cpp"
+    subprocess.run(["g++", "-std=c++17", "-O1", f"-I{tmp_path}", source, "-o", tmp_path / "counted"], check=True)
+    text = "".join(line(row) for row in random_states(robot, 900, seed=13).rows(robot))
+    printed = subprocess.run([tmp_path / "counted"], input=text, capture_output=True, text=True, check=True).stdout
+    status, steps, inner, counts = np.array([row.split() for row in printed.splitlines()], int).T
+    assert status.size == 900
+    counted = operations(mechanics(robot))
+    sines = counted["SIN"] + counted["COS"]
+    bounds = costs(robot.m, len(robot.platform.dof), counted.total() - sines, sines)
+    optimal = status == OPTIMAL
+    assert (counts[optimal & (steps == 0)] <= bounds.free).all()
+    most = bounds.free + steps * bounds.outer + inner * bounds.inner
+    assert (counts[optimal] <= most[optimal]).all()
+    assert (counts[optimal] > bounds.free / 2).all()  # the bound is not far from what there is
+    soft = ~optimal & (status != INVALID)
+    most = bounds.soft_free + steps * bounds.soft_outer + inner * bounds.soft_inner
+    assert (counts[soft] <= most[soft]).all()
+    assert counts.max() <= bounds.most
 
 
 def test_other_processors_compute_the_same_bits(tmp_path):
