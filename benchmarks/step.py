@@ -159,12 +159,14 @@ def accuracy_lines(names: list[str], count: int) -> tuple[list[str], bool]:
 
 
 def time_lines(names: list[str], count: int = 2000) -> list[str]:
-    """Return a table of times; those of OSQP are of the feasible states, without the mechanics, from warm starts."""
-    lines = [
-        "| robot | optimal: best, mean, worst [us] | soft: mean, worst [us] | OSQP 1e-3 [us] | its error | ratio | "
-    ]
-    lines[0] += "OSQP 1e-6 [us] | its error | ratio |"
-    lines += ["|---|---|---|---:|---:|---:|---:|---:|---:|"]
+    """Return a table of times.
+
+    OSQP's are those of the feasible states: new data and solve, from the last solution, without the mechanics. Its
+    errors are the 99th percentile, in units of the largest limit.
+    """
+    heads = ["robot", "optimal: best, mean, worst [us]", "soft: mean, worst [us]"]
+    heads += ["OSQP at 1e-3 [us]", "error", "ratio", "OSQP at 1e-6 [us]", "error", "ratio"]
+    lines = [f"| {' | '.join(heads)} |", "|---|---|---|" + "---:|" * 6]
     for name in names:
         robot = robot_named(name)
         states = random_states(robot, count, seed=1)
@@ -178,7 +180,8 @@ def time_lines(names: list[str], count: int = 2000) -> list[str]:
             cells += [f"{times[soft].mean():.2f}, {times[soft].max():.2f}" if soft.any() else "-"]
             for tolerance in (1e-3, 1e-6):
                 peer = osqp_times(robot, A[easy], w[easy], tolerance, Path(folder) / f"osqp-{tolerance:g}")
-                error = np.abs(peer.tensions - steps.tensions[easy]).max() / robot.t_max.max()
+                errors = np.abs(peer.tensions - steps.tensions[easy]).max(axis=1) / robot.t_max.max()
+                error = np.percentile(np.nan_to_num(errors, nan=np.inf), 99)
                 mean = 1e6 * peer.seconds.mean()
                 cells += [f"{mean:.1f}", f"{error:.0e}", f"1/{mean / times[easy].mean():.0f}"]
         lines.append(f"| {name} | {' | '.join(cells)} |")

@@ -120,6 +120,7 @@ def lines_of(bounds: Costs) -> dict[str, list[str]]:
             f"mechanics                 {bounds.mechanics:7}, and {bounds.sines} sines and cosines",
             f"no tension at a limit     {bounds.free:7}, mechanics included",
             f"exact answer, each outer  {bounds.outer:7}, inner {bounds.inner:7}",
+            f"soft answer, no iteration {bounds.soft_free:7}, mechanics and the attempt at an exact one included",
             f"soft answer, each outer   {bounds.soft_outer:7}, inner {bounds.soft_inner:7}",
             f"all iterations, at most   {bounds.most:7}",
         ],

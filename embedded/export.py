@@ -8,6 +8,7 @@ import textwrap
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 
 from .. import __version__
 from ..inputs import file_path, one_of
@@ -100,6 +101,7 @@ def step_files(robot: Robot, precision: str = "double") -> dict[str, str]:
         "types": _section("towline_types.h"),
         "core": "\n\n".join(_section(name) for name in _SECTIONS),
         "length": repr(robot.length),
+        **{name: repr(value) for name, value in _sizes(robot).items()},
         "t_min": ", ".join(literal(t) for t in robot.t_min),
         "t_max": ", ".join(literal(t) for t in robot.t_max),
         "home": f"static const real CARRIER_HOME[6 * TOWLINE_CARRIERS] = {{{home}}};\n" if moving else "",
@@ -126,6 +128,18 @@ def _columns(moving: list[str], has_wind: bool) -> list[tuple[int, int, str]]:
     groups += [(6, "disturbance, in {G}: other force on the platform, and moment about its CoM")]
     lasts = [sum(size for size, _ in groups[: index + 1]) for index in range(len(groups))]
     return [(last - size + 1, last, what) for last, (size, what) in zip(lasts, groups, strict=True)]
+
+
+def _sizes(robot: Robot) -> dict[str, float]:
+    """Return the factors of the size of the terms of the required wrench."""
+    platform, aero = robot.platform, robot.platform.aero
+    com = float(np.linalg.norm(platform.com))
+    return {
+        "mass": platform.mass,
+        "gravity": float(np.abs(robot.gravity).sum()),
+        "turning": platform.mass * com + float(np.abs(robot.inertia).max()) / robot.length,
+        "drag": 0.5 * aero.air_density * aero.area * max(aero.drag, aero.lift) if aero else 0.0,
+    }
 
 
 def _costs(robot: Robot, function: ca.Function) -> dict[str, str]:

@@ -14,7 +14,8 @@ void solve_rows(int count, int n, int m, const towline_real *A, const towline_re
                                          t_max + row * m,
                                          t_ref + row * m,
                                          weights + row * m,
-                                         length[row]};
+                                         length[row],
+                                         0};
         towline_answer answer;
         status[row] = (int)(rho > 0 ? towline_solve_always(&problem, rho, &answer) : towline_solve(&problem, &answer));
         steps[row] = answer.steps;

@@ -23,6 +23,12 @@
 #endif
 
 static const real LENGTH = C(@length@); /* brings moments to newtons [m] */
+#ifdef TOWLINE_FLOAT
+static const real MASS = C(@mass@);
+static const real GRAVITY = C(@gravity@);
+static const real TURNING = C(@turning@); /* force for each unit of angular acceleration [N s^2] */
+static const real DRAG = C(@drag@);       /* force for each squared unit of air speed [N s^2/m^2] */
+#endif
 static const real T_MIN[CABLES] = {@t_min@};
 static const real T_MAX[CABLES] = {@t_max@};
 @home@
@@ -76,6 +82,33 @@ static int is_state(const towline_input *input) {
            are_finite(input->disturbance, 6);
 }
 
+/*
+ * Return the size of the terms that the required wrench is a sum of [N], moments divided by the length. In float its
+ * rounding is a part of them: near free fall, where they cancel, smaller wrenches prove nothing. In double it is 0, as
+ * in Python.
+ */
+static real terms_of_wrench(const towline_input *input) {
+#ifdef TOWLINE_FLOAT
+    const real *v = input->velocity, *a = input->acceleration, *d = input->disturbance;
+    real linear = GRAVITY, angular = 0, other = 0, speed = 0;
+    for (int i = 0; i < 3; i++) {
+        linear += magnitude(a[i]);
+        angular += magnitude(a[i + 3]) + 3 * v[i + 3] * v[i + 3];
+        other += magnitude(d[i]) + magnitude(d[i + 3]) / LENGTH;
+        speed += 2 * v[i] * v[i];
+    }
+#if TOWLINE_WIND
+    for (int i = 0; i < 3; i++) {
+        speed += 2 * input->wind[i] * input->wind[i];
+    }
+#endif
+    return MASS * linear + TURNING * angular + DRAG * speed + other;
+#else
+    (void)input;
+    return 0;
+#endif
+}
+
 /* Hold the last command, inside the limits. */
 static void hold(const towline_state *state, towline_answer *answer) {
     for (int c = 0; c < CABLES; c++) {
@@ -87,7 +120,9 @@ static void hold(const towline_state *state, towline_answer *answer) {
 
 towline_status towline_step(const towline_input *input, towline_state *state, towline_answer *answer) {
     real A[6 * CABLES], w[6], low[CABLES], high[CABLES];
-    const towline_problem problem = {6, CABLES, A, w, low, high, input->t_ref, 0, LENGTH};
+    const towline_problem problem = {6,      CABLES, A, w, low, high, input->t_ref, 0,
+                                     LENGTH,
+                                     terms_of_wrench(input)};
     for (int c = 0; c < CABLES; c++) {
         low[c] = T_MIN[c];
         high[c] = T_MAX[c];

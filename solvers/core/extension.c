@@ -24,8 +24,8 @@ static int solve(const double *data, Py_ssize_t size, double *t, Py_ssize_t m, d
         return -1;
     }
     const double *w = data + n * m, *limits = w + n;
-    const towline_problem problem = {(int)n,         (int)m,         data,         w, limits, limits + m,
-                                     limits + 2 * m, limits + 3 * m, limits[4 * m]};
+    const towline_problem problem = {(int)n,         (int)m,         data,          w, limits, limits + m,
+                                     limits + 2 * m, limits + 3 * m, limits[4 * m], 0};
     towline_answer answer;
     const towline_status status = towline_solve(&problem, &answer);
     if (status == TOWLINE_OPTIMAL) {
@@ -92,7 +92,7 @@ static void solve_batch(double *const *array, Py_ssize_t rows, int n, int m, dou
             given[i] = array[i] ? array[i] + row * (Py_ssize_t)array[PER][i] : NULL;
         }
         const towline_problem problem = {
-            n, m, given[A], given[W], given[T_MIN], given[T_MAX], given[T_REF], given[WEIGHTS], *given[LENGTH]};
+            n, m, given[A], given[W], given[T_MIN], given[T_MAX], given[T_REF], given[WEIGHTS], *given[LENGTH], 0};
         towline_answer answer;
         const towline_status status =
             rho > 0 ? towline_solve_soft(&problem, rho, &answer) : towline_solve(&problem, &answer);

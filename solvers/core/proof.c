@@ -75,7 +75,7 @@ int towline_proves_optimum(const form *f, const int *active, const real *side, c
 }
 
 measure towline_measure(const form *f, const towline_problem *problem, const real *t) {
-    measure known = {0, 0, 0};
+    measure known = {0, problem->w_terms, 0};
     for (int i = 0; i < problem->n; i++) {
         const real x = problem->w[i] * f->scale[i];
         known.required += x * x;

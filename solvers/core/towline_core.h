@@ -45,6 +45,7 @@ typedef struct {
     const towline_real *t_ref;   /* m, [N]; NULL = 0 */
     const towline_real *weights; /* m; NULL = 1 */
     towline_real length;         /* characteristic length [m] */
+    towline_real w_terms; /* size of terms that cancel in w and leave their rounding there [N]; 0 if w is exact */
 } towline_problem;
 
 #ifndef TOWLINE_STEP
