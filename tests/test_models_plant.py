@@ -255,13 +255,16 @@ def test_batches_and_threads_give_the_bits_of_single_rows(name, stiffness):
     starts = plant.start(velocity=rng.normal(size=(5, 6)), tensions=rng.uniform(0, 5, (5, 6)))
     lengths = lengths_at(robot) * rng.uniform(0.99, 1.01, (5, 30, 6))
     poses = robot.carrier_home + 1e-3 * rng.normal(size=(5, 30, len(robot.carriers), 6))
-    commands = plant.command(lengths, carrier_pose=poses, wrench=rng.normal(size=(5, 30, 6)))
+    moves = rng.random((2, 5, 30, 1, 1)) < 0.5  # some carriers move in some steps, and rest in others
+    velocities, accelerations = moves * rng.normal(size=(2, *poses.shape))
+    commands = plant.command(lengths, None, poses, velocities, accelerations, wrench=rng.normal(size=(5, 30, 6)))
     all_rows = plant.run(starts, commands, 1e-3, threads=1)
     shared = plant.run(starts, commands, 1e-3, threads=3)
     assert (all_rows.states == shared.states).all()
     state = starts[3]
     for k in range(30):
         state = plant.step(state, commands[3, k], 1e-3)
+        assert (plant.read(state).lengths == plant.read(all_rows.states[3, k + 1]).lengths).all()
     assert (state == all_rows.states[3, -1]).all()
     assert plant.run(starts[:, None], commands[None, :], 1e-3).states.shape == (5, 5, 31, plant.size)
 
@@ -472,6 +475,8 @@ def test_states_are_read_as_they_are_made():
     assert now.carrier_pose == pytest.approx(carriers, abs=1e-12)
     assert now.rotation == pytest.approx(rotations(poses[:, 3:]), abs=1e-14)
     assert (now.lengths == 1).all()
+    moving = plant.read(plant.start(carrier_velocity=np.ones((1, 6))))
+    assert (moving.carrier_velocity == 0).all(), "the ground"
 
 
 def test_hostile_commands_leave_finite_states():

@@ -72,6 +72,8 @@ def _impose(command, reference, state, change, at, time):
     for i in range(9, 12):
         turns = turns or command[reference + i] != 0.0 or command[reference + 6 + i] != 0.0
     if not turns:
+        for i in range(3):
+            state[at + RATE + i] = change[at + RATE + i] = 0.0
         return False
     d_roll = command[reference + 9] + time * command[reference + 15]
     d_pitch = command[reference + 10] + time * command[reference + 16]

@@ -152,7 +152,7 @@ class Plant:
         pose, velocity
             Of the platform frame in {G} [m, rad], (..., 6), and its time derivative; default: at home, at rest.
         carrier_pose, carrier_velocity
-            The same of the carriers, (..., c, 6). Prescribed ones follow their commands from the first step on.
+            The same of the carriers, (..., c, 6); velocities that a carrier cannot have are left out.
         tensions
             (..., m) [N]: elastic cables have the unstrained lengths that give these at rest.
         lengths
@@ -191,6 +191,9 @@ class Plant:
         bodies = np.zeros((*batch, 1 + count, layout.BODY))
         place(bodies[..., 0, :], poses, velocities, np.array(robot.platform.com))
         place(bodies[..., 1:, :], carriers, moving, np.zeros(3))
+        kinds = self._bodies[1:, layout.MOTION]
+        bodies[..., 1:, layout.VELOCITY : layout.RATE] *= (kinds != layout.RESTS)[:, None]
+        bodies[..., 1:, layout.RATE :] *= np.isin(kinds, (layout.FREE, layout.IMPOSED))[:, None]
         cables = np.zeros((*batch, layout.CABLE_BLOCKS, robot.m))
         if self.drive == "tensions":
             first = pulls

@@ -69,6 +69,7 @@ def run_rows(start, stop, bodies, cables, settings, states, commands, period, su
     step = period / substeps
     for row in range(start, stop):
         state[:] = states[row]
+        slopes[:], work[0][:], work[1][:] = 0.0, 0.0, 0.0  # nothing is left of the row before
         for k in range(commands.shape[1]):
             command[:] = commands[row, k]
             _take_command(cables, settings, command, state, work[1], places, period)
