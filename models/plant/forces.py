@@ -147,12 +147,16 @@ def _forces(robot, command, state, change, work, time):
         commanded_tensions(cables, settings, command, state, change, on_cables, places)
     else:
         constrained = elastic_tensions(cables, state, change, on_cables, places)
-    load_bodies(bodies, settings, command, on_bodies, state, m)
-    pull_bodies(bodies, cables, on_bodies, on_cables)
-    move_bodies(bodies, settings, command, state, change, on_bodies, m)
-    if settings[HAS_WINCHES] == 1.0:
-        move_winches(cables, settings, command, state, change, on_cables, places, time)
-    if constrained:
+    # The second time with the tensions of cables without stiffness, which follow from what bodies do without them.
+    for _ in range(2):
+        load_bodies(bodies, settings, command, on_bodies, state, m)
+        pull_bodies(bodies, cables, on_bodies, on_cables)
+        move_bodies(bodies, settings, command, state, change, on_bodies, m)
+        if settings[HAS_WINCHES] == 1.0:
+            move_winches(cables, settings, command, state, change, on_cables, places, time)
+        if not constrained:
+            break
+        constrained = False
         gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
         for i in range(m):
             on_cables[i, IMPULSE] = free_stretch_acceleration(bodies, cables, state, change, on_bodies, on_cables, i)
@@ -161,8 +165,3 @@ def _forces(robot, command, state, change, work, time):
         for i in range(m):
             if picks[CANDIDATE, i] == 1:
                 on_cables[i, T] = on_cables[i, IMPULSE]
-        load_bodies(bodies, settings, command, on_bodies, state, m)
-        pull_bodies(bodies, cables, on_bodies, on_cables)
-        move_bodies(bodies, settings, command, state, change, on_bodies, m)
-        if settings[HAS_WINCHES] == 1.0:
-            move_winches(cables, settings, command, state, change, on_cables, places, time)
