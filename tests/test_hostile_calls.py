@@ -183,6 +183,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "file": lambda: "file.nc",
     "Plan.animate.file": lambda: "film.gif",
     "folder": lambda: "folder",
+    "precision": lambda: "double",
     "speed": lambda: 1.0,
     "fps": lambda: 5.0,
     "condition": StaticEquilibrium,
