@@ -145,6 +145,23 @@ def test_float_calls_nothing_optimal_that_is_infeasible(code, name):
     assert np.isfinite(steps.tensions).all()
 
 
+def test_in_free_fall_float_proves_only_what_holds(code):
+    """Only rounding of weight and inertia is left of the required wrench there, and its direction has no meaning."""
+    robot = load("wang-ctmrts-6")
+    dynamics = Dynamics(robot)
+    states = random_states(robot, 4500, seed=14, single=True)
+    near = states.select(np.arange(4500) % 9 < 4)  # KINDS[:4]: near home
+    slack = np.zeros((2000, robot.m))
+    falling = dynamics.acceleration(near.pose, near.velocity, slack, near.carrier_pose)
+    falling = np.asarray(falling).astype(np.float32).astype(float)
+    states = near._replace(acceleration=falling, disturbance=np.zeros((2000, 6)))
+    steps = code("wang-ctmrts-6", "float").run(states.rows(robot))
+    A, w = states.problems(dynamics)
+    assert np.median(np.linalg.norm(w, axis=1)) < 1e-4
+    check_certificates(robot, A, w, steps)
+    assert not (steps.status == INVALID).any()
+
+
 def test_the_soft_answer_misses_the_wrench_by_least(code):
     """No tensions inside the limits come nearer, by bounded least squares of scipy."""
     from scipy.optimize import lsq_linear
