@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import textwrap
+from itertools import accumulate
 from pathlib import Path
 
 import casadi as ca
@@ -86,8 +87,9 @@ def step_files(robot: Robot, precision: str = "double") -> dict[str, str]:
     function = mechanics(robot)
     moving = [robot.carriers[index].name for index in moving_carriers(robot)]
     home = ", ".join(literal(value) for index in moving_carriers(robot) for value in robot.carrier_home[index])
-    columns = _columns(moving, robot.platform.aero is not None)
-    counts = sorted({18, *(end for _, end, _ in columns if end > 18)})
+    has_wind = robot.platform.aero is not None
+    columns = _columns(moving, has_wind)
+    counts = list(accumulate([18, *([6 * len(moving)] if moving else []), *([3] if has_wind else []), 6]))
     values = {
         "name": _comment(robot.name),
         "source": _comment(f"Numbers of the robot: {robot.source}"),
@@ -97,7 +99,7 @@ def step_files(robot: Robot, precision: str = "double") -> dict[str, str]:
         "cables": str(robot.m),
         "carriers": str(len(moving)),
         "carrier_names": _comment(", ".join(moving)) or "none",
-        "wind": str(int(robot.platform.aero is not None)),
+        "wind": str(int(has_wind)),
         "types": _section("towline_types.h"),
         "core": "\n\n".join(_section(name) for name in _SECTIONS),
         "length": repr(robot.length),
@@ -110,7 +112,7 @@ def step_files(robot: Robot, precision: str = "double") -> dict[str, str]:
         "counts": " or ".join([", ".join(map(str, counts[:-1])), str(counts[-1])]),
         "columns": "\n".join(f"| {first} to {last} | {what} |" for first, last, what in columns),
         "example": " ".join(f"{value:.6g}" for value in [*robot.home, *[0.0] * 12]),
-        "more": "".join([", carrier_pose" if moving else "", ", wind" if robot.platform.aero else ""]),
+        "more": "".join([", carrier_pose" if moving else "", ", wind" if has_wind else ""]),
         **_costs(robot, function),
     }
     return {name: _filled(name, values) for name in _FILES}

@@ -271,6 +271,8 @@ def test_the_deepest_stack_is_that_of_the_longest_calls():
 def test_code_and_stack_are_small(tmp_path, name):
     """On a Cortex-M7 where there is its compiler: 25 kB of code, and 6 kB of stack for twelve cables."""
     required("gcc")
+    if "Free Software Foundation" not in subprocess.check_output(["gcc", "--version"], text=True):
+        pytest.skip("gcc is another compiler here, which does not report the stack")
     size = step_size.measure_size(robot_named(name), "double", tmp_path, step_size.target())
     assert size.text < 25_000
     assert 2_000 < size.stack <= 6 * 1024

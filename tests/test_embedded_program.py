@@ -108,6 +108,23 @@ def test_a_malformed_line_ends_the_program_in_one_line(program, bad, message):
     assert len(done.stdout.splitlines()) == 1  # what was before is answered
 
 
+@pytest.mark.parametrize(("name", "counts"), [("wang-flying", (18, 24, 27, 33)), ("wang-ctmrts-6", (18, 54, 60))])
+def test_a_line_may_end_before_what_is_as_usual(program, name, counts):
+    """Left out, carriers are at home, the air is still and there is no disturbance; the message lists the counts."""
+    robot = load(name)
+    whole = np.r_[robot.home + 0.01, np.full(6, 0.1), np.full(6, 0.2)]
+    usual = np.r_[robot.carrier_home.ravel(), np.zeros(counts[-1] - 18 - robot.carrier_home.size)]
+    lines = [line(np.r_[whole, usual][:count]) for count in counts]
+    answers = program(name, "".join(lines)).stdout.splitlines()
+    assert len(answers) == len(counts)
+    assert len(set(answers)) == 1
+    listed = f"{', '.join(map(str, counts[:-1]))} or {counts[-1]}"
+    for count in set(range(counts[-1] + 2)) - set(counts):
+        done = program(name, "1 " * count + "\n")
+        assert done.returncode == 1
+        assert f"line 1: must have {listed} numbers, got " in done.stderr
+
+
 def test_the_program_explains_its_options(program):
     for options in (["--rate"], ["--rate", "-1"], ["--rate", "x"], ["--nonsense"]):
         done = program("cogiro", "", *options)

@@ -3,7 +3,7 @@
  *
  * A line has pose, velocity and wanted acceleration of the platform (6 numbers each), then, where the robot has them, the
  * pose of each carrier that moves (6 each) and the wind (3), then the disturbance (6). Numbers are separated by spaces;
- * groups may be left out from the end: carriers at home, still air, no disturbance.
+ * disturbance, wind and carriers may be left out, in this order: no disturbance, still air, carriers at home.
  *
  * --certificate adds, after the tensions, the shortfall and the six numbers of its direction, zero where there is none.
  * --rate NEWTONS limits the change of each tension from one line to the next.
