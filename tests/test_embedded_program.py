@@ -181,6 +181,53 @@ def test_computed_torque_is_its_formula(tmp_path):
     np.testing.assert_allclose(printed, expected, rtol=1e-12)
 
 
+def test_a_broken_state_of_the_caller_has_a_defined_answer(tmp_path):
+    """Whatever is in the state, the command is inside the limits, and the next step is as usual."""
+    required("cc")
+    folder = towline.export_step("planar-4", tmp_path / "step")
+    (folder / "try.c").write_text(
+        """
+        #include <math.h>
+        #include <stdio.h>
+        #include "towline_step.h"
+        static void show(const towline_input *input, towline_state *state) {
+            towline_answer answer;
+            printf("%s", towline_status_name(towline_step(input, state, &answer)));
+            for (int c = 0; c < TOWLINE_CABLES; c++) printf(" %.17g", answer.tensions[c]);
+            printf("\\n");
+        }
+        int main(void) {
+            const towline_input input = {.pose = HOME};
+            towline_state state;
+            towline_start(&state);
+            show(&input, &state);
+            state.tensions[1] = NAN;
+            show(&input, &state);
+            show(&input, &state);
+            state.tensions[2] = INFINITY;
+            state.rate_max[2] = 1;
+            show(&input, &state);
+            state.rate_max[2] = NAN;
+            show(&input, &state);
+            state.rate_max[2] = -1;
+            show(&input, &state);
+            towline_start(&state);
+            show(&input, &state);
+            return 0;
+        }
+        """.replace("HOME", "{" + ", ".join(map(repr, load("planar-4").home.tolist())) + "}")
+    )
+    subprocess.run(["cc", *FLAGS, "try.c", "towline_step.c", "-lm", "-o", "try"], cwd=folder, check=True)
+    printed = [row.split() for row in subprocess.check_output([folder / "try"], text=True).splitlines()]
+    statuses, commands = [row[0] for row in printed], np.array([row[1:] for row in printed], float)
+    assert statuses == ["optimal", "invalid", "optimal", "invalid", "invalid", "invalid", "optimal"]
+    robot = load("planar-4")
+    assert ((commands >= robot.t_min) & (commands <= robot.t_max)).all()
+    np.testing.assert_array_equal(commands[[2, 6]], commands[[0, 0]])
+    assert commands[1, 1] == robot.t_min[1]
+    np.testing.assert_array_equal(np.delete(commands[1], 1), np.delete(commands[0], 1))
+
+
 def test_nothing_is_overwritten_and_nothing_half_written(tmp_path):
     (tmp_path / "here").mkdir()
     for arguments, message in (

@@ -127,7 +127,8 @@ towline_status towline_step(const towline_input *input, towline_state *state, to
         low[c] = T_MIN[c];
         high[c] = T_MAX[c];
         if (state->has_command) {
-            const real least = state->tensions[c] - state->rate_max[c], most = state->tensions[c] + state->rate_max[c];
+            const real rate = state->rate_max[c] >= 0 ? state->rate_max[c] : (real)NAN; /* the solver rejects NaN */
+            const real least = state->tensions[c] - rate, most = state->tensions[c] + rate;
             low[c] = between(least, low[c], most);
             high[c] = between(least, high[c], most);
         }

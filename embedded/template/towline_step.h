@@ -88,7 +88,8 @@ void towline_computed_torque(const towline_gains *gains, const towline_reference
  * TOWLINE_SINGULAR    the certificate: no tensions within the limits reach the required wrench along it, by `shortfall`
  *                     newtons. Its first three entries have no unit, the others 1/m. Singular: nor do any beyond the limits.
  * TOWLINE_INACCURATE  rounding forbids a proof of any of these: soft answer.
- * TOWLINE_INVALID     the input is no state (NaN, infinite, a cable of no length): the last command, held.
+ * TOWLINE_INVALID     the input is no state (NaN, infinite, a cable of no length), or the last command is not finite, or
+ *                     rate_max is NaN or negative: the last command, held.
  *
  * With rate limits the limits are those that can be reached from the last command, and optimal, infeasible and the
  * certificate refer to them. A last command outside the limits of the cables moves towards them as fast as its rate
