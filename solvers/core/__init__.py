@@ -29,8 +29,10 @@ except ImportError:
         """
         return UNSURE
 
-    def solve_rows(n: int, m: int, rho: float, *arrays: Any) -> None:
-        """Solve the rows of a batch whose status is `UNSURE`; those that stay so need another method.
+    def solve_rows(n: int, m: int, rho: float, *arrays: Any) -> int:
+        """Solve the rows of a batch whose status is `UNSURE`, and return how many of all rows are optimal.
+
+        Those that stay unsure need another method.
 
         Parameters
         ----------
@@ -42,3 +44,4 @@ except ImportError:
             A, w, lower, upper, ref, weights, length, per, t, d, info, residual and status of `kernels.rows.solve_rows`,
             but `per` of float64.
         """
+        return 0

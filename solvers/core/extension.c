@@ -81,11 +81,13 @@ enum { TENSIONS = GIVEN, DIRECTION, INFO, RESIDUAL, STATUS, ARRAYS }; /* and wha
 
 enum { UNSURE = 6 }; /* of kernels/codes.py */
 
-/* Solve each row of a batch whose status is UNSURE; see `towline_solve_soft` if rho > 0. */
-static void solve_batch(double *const *array, Py_ssize_t rows, int n, int m, double rho) {
+/* Solve each row of a batch whose status is UNSURE, see `towline_solve_soft` if rho > 0; return how many are optimal. */
+static Py_ssize_t solve_batch(double *const *array, Py_ssize_t rows, int n, int m, double rho) {
+    Py_ssize_t optimal = 0;
     for (Py_ssize_t row = 0; row < rows; row++) {
         const double *given[PER];
         if (array[STATUS][row] < UNSURE) {
+            optimal += array[STATUS][row] == TOWLINE_OPTIMAL;
             continue;
         }
         for (int i = 0; i < PER; i++) {
@@ -105,6 +107,7 @@ static void solve_batch(double *const *array, Py_ssize_t rows, int n, int m, dou
             code = UNSURE;
         }
         array[STATUS][row] = code;
+        optimal += code == TOWLINE_OPTIMAL;
         array[RESIDUAL][row] = answer.residual;
         array[INFO][2 * row] = answer.support;
         array[INFO][2 * row + 1] = proven ? answer.shortfall : (double)NAN;
@@ -115,6 +118,7 @@ static void solve_batch(double *const *array, Py_ssize_t rows, int n, int m, dou
             array[DIRECTION][row * n + i] = answer.direction[i];
         }
     }
+    return optimal;
 }
 
 static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
@@ -122,6 +126,7 @@ static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssi
     Py_buffer views[ARRAYS];
     double *array[ARRAYS];
     int taken = 0, fits = 0;
+    Py_ssize_t optimal = 0;
     if (count != ARRAYS + 3) {
         PyErr_SetString(PyExc_TypeError, "solve_rows takes n, m, rho and thirteen arrays");
         return NULL;
@@ -149,7 +154,7 @@ static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssi
             }
         }
         if (fits) {
-            Py_BEGIN_ALLOW_THREADS solve_batch(array, rows, (int)n, (int)m, rho);
+            Py_BEGIN_ALLOW_THREADS optimal = solve_batch(array, rows, (int)n, (int)m, rho);
             Py_END_ALLOW_THREADS
         }
     }
@@ -162,7 +167,7 @@ static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssi
         }
         return NULL;
     }
-    Py_RETURN_NONE;
+    return PyLong_FromSsize_t(optimal);
 }
 
 static PyMethodDef functions[] = {
@@ -171,7 +176,7 @@ static PyMethodDef functions[] = {
      "Solve a packed problem; return its status and fill tensions (m,) if optimal, direction (n,) if out of reach."},
     {"solve_rows", (PyCFunction)(void (*)(void))solve_rows, METH_FASTCALL,
      "solve_rows(n, m, rho, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, residual, "
-     "status)\n--\n\nSolve the rows of a batch whose status is UNSURE; see `kernels.rows.solve_rows`."},
+     "status)\n--\n\nSolve the rows of a batch whose status is UNSURE; return how many of all are optimal."},
     {NULL, NULL, 0, NULL},
 };
 

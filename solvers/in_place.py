@@ -1,0 +1,102 @@
+"""Solve batches of one shape again and again, in arrays of its own and with tensions in every case: `InPlace`."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .batch import solve_batch
+from .core import CABLES, ROWS, solve_rows
+from .kernels.codes import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
+from .problem import TensionProblem
+from .solve import solve
+
+__all__ = ["InPlace"]
+
+Array = NDArray[np.float64]
+
+RHO = 1e8  # weight of the squared wrench error in a soft answer, beside the squared tensions
+
+
+class InPlace:
+    """Problems of one shape, to be written into its arrays, solved, and written again.
+
+    A controller solves such a problem thousands of times a second: no array is made, and where no tensions give w, the
+    tensions are those of the method "soft-wrench", with the least wrench error that the limits permit.
+
+    Parameters
+    ----------
+    rows, n, m :
+        How many problems, of how many wrench rows and cables.
+    length :
+        Characteristic length [m] of all problems.
+
+    Attributes
+    ----------
+    A, w :
+        Wrench matrices, shape (rows, n, m), and required wrenches, shape (rows, n), [N] and [N m].
+    bounds, t_ref :
+        Lowest and highest tensions, shape (2, rows, m), and tensions to stay near, shape (rows, m) [N].
+    tensions :
+        The answers [N], shape (rows, m); nan where the numbers of a row are no problem.
+    code :
+        Status of each row, shape (rows,): `STATUSES[int(code)]`.
+    direction, shortfall :
+        Where no tensions give w: a verified direction, shape (rows, n), along which they miss it, and by how much
+        [N].
+    """
+
+    def __init__(self, rows: int, n: int, m: int, length: float):
+        self.A, self.w = np.zeros((rows, n, m)), np.zeros((rows, n))  # (rows, n, m), (rows, n)
+        self.bounds, self.t_ref = np.zeros((2, rows, m)), np.zeros((rows, m))  # (2, rows, m), (rows, m)
+        self.tensions = np.zeros((rows, m))  # (rows, m)
+        self.code = np.zeros(rows)  # (rows,)
+        self.direction, self._info = np.zeros((rows, n)), np.zeros((rows, 2))  # (rows, n), (rows, 2)
+        self._residual, self._spare = np.zeros(rows), (np.zeros((rows, n)), np.zeros((rows, 2)))
+        self._lengths = np.array([length])
+        per = np.array([n * m, n, m, m, m, 0, 0], dtype=float)  # one length and equal weights for all rows
+        given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), self._lengths, per)
+        self._exact = (n, m, 0.0, *given, self.tensions, self.direction, self._info, self._residual, self.code)
+        self._soft = (n, m, RHO, *given, self.tensions, *self._spare, self._residual, self.code)
+        self._has_core = n <= ROWS and m <= CABLES
+
+    @property
+    def shortfall(self) -> Array:
+        """Return by how much the limits miss w along `direction` [N], shape (rows,)."""
+        return self._info[:, 1]
+
+    def solve(self) -> bool:
+        """Solve all rows, and return whether tensions that give w result for each."""
+        self.code.fill(UNSURE)
+        if self._has_core and solve_rows(*self._exact) == len(self.code):
+            return True
+        self._solve_others()
+        return not self.code.any()
+
+    def _solve_others(self) -> None:
+        """Answer the rows whose tensions the core did not prove optimal."""
+        self._prove_without_core()
+        exact = self.code.copy()
+        self.code[(exact != OPTIMAL) & (exact != INVALID)] = UNSURE
+        if self._has_core:
+            solve_rows(*self._soft)
+        for row in np.flatnonzero(self.code == UNSURE):
+            solution = solve(self._problem(int(row)), "soft-wrench", rho=RHO)
+            self.tensions[row] = np.nan if solution.tensions is None else solution.tensions
+        self.code[:] = exact
+        self.tensions[exact == INVALID] = np.nan
+        unproven = (exact != INFEASIBLE) & (exact != SINGULAR)
+        self.direction[unproven], self._info[unproven] = np.nan, np.nan
+
+    def _prove_without_core(self) -> None:
+        """Decide the rows of which the core is not sure, or all without it."""
+        rows = np.flatnonzero(self.code == UNSURE)
+        if not rows.size:
+            return
+        batch = solve_batch(
+            self.A[rows], self.w[rows], *self.bounds[:, rows], t_ref=self.t_ref[rows], length=self._lengths
+        )
+        self.code[rows], self.tensions[rows], self.direction[rows] = batch.code, batch.tensions, batch.direction
+        self._info[rows] = np.stack([batch.support, batch.shortfall], axis=1)
+
+    def _problem(self, row: int) -> TensionProblem:
+        given = (self.A[row], self.w[row], *self.bounds[:, row])
+        return TensionProblem(*given, t_ref=self.t_ref[row], length=float(self._lengths[0]))
