@@ -292,8 +292,7 @@ class Plant:
         if not math.isfinite(np.vdot(state, state) + np.vdot(command, command)):
             return None
         history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
-        robot = self._bodies, self._cables, self._settings
-        run_rows()(0, 1, *robot, state[None], command[None, None], dt, 1, 1, history, tensions)
+        run_rows()(0, 1, *self.arrays, state[None], command[None, None], dt, 1, 1, history, tensions)
         return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
 
     def run(
@@ -342,9 +341,7 @@ class Plant:
         kept = 1 + steps // keep
         history, tensions = np.empty((count, kept, self.size)), np.empty((count, kept, self.robot.m))
         arguments = (
-            self._bodies,
-            self._cables,
-            self._settings,
+            *self.arrays,
             np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size),
             np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:]),
             period,
@@ -372,6 +369,11 @@ class Plant:
             )
         times = period * keep * np.arange(kept)
         return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return bodies, cables and settings as the kernels read them, see `layout`."""
+        return self._bodies, self._cables, self._settings
 
     def read(self, states: np.ndarray) -> Reading:
         """Return what `states`, (..., n), are: poses [m, rad], velocities, lengths."""
