@@ -1,0 +1,37 @@
+"""`uncontrolled`: the wrenches that neither tensions nor carriers can change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..distribution import tensions
+from ..models.dynamics import dynamics_of
+from ..models.robot import Robot
+
+__all__ = ["uncontrolled"]
+
+STEP = 1e-6  # [m, rad], of a difference quotient
+NONE = 1e-6  # of the largest singular value
+
+
+def uncontrolled(robot: Robot, reach: np.ndarray) -> np.ndarray:
+    """Return wrench directions that a robot at rest at home cannot change, (k, 6), moments over its length [N].
+
+    To first order, by tensions, and by carriers that move where their `reach`, (c, 6) [m, rad], is not zero while the
+    tensions stay. A motion along such a direction of a towed load swings, and no controller damps it.
+    """
+    dynamics, home = dynamics_of(robot), robot.carrier_home
+    found = tensions(robot, robot.home, method="soft-wrench").tensions
+    scale = np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask
+    A = dynamics.wrench_matrix(robot.home, home)
+    columns = [A * robot.force_scale]
+    for index, far in enumerate(reach):
+        for coordinate in np.flatnonzero(far):
+            moved = home.copy()
+            moved[index, coordinate] += STEP
+            change = (dynamics.wrench_matrix(robot.home, moved) - A) @ found / STEP
+            columns.append(far[coordinate] * change[:, None])
+    U, sizes, _ = np.linalg.svd(scale[:, None] * np.hstack(columns))
+    rank = int((sizes > NONE * sizes[0]).sum())
+    beyond = U[:, rank:].T
+    return beyond[np.abs(beyond @ np.diag(robot.dof_mask.astype(float))).max(axis=1) > NONE]

@@ -1,0 +1,285 @@
+"""`ComputedTorque`: a wanted acceleration, the wrench that it needs, and the tensions that give it."""
+
+from __future__ import annotations
+
+import os
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from typing_extensions import override
+
+from ..errors import InputError
+from ..inputs import number, shown
+from ..models.batch import as_array
+from ..models.files import as_robot
+from ..models.plant import layout
+from ..models.plant.packing import bodies_of, cables_of, settings_of
+from ..models.robot import Robot
+from ..solvers.in_place import InPlace
+from ..solvers.kernels.codes import OPTIMAL
+from .authority import uncontrolled
+from .command import HOLD, PLANNED, SOFT, Command
+from .controller import Controller
+from .machine import mechanics, thrusts
+from .mechanics import CARRIERS, DISTURBANCE, GAINS, KD, KI, KP, MEMORY, OBSERVER
+from .reference import Reference
+from .state import State
+
+__all__ = ["ComputedTorque"]
+
+
+class ComputedTorque(Controller):
+    """Control a robot by its inverse dynamics, whatever its cables hang from.
+
+        a* = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral of (x_ref - x)
+        t  = argmin |t - t_ref|^2    s.t.  A t = w(x, v, a*) - d,  t_min <= t <= t_max,  |t - t_last| <= rate dt
+
+    with d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state is answered:
+    with these tensions if there are any ("as planned"), else with those whose wrench is nearest ("soft wrench"), and a
+    state that is no state (nan from a sensor) with the last command, which goes to the planned tensions as fast as the
+    rate permits ("hold"). Carriers follow the reference, or help the tensions within their `reach`: so the loads of
+    towing robots and of teams of quadrotors, with fewer cables than degrees of freedom, do not swing. Quadrotors have
+    loops of their own for place and attitude (see `thrusts`).
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    bandwidth
+        w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2. Default: 10, but 1.5
+        for fewer cables than degrees of freedom, whose load swings with its carriers.
+    damping
+        z of the same: Kd = 2 z w.
+    integral
+        Ki [1/s^3], a number or one for each coordinate; it pauses while a step is not answered as planned.
+    observer
+        Bandwidth of the estimate of the disturbance [rad/s]; 0: none is made.
+    rate
+        Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
+    reach
+        How far carriers may go off their reference to help the tensions (see `reaction`): position [m] and attitude
+        [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may go 0.5 m.
+    carrier_bandwidth, carrier_acceleration
+        Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
+    place, attitude
+        Bandwidths of the loops of flying carriers [rad/s], see `thrusts`.
+    patience
+        How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
+        others do without it. Cables of a fixed length never do.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value.
+    """
+
+    batches = True
+
+    def __init__(
+        self,
+        robot: Robot | str | os.PathLike[str],
+        bandwidth: Any = None,
+        damping: Any = 1.0,
+        integral: Any = 0.0,
+        observer: float = 10.0,
+        rate: Any = None,
+        reach: tuple[float, float] | None = None,
+        carrier_bandwidth: float = 6.0,
+        carrier_acceleration: float = 5.0,
+        place: float = 5.0,
+        attitude: float = 40.0,
+        patience: float = 0.05,
+    ):
+        self.robot = as_robot(robot)
+        few = self.robot.m < len(self.robot.platform.dof)
+        w = _positive("bandwidth", (1.5 if few else 10.0) if bandwidth is None else bandwidth, 6)
+        z = _positive("damping", damping, 6)
+        self._gains = np.zeros((GAINS, 6))
+        self._gains[KP], self._gains[KD], self._gains[KI] = w**2, 2 * z * w, _positive("integral", integral, 6)
+        self._gains[OBSERVER] = number("observer", observer, 0.0, 1e4)
+        self._gains[CARRIERS, :2] = (
+            number("carrier_bandwidth", carrier_bandwidth, 0.0, 1e3),
+            number("carrier_acceleration", carrier_acceleration, 0.0, 1e4),
+        )
+        patience = number("patience", patience, 1e-6, 1e6)
+        self._patience = patience if self.robot.fixed_lengths is None else np.inf
+        self._reach = _reach(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
+        fastest = np.full(self.robot.m, np.inf) if rate is None else _positive("rate", rate, self.robot.m)
+        self._limits = np.stack([self.robot.t_min, self.robot.t_max, fastest])
+        bodies = bodies_of(self.robot)
+        bodies[:, layout.MOTION] = layout.FREE  # where they are is measured, whatever moves them
+        none, platform = np.zeros(self.robot.m), self.robot.platform
+        settings = np.array([*settings_of(self.robot), *platform.com, platform.mass])
+        self._robot = (bodies, cables_of(self.robot, none, none), settings, self.robot.dof_mask.astype(float))
+        self._write = mechanics()
+        self._inverses, self._actuators = _inverses(self.robot)
+        self._loops = np.array([number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3)])
+        self._thrusts = thrusts() if self._inverses.any() else None
+        self.reset()
+
+    @override
+    def reset(self) -> None:
+        self._begin(1)
+
+    @property
+    def disturbance(self) -> np.ndarray:
+        """Return the estimated force [N] and moment about the CoM [N m] beside cables and weight, (n, 6)."""
+        return self._memory[:, DISTURBANCE].copy()
+
+    @property
+    def uncontrolled(self) -> np.ndarray:
+        """Return what the controller cannot change at home: wrench directions (k, 6), moments over the length [N]."""
+        reach = self._reach if len(self._reach) else np.zeros((len(self.robot.carriers), 6))
+        return uncontrolled(self.robot, reach)
+
+    def _begin(self, rows: int) -> None:
+        """Make the memory of one robot, or of as many as a batch has rows."""
+        m, count = self.robot.m, len(self.robot.carriers)
+        self._time: float | None = None
+        self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
+        self._pulls, self._integrates = np.zeros((rows, 2, m)), np.ones(rows, dtype=bool)
+        self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
+        # Carriers have a command of their own where they react or fly.
+        self._carriers = np.zeros((rows, count if self._thrusts or len(self._reach) else 0, 3, 6))
+        self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
+        self._held = np.zeros_like(self._actuation)
+        self._problems = InPlace(rows, 6, m, self.robot.length)
+        self._silent = np.zeros((rows, m))
+        given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._silent)
+        results = (self._carriers, self._problems.A, self._problems.w, self._problems.bounds)
+        self._arrays = (*given, self._integrates, self._memory, self._reactions, *results)
+        self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
+        self._paused = False  # whether the integral of a row does
+        self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
+
+    @override
+    def step(self, time: float, state: State, reference: Reference) -> Command:
+        """Return the command for the time from `time` [s] until the next step.
+
+        Raises
+        ------
+        InputError
+            If the time is not later than that of the step before, or an array does not have the shape of the robot's.
+        """
+        if not isinstance(state, State):
+            raise InputError(f"state must be a State, got {shown(state)}")
+        if not isinstance(reference, Reference):
+            raise InputError(f"reference must be a Reference, got {shown(reference)}")
+        if not isinstance(time, float | int) or not isfinite(time):
+            raise InputError(f"time must be a finite number [s], got {shown(time)}")
+        alone = np.ndim(state.pose) == 1
+        rows = 1 if alone else len(state.pose)
+        if rows != len(self._wanted):
+            self._begin(rows)
+        dt = 0.0 if self._time is None else time - self._time
+        if not (dt > 0 or self._time is None):
+            raise InputError(
+                f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
+            )
+        self._take(state, reference)
+        self._write(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
+        problems, answered, proof = self._problems, self._as_planned, self._nowhere
+        if not problems.solve():
+            answered, proof = self._answer_others(), (problems.direction.copy(), problems.shortfall.copy())
+            self._integrates[:] = answered == PLANNED
+        elif self._paused:
+            self._integrates[:] = True
+        self._paused = answered is not self._as_planned
+        tensions = problems.tensions.copy()
+        self._time, self._pulls[:, 1] = time, tensions
+        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
+        if len(self._carriers[0]):
+            own = self._carriers.copy()
+            own = own[0] if alone else own
+            carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
+        actuation = None
+        if self._thrusts is not None:
+            self._thrusts(
+                self._robot, self._loops, self._inverses, self._measured, self._carriers, tensions, self._actuation
+            )
+            # A state that is no state leaves its actuators as they were.
+            inside = np.clip(self._actuation, *self._actuators)
+            actuation = self._held = np.where(np.isfinite(inside), inside, self._held)
+        if alone:
+            own = None if actuation is None else actuation[0]
+            return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)
+        pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
+        return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
+
+    def _take(self, state: State, reference: Reference) -> None:
+        """Copy a state and a reference to where the kernel reads them."""
+        measured, wanted, pulls = self._measured, self._wanted, self._pulls
+        try:
+            measured[:, 0, :6], measured[:, 0, 6:] = state.pose, state.velocity
+            measured[:, 1:, :6], measured[:, 1:, 6:] = state.carrier_pose, state.carrier_velocity
+            wanted[:, :6], wanted[:, 6:12], wanted[:, 12:] = reference[:3]
+            if len(self._carriers[0]):
+                for order in range(3):
+                    self._carriers[:, :, order] = reference[3 + order]
+            self._problems.t_ref[:] = 0.0 if reference.tensions is None else reference.tensions
+            pulls[:, 0] = pulls[:, 1] if state.tensions is None else state.tensions
+        except (ValueError, TypeError):
+            raise InputError(self._misfit(state, reference)) from None
+
+    def _misfit(self, state: State, reference: Reference) -> str:
+        """Return which array of a state or a reference does not fit the robot."""
+        m, count = self.robot.m, len(self.robot.carriers)
+        for given in (state, reference):
+            for name, value in given._asdict().items():
+                core = (m,) if name == "tensions" else (count, 6) if name.startswith("carrier") else (6,)
+                shape = np.shape(value) if value is not None else core
+                if shape[-len(core) :] != core or shape[: -len(core)] not in ((), (len(self._wanted),)):
+                    return f"{type(given).__name__.lower()}.{name} must be of shape {_shape(core)}, got shape {shape}"
+        return "state and reference must be arrays of numbers"
+
+    def _answer_others(self) -> np.ndarray:
+        """Give rows without tensions a command, and return how each row was answered."""
+        problems = self._problems
+        answered = np.where(problems.code == OPTIMAL, PLANNED, SOFT).astype(np.int8)
+        for row in np.flatnonzero(~np.isfinite(problems.tensions).all(axis=1)):
+            answered[row] = HOLD
+            last, reference = self._pulls[row, 1], problems.t_ref[row]
+            target = np.where(np.isfinite(reference), reference, last)
+            problems.tensions[row] = np.clip(target, *problems.bounds[:, row])
+        return answered
+
+
+def _reach(robot: Robot, reach: Any) -> np.ndarray:
+    """Return how far each coordinate of each carrier may go, (c, 6); (0, 6) if none may."""
+    far = as_array("reach", reach, (2,))
+    if far.shape != (2,) or not ((far >= 0) & (far <= [1e3, 1.0])).all():
+        raise InputError(f"reach must be a distance [m] and an angle up to 1 rad, got {shown(reach)}")
+    result = np.zeros((len(robot.carriers), 6))
+    for row, carrier in zip(result, robot.carriers, strict=True):
+        free = list(carrier.free_coordinates(robot.drive))
+        row[free] = np.repeat(far, 3)[free]
+        if carrier.efforts:
+            row[3:] = 0.0  # its attitude follows from its thrust
+    return result if result.any() else np.zeros((0, 6))
+
+
+def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return the commands for units of force and moment on each carrier, (c, a, 6), and their limits, (2, c, a)."""
+    most = max(len(carrier.actuators) for carrier in robot.carriers)
+    inverses, limits = np.zeros((len(robot.carriers), most, 6)), np.zeros((2, len(robot.carriers), most))
+    for index, carrier in enumerate(robot.carriers):
+        if actuators := carrier.actuators:
+            inverses[index, : len(actuators)] = np.linalg.pinv(np.array([each.wrench for each in actuators]).T)
+            limits[:, index, : len(actuators)] = np.array([(each.low, each.high) for each in actuators]).T
+    return inverses, limits
+
+
+def _positive(name: str, value: Any, size: int) -> np.ndarray:
+    result = as_array(name, value, () if np.ndim(value) == 0 else (size,))
+    if result.ndim > 1 or not ((result >= 0) & (result <= 1e9)).all():
+        raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")
+    return np.broadcast_to(result, size)
+
+
+def _for_all(value: np.ndarray, rows: int) -> np.ndarray:
+    return np.broadcast_to(value, (rows, *np.shape(value)[-2:]))
+
+
+def _shape(core: tuple[int, ...]) -> str:
+    return f"(..., {', '.join(map(str, core))})"

@@ -1,0 +1,42 @@
+"""Compile the kernels of a step, together with those of the plant for bodies and cables that they use."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from ..models.kernel import Kernel, compile_function
+from ..models.plant import machine
+from ..models.plant.machine import joined
+
+__all__ = ["mechanics", "thrusts"]
+
+_PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
+_SHARED = tuple(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines"))
+_MECHANICS = (*_SHARED, _HERE / "reaction.py", _HERE / "mechanics.py")
+_ROBOT = "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1]))"
+_OF_ROWS = (
+    f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64[:, :, ::1], "
+    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], boolean[::1], float64[:, :, ::1], "
+    "float64[:, :, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1])"
+)
+_OF_THRUSTS = (
+    f"void({_ROBOT}, float64[::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, ::1], "
+    "float64[:, :, ::1])"
+)
+
+
+@cache
+def mechanics() -> Kernel:
+    """Return `mechanics.write_rows` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled(_MECHANICS, "write_rows", _OF_ROWS)
+
+
+@cache
+def thrusts() -> Kernel:
+    """Return `thrusts.write_thrusts` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled((*_MECHANICS, _HERE / "thrusts.py"), "write_thrusts", _OF_THRUSTS)
+
+
+def _compiled(modules: tuple[Path, ...], name: str, signature: str) -> Kernel:
+    return compile_function(joined(modules, name), name, signature)

@@ -1,0 +1,265 @@
+"""Kernel: what one step of a controller needs of a robot's mechanics, for each row of a batch.
+
+    a* = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral           in the coordinates of the pose, angles by turns
+    w  = (m (a_c - g), R (J alpha + Omega x J Omega)) - d                 about the CoM
+    d  = K (p - p_0 - integral of (A t + m g + d))                        the estimated disturbance, p the momentum
+
+The Euler angles' derivatives give the rate Omega and its derivative alpha in the platform's axes. Carriers take part by
+their places alone: what they do moves the anchors, not the platform.
+"""
+
+import math
+
+import numpy as np
+
+from ..models.plant.bodies import place_bodies, set_quaternion
+from ..models.plant.layout import (
+    ARM,
+    BODY,
+    BODY_WORK,
+    CABLE_BLOCKS,
+    CABLE_WORK,
+    CARRIER,
+    COMMANDS,
+    GRAVITY,
+    INERTIA,
+    OMEGA,
+    QUATERNION,
+    RATE,
+    SETTINGS,
+    VELOCITY,
+    U,
+)
+from ..models.plant.lines import run_cables
+from .reaction import add_offsets, react
+
+# Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has the bandwidth of their
+# reaction and its largest acceleration.
+KP, KD, KI, OBSERVER, CARRIERS, GAINS = 0, 1, 2, 3, 4, 5
+COM, TOTAL_MASS = SETTINGS, SETTINGS + 3
+# Rows of `limits`, and tensions that a cable reports after it is cut and may be commanded before, of its upper limit.
+LOWEST, HIGHEST, RATE_MAX = 0, 1, 2
+NOTHING, SOMETHING = 1e-4, 1e-3
+# Rows of `memory`: integral of the error, estimated disturbance, and momentum less what the estimate explains.
+INTEGRAL, DISTURBANCE, EXPLAINED, MEMORY = 0, 1, 2, 3
+
+
+def write_rows(
+    robot,
+    gains,
+    limits,
+    reach,
+    patience,
+    dt,
+    measured,
+    reference,
+    t_ref,
+    pulls,
+    silent,
+    integrates,
+    memory,
+    reactions,
+    carriers,
+    A,
+    w,
+    bounds,
+):
+    """Update the memory of each row of a batch, and write its wrench matrix, wrench and bounds of tensions.
+
+    A row with a number that is not finite keeps its memory, and gets a wrench of nan.
+
+    Parameters
+    ----------
+    robot
+        Bodies, each of them free, cables and settings in the columns of `layout`, and (6,), 1 for the platform's
+        degrees of freedom, else 0.
+    gains
+        (5, 6), rows KP, KD, KI, OBSERVER and CARRIERS.
+    limits
+        (3, m), rows LOWEST and HIGHEST tension [N] and RATE_MAX [N/s].
+    reach
+        (c, 6), how far carriers may go off their reference to help the tensions [m, rad]; (0, 6): they do not.
+    patience
+        For how long a cable may report no tension where one is commanded until it counts as cut [s].
+    dt
+        Time since the last step [s]; 0 in the first one, which starts the memory and has no bounds by rates.
+    measured
+        (N, 1 + c, 12), pose and velocity of the platform and of each carrier.
+    reference
+        (N, 18), pose, velocity and acceleration of the platform.
+    t_ref
+        (N, m), tensions to stay near [N].
+    pulls
+        (N, 2, m), tensions since the last step, by sensors or else as commanded, and the last command [N].
+    silent
+        (N, m), for how long each cable has reported no tension where one was commanded [s].
+    integrates
+        (N,), whether the integral goes on.
+    memory
+        (N, 3, 6), rows INTEGRAL, DISTURBANCE and EXPLAINED.
+    reactions, carriers
+        (N, 2, c, 6) and (N, c, 3, 6), see `reaction.react`.
+    A, w, bounds
+        Results, (N, 6, m), (N, 6) and (2, N, m).
+    """
+    bodies, cables, settings, mask = robot
+    count, m = bodies.shape[0], cables.shape[0]
+    places = BODY * count
+    state, wanted, momentum = np.zeros(places + CABLE_BLOCKS * m), np.zeros(6), np.zeros(6)
+    command = np.zeros(COMMANDS + m + CARRIER * count)
+    on_bodies, on_cables = np.zeros((count, BODY_WORK)), np.zeros((m, CABLE_WORK))
+    columns, gram = np.zeros((6 * reach.shape[0], 6)), np.zeros((6, 7))
+    for row in range(measured.shape[0]):
+        write_bounds(limits, patience, dt, pulls[row], silent[row], bounds[:, row])
+        if not is_finite(measured[row], reference[row], pulls[row]):
+            for k in range(6):
+                w[row, k] = math.nan
+            if reach.shape[0] > 0:
+                add_offsets(reactions[row], carriers[row])
+            continue
+        for b in range(count):
+            put_body(state, BODY * b, measured[row, b])
+        place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
+        move_to_com(settings, state, on_bodies)
+        run_cables(cables, state, on_bodies, on_cables, places)
+        write_wrench_matrix(mask, on_cables, A[row])
+        for k in range(6):
+            error = reference[row, k] - measured[row, 0, k]
+            if k >= 3:
+                error -= 2.0 * math.pi * math.floor(error / (2.0 * math.pi) + 0.5)
+            if integrates[row]:
+                memory[row, INTEGRAL, k] += dt * error
+            wanted[k] = reference[row, 12 + k] + gains[KP, k] * error + gains[KI, k] * memory[row, INTEGRAL, k]
+            wanted[k] += gains[KD, k] * (reference[row, 6 + k] - measured[row, 0, 6 + k])
+        write_wrench(bodies, settings, state, wanted, measured[row, 0], on_bodies, w[row], momentum)
+        observe(settings, mask, gains, dt, A[row], pulls[row, 0], momentum, memory[row])
+        for k in range(6):
+            w[row, k] = mask[k] * (w[row, k] - memory[row, DISTURBANCE, k])
+        if reach.shape[0] > 0:
+            react(
+                settings, gains[CARRIERS], dt, reach, cables, on_cables, A[row], w[row], t_ref[row], reactions[row],
+                columns, gram, carriers[row],
+            )  # fmt: skip
+
+
+def write_bounds(limits, patience, dt, pulls, silent, bounds):
+    """Write the bounds of a row's tensions: limits and rates, and zero for a cable that is cut."""
+    for i in range(limits.shape[1]):
+        step, last, highest = limits[RATE_MAX, i] * dt, pulls[1, i], limits[HIGHEST, i]
+        if pulls[0, i] <= NOTHING * highest and last >= SOMETHING * highest:
+            silent[i] += dt
+        elif silent[i] < patience:
+            silent[i] = 0.0
+        if silent[i] >= patience:
+            bounds[0, i] = bounds[1, i] = 0.0
+        elif dt > 0.0:
+            bounds[0, i] = min(max(limits[LOWEST, i], last - step), highest)
+            bounds[1, i] = max(min(highest, last + step), limits[LOWEST, i])
+        else:
+            bounds[0, i], bounds[1, i] = limits[LOWEST, i], highest
+
+
+def is_finite(measured, reference, pulls):
+    """Return whether all numbers of a row are finite."""
+    total = 0.0
+    for b in range(measured.shape[0]):
+        for k in range(12):
+            total += 0.0 * measured[b, k]
+    for k in range(18):
+        total += 0.0 * reference[k]
+    for i in range(pulls.shape[1]):
+        total += 0.0 * pulls[0, i]
+    return total == 0.0
+
+
+def observe(settings, mask, gains, dt, A, pull, momentum, memory):
+    """Update the estimated disturbance, whose change since the last step A t + m g + d does not explain."""
+    for k in range(6):
+        known = 0.0
+        if dt > 0.0:
+            known = settings[TOTAL_MASS] * settings[GRAVITY + k] if k < 3 else 0.0
+            for i in range(A.shape[1]):
+                known += A[k, i] * pull[i]
+            known += memory[DISTURBANCE, k]
+        else:
+            memory[EXPLAINED, k] = momentum[k]
+        memory[EXPLAINED, k] += dt * known
+        gain = gains[OBSERVER, k] if dt * gains[OBSERVER, k] < 1.0 else 1.0 / dt
+        memory[DISTURBANCE, k] = mask[k] * gain * (momentum[k] - memory[EXPLAINED, k])
+
+
+def move_to_com(settings, state, on_bodies):
+    """Make the platform's block, written for its frame, that of its CoM."""
+    cx, cy, cz = turned(on_bodies, settings[COM], settings[COM + 1], settings[COM + 2])
+    ox, oy, oz = on_bodies[0, OMEGA], on_bodies[0, OMEGA + 1], on_bodies[0, OMEGA + 2]
+    state[0] += cx
+    state[1] += cy
+    state[2] += cz
+    state[VELOCITY] += oy * cz - oz * cy
+    state[VELOCITY + 1] += oz * cx - ox * cz
+    state[VELOCITY + 2] += ox * cy - oy * cx
+
+
+def write_wrench_matrix(mask, on_cables, A):
+    """Write the columns (u, r x u), with zeros where the platform has no freedom."""
+    for i in range(A.shape[1]):
+        ux, uy, uz = on_cables[i, U], on_cables[i, U + 1], on_cables[i, U + 2]
+        rx, ry, rz = on_cables[i, ARM], on_cables[i, ARM + 1], on_cables[i, ARM + 2]
+        A[0, i], A[1, i], A[2, i] = mask[0] * ux, mask[1] * uy, mask[2] * uz
+        A[3, i] = mask[3] * (ry * uz - rz * uy)
+        A[4, i] = mask[4] * (rz * ux - rx * uz)
+        A[5, i] = mask[5] * (rx * uy - ry * ux)
+
+
+def put_body(state, at, motion):
+    """Write the block of a body, of its frame, from its pose and velocity (12,)."""
+    for k in range(3):
+        state[at + k], state[at + VELOCITY + k] = motion[k], motion[6 + k]
+    set_quaternion(state, at + QUATERNION, motion[3], motion[4], motion[5])
+    sr, cr, sp, cp = math.sin(motion[3]), math.cos(motion[3]), math.sin(motion[4]), math.cos(motion[4])
+    state[at + RATE] = motion[9] - sp * motion[11]
+    state[at + RATE + 1] = cr * motion[10] + sr * cp * motion[11]
+    state[at + RATE + 2] = -sr * motion[10] + cr * cp * motion[11]
+
+
+def turned(on_bodies, x, y, z):
+    """Return a vector of the platform's frame in {G}."""
+    return (
+        on_bodies[0, 0] * x + on_bodies[0, 1] * y + on_bodies[0, 2] * z,
+        on_bodies[0, 3] * x + on_bodies[0, 4] * y + on_bodies[0, 5] * z,
+        on_bodies[0, 6] * x + on_bodies[0, 7] * y + on_bodies[0, 8] * z,
+    )
+
+
+def write_wrench(bodies, settings, state, wanted, motion, on_bodies, w, momentum):
+    """Write the wrench of a wanted acceleration of the pose, and the momentum, both about the CoM in {G}."""
+    roll, pitch, d_roll, d_pitch, d_yaw = motion[3], motion[4], motion[9], motion[10], motion[11]
+    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    p, q, r = state[RATE], state[RATE + 1], state[RATE + 2]
+    ap = wanted[3] - sp * wanted[5] - cp * d_pitch * d_yaw
+    aq = cr * wanted[4] - sr * d_roll * d_pitch + sr * cp * wanted[5]
+    aq += (cr * cp * d_roll - sr * sp * d_pitch) * d_yaw
+    ar = -sr * wanted[4] - cr * d_roll * d_pitch + cr * cp * wanted[5]
+    ar -= (sr * cp * d_roll + cr * sp * d_pitch) * d_yaw
+    J = bodies[0, INERTIA : INERTIA + 9]
+    hx = J[0] * p + J[1] * q + J[2] * r
+    hy = J[3] * p + J[4] * q + J[5] * r
+    hz = J[6] * p + J[7] * q + J[8] * r
+    nx = J[0] * ap + J[1] * aq + J[2] * ar + q * hz - r * hy
+    ny = J[3] * ap + J[4] * aq + J[5] * ar + r * hx - p * hz
+    nz = J[6] * ap + J[7] * aq + J[8] * ar + p * hy - q * hx
+    w[3], w[4], w[5] = turned(on_bodies, nx, ny, nz)
+    momentum[3], momentum[4], momentum[5] = turned(on_bodies, hx, hy, hz)
+    # The CoM accelerates as the frame does, and by alpha x c + Omega x (Omega x c).
+    cx, cy, cz = settings[COM], settings[COM + 1], settings[COM + 2]
+    ux, uy, uz = q * cz - r * cy, r * cx - p * cz, p * cy - q * cx
+    ax = aq * cz - ar * cy + q * uz - r * uy
+    ay = ar * cx - ap * cz + r * ux - p * uz
+    az = ap * cy - aq * cx + p * uy - q * ux
+    ax, ay, az = turned(on_bodies, ax, ay, az)
+    mass = settings[TOTAL_MASS]
+    w[0] = mass * (wanted[0] + ax - settings[GRAVITY])
+    w[1] = mass * (wanted[1] + ay - settings[GRAVITY + 1])
+    w[2] = mass * (wanted[2] + az - settings[GRAVITY + 2])
+    for k in range(3):
+        momentum[k] = mass * state[VELOCITY + k]

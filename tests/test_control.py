@@ -1,0 +1,224 @@
+"""One step of control: the wrench of a wanted acceleration, tensions in every case, and what acts beside the cables."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State
+from towline.distribution import tensions as distribute
+from towline.errors import InputError
+from towline.models import Dynamics, load
+from towline.simulation import simulate
+
+ROBOTS = ["cogiro", "wang-flying", "caroca-pulleys", "planar-4", "wang-ctmrts-6", "multi-quadrotor-4", "flycrane"]
+
+
+def at_home(robot, rows=None):
+    """Return a state and a reference at rest at home, for one robot or for a batch."""
+    lead = () if rows is None else (rows,)
+    pose, carriers = np.tile(robot.home, (*lead, 1)), np.tile(robot.carrier_home, (*lead, 1, 1))
+    state = State(pose, np.zeros_like(pose), carriers, np.zeros_like(carriers))
+    return state, Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, *(0 * robot.carrier_home,) * 2)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_problem_of_a_step_is_that_of_the_symbolic_dynamics(name):
+    """The kernel goes by bodies with quaternions, `Dynamics` by Euler angles and CasADi."""
+    robot, rng, rows = load(name), np.random.default_rng(5), 40
+    dynamics, c = Dynamics(robot), len(robot.carriers)
+    pose = robot.home + rng.normal(scale=0.2, size=(rows, 6)) * robot.dof_mask
+    velocity = rng.normal(size=(rows, 6)) * robot.dof_mask
+    carriers = robot.carrier_home + rng.normal(scale=0.1, size=(rows, c, 6))
+    moving = rng.normal(size=(rows, c, 6))
+    wanted, speed = rng.normal(size=(rows, 6)) * robot.dof_mask, rng.normal(size=(rows, 6)) * robot.dof_mask
+    still = np.zeros((c, 6))
+    controller = ComputedTorque(name, bandwidth=2.0, damping=0.7, observer=0.0, reach=(0.0, 0.0))
+    controller.step(
+        0.0, State(pose, velocity, carriers, moving), Reference(robot.home, speed, wanted, carriers, still, still)
+    )
+    acceleration = wanted + 2 * 0.7 * 2.0 * (speed - velocity) + 4.0 * (robot.home - pose)
+    w = (
+        dynamics.required_wrench(pose, velocity, acceleration, carriers, moving, np.zeros((rows, c, 6)))
+        * robot.dof_mask
+    )
+    A = dynamics.wrench_matrix(pose, carriers) * robot.dof_mask[:, None]
+    np.testing.assert_allclose(controller._problems.A, A, atol=1e-12)
+    np.testing.assert_allclose(controller._problems.w, w, rtol=1e-11, atol=1e-11 * np.abs(w).max())
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-2", "wang-flying"])
+def test_a_step_gives_the_tensions_of_the_distribution(name):
+    robot = load(name)
+    state, reference = at_home(robot)
+    t_ref = robot.t_min + 0.1 * (robot.t_max - robot.t_min)
+    command = ComputedTorque(name).step(0.0, state, reference._replace(tensions=t_ref))
+    assert ANSWERS[command.answered] == "as planned"
+    expected = distribute(name, robot.home, t_ref=t_ref).tensions
+    np.testing.assert_allclose(command.tensions, expected, atol=1e-9 * robot.t_max.max())
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_state_is_answered_inside_limits_and_rates(name):
+    """Far off, infeasible, singular, with numbers that are none: a command, and how it was answered."""
+    robot, rng, rows, steps = load(name), np.random.default_rng(11), 200, 25
+    low, high = robot.t_min, robot.t_max
+    rate = 0.3 * (high - low) / 1e-3
+    controller, last = ComputedTorque(name, rate=rate / 10), None
+    state, reference = at_home(robot, rows)
+    answers = set()
+    for k in range(steps):
+        scale = 10.0 ** rng.uniform(-3, 2, (rows, 1))
+        pose = state.pose + scale * rng.normal(size=(rows, 6)) * robot.dof_mask
+        velocity = scale * rng.normal(size=(rows, 6))
+        carriers = state.carrier_pose + scale[:, None] * rng.normal(size=state.carrier_pose.shape)
+        pose[rng.random(rows) < 0.03, rng.integers(6)] = rng.choice([np.nan, np.inf, -np.inf])
+        pose[rng.random(rows) < 0.03, :3] = robot.anchors[0]
+        command = controller.step(1e-3 * k, State(pose, velocity, carriers, state.carrier_velocity), reference)
+        assert np.isfinite(command.tensions).all()
+        assert ((command.tensions >= low) & (command.tensions <= high)).all()
+        if last is not None:
+            assert (np.abs(command.tensions - last) <= rate / 10 * 1e-3 * (1 + 1e-9)).all()
+        last = command.tensions
+        assert np.isfinite(command.carrier_pose).all()
+        assert command.actuation is None or np.isfinite(command.actuation).all()
+        answers |= {ANSWERS[answer] for answer in command.answered}
+        proven = np.isfinite(command.direction).all(axis=1)
+        along = np.einsum("nj,nji->ni", command.direction[proven], controller._problems.A[proven])
+        bounds = controller._problems.bounds[:, proven]
+        most = np.where(along > 0, along * bounds[1], along * bounds[0]).sum(axis=1)
+        gap = np.einsum("nj,nj->n", command.direction[proven], controller._problems.w[proven]) - most
+        assert (gap > 0).all(), "a direction along which every tension inside the bounds misses the wrench"
+    assert {"soft wrench", "hold"} <= answers
+
+
+def test_a_row_of_a_batch_is_answered_as_it_is_alone():
+    robot, rng = load("wang-flying"), np.random.default_rng(2)
+    state, reference = at_home(robot, 5)
+    together, alone = ComputedTorque(robot, rate=500), ComputedTorque(robot, rate=500)
+    for k in range(20):
+        pose = state.pose + rng.normal(scale=0.02, size=(5, 6))
+        moved = state._replace(pose=pose)
+        batch = together.step(1e-3 * k, moved, reference)
+        single = alone.step(1e-3 * k, State(*(part[3] for part in moved[:4])), reference)
+        np.testing.assert_array_equal(batch.tensions[3], single.tensions)
+        assert batch.answered[3] == single.answered
+
+
+def test_an_error_decays_as_the_bandwidth_says():
+    """A critically damped error: e(t) = e_0 (1 + w t) exp(-w t)."""
+    robot = load("cogiro")
+    pose = robot.home + np.array([0.0, 0.0, 0.01, 0, 0, 0])
+
+    class Step:
+        natural_duration, frame = 1.0, "world"
+
+        def at(self, times, duration):
+            poses = np.tile(robot.home, (len(times), 1))
+            poses[times == 0] = pose
+            return poses, np.zeros_like(poses), np.zeros_like(poses)
+
+    flight = simulate(robot, Step(), ComputedTorque(robot, bandwidth=8.0, observer=0.0), period=2e-4)
+    away = flight.record.motions[:, 0, 2] - robot.home[2]
+    times = flight.times
+    np.testing.assert_allclose(away[1:], (0.01 * (1 + 8 * times) * np.exp(-8 * times))[1:], atol=2e-5)
+
+
+def test_the_observer_finds_a_force_and_a_moment_that_nobody_reports():
+    robot, push = load("ipanema-1"), np.array([30.0, -20, 10, 1, -2, 0.5])
+    pose = robot.home.copy()
+    controller = ComputedTorque(robot, observer=20.0)
+    flight = simulate(robot, pose, controller, duration=1.0, disturbance=push)
+    np.testing.assert_allclose(controller.disturbance[0], push, atol=1e-3)
+    without = simulate(robot, pose, ComputedTorque(robot, observer=0.0), duration=1.0, disturbance=push)
+    # Without it the stiffness Kp m holds the force at the distance F / (m w^2).
+    expected = np.linalg.norm(push[:3]) / (robot.platform.mass * 10.0**2)
+    assert without.error[-1] == pytest.approx(expected, rel=0.05)
+    assert flight.error[-1] < 1e-3 * without.error[-1] + 1e-6
+
+
+def test_a_base_that_may_react_gives_back_what_a_side_force_takes_of_the_tensions():
+    """It goes where the cables carry weight and force with nearly the tensions that carried the weight."""
+    robot, push = load("wang-flying"), np.array([0.6, 0.3, 0.0, 0.0, 0.0, 0.0])
+    planned = distribute(robot, robot.home).tensions
+    changes = []
+    for reach in ((0.0, 0.0), (0.5, 0.3)):
+        controller = ComputedTorque(robot, reach=reach)
+        flight = simulate(robot, robot.home, controller, duration=5.0, disturbance=push)
+        assert flight.error[-1] < 1e-4
+        changes.append(np.abs(flight.record.tensions[-1] - planned).max())
+    assert changes[1] < 0.2 * changes[0]
+    dynamics, motion = Dynamics(robot), flight.record.motions[-1]
+    w = dynamics.required_wrench(robot.home, *np.zeros((2, 6)), motion[1:, :6], *np.zeros((2, 1, 6))) - push
+    A = dynamics.wrench_matrix(motion[0, :6], motion[1:, :6])
+    np.testing.assert_allclose(A @ flight.record.tensions[-1], w, atol=2e-3)
+
+
+def test_a_team_hovers_with_the_thrust_that_statics_requires():
+    """At rest each thrust is the weight of its quadrotor and the pull of its cable, as vectors."""
+    robot = load("multi-quadrotor-3")
+    solution = distribute(robot, robot.home)
+    state, reference = at_home(robot)
+    command = ComputedTorque(robot).step(0.0, state, reference._replace(tensions=solution.tensions))
+    directions = robot.home_anchors - robot.home_attachments
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    for index, carrier in enumerate(robot.carriers):
+        (cable,) = np.flatnonzero(robot.carrier_of_cable == index)
+        force = -carrier.body.mass * np.array(robot.gravity) + command.tensions[cable] * directions[cable]
+        axis = Rotation.from_euler("xyz", robot.carrier_home[index, 3:]).as_matrix()[:, 2]
+        assert command.actuation[index, 0] == pytest.approx(force @ axis, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"bandwidth": -1}, "bandwidth"),
+        ({"bandwidth": [1, 2]}, "bandwidth"),
+        ({"damping": np.nan}, "damping"),
+        ({"integral": "much"}, "integral"),
+        ({"observer": np.inf}, "observer"),
+        ({"rate": [1, 2]}, "rate"),
+        ({"reach": 3}, "reach"),
+        ({"reach": (0.1, 4)}, "reach"),
+        ({"robot": "no-such-robot"}, "no-such-robot"),
+    ],
+)
+def test_wrong_gains_are_refused_in_one_line(arguments, message):
+    with pytest.raises(InputError, match=message) as error:
+        ComputedTorque(**{"robot": "cogiro"} | arguments)
+    assert "\n" not in str(error.value)
+
+
+def test_wrong_steps_are_refused_in_one_line():
+    robot = load("cogiro")
+    controller, (state, reference) = ComputedTorque(robot), at_home(robot)
+    controller.step(0.0, state, reference)
+    with pytest.raises(InputError, match="time must increase"):
+        controller.step(0.0, state, reference)
+    with pytest.raises(InputError, match=r"state.velocity must be of shape \(..., 6\), got shape \(3,\)"):
+        controller.step(1.0, state._replace(velocity=np.zeros(3)), reference)
+    with pytest.raises(InputError, match=r"reference.tensions must be of shape"):
+        controller.step(1.0, state, reference._replace(tensions=np.zeros(5)))
+
+
+def test_what_three_cables_cannot_control_their_robots_can_and_nothing_else():
+    """Without motion of the robots all wrenches at right angles to the three cables; with it none is left."""
+    robot = load("wang-ctmrts")
+    fixed = ComputedTorque(robot, reach=(0.0, 0.0)).uncontrolled
+    A = Dynamics(robot).wrench_matrix(robot.home, robot.carrier_home) / np.repeat([1.0, robot.length], 3)[:, None]
+    assert fixed.shape == (3, 6)
+    np.testing.assert_allclose(fixed @ A, 0, atol=1e-6)
+    assert ComputedTorque(robot).uncontrolled.shape == (0, 6)
+    assert ComputedTorque("cogiro").uncontrolled.shape == (0, 6)
+
+
+def test_open_loop_orders_the_plan_and_drifts_where_computed_torque_stays():
+    """An unstable pose: the platform hangs below a base that gusts do not move, and nobody answers a push."""
+    robot, push = load("wang-flying"), np.array([0.2, 0, 0, 0, 0, 0])
+    adrift = simulate(robot, robot.home, OpenLoop(robot), duration=0.5, disturbance=push)
+    stays = simulate(robot, robot.home, duration=0.5, disturbance=push)
+    assert (adrift.record.commanded == adrift.record.commanded[0]).all()
+    first = adrift.error[100]  # while the cables' directions are nearly what they were: a free mass
+    assert first == pytest.approx(0.5 * 0.2 / robot.platform.mass * 0.1**2, rel=0.1)
+    assert adrift.error[-1] > 10 * stays.error[-1]
+    with pytest.raises(InputError, match="quad1"):
+        OpenLoop("multi-quadrotor-3")
