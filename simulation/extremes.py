@@ -1,0 +1,49 @@
+"""`Extremes`: what is kept of each of many flights: errors, extreme tensions, slack, and how steps were answered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..control import ANSWERS, Command, Reference
+
+__all__ = ["Extremes"]
+
+
+class Extremes:
+    """Keep a few numbers of each flight while it is flown.
+
+    Attributes
+    ----------
+    squares, error_max
+        Sum of the squared errors of the position, and the largest error [m], (N,).
+    tension_min, tension_max
+        Extreme tensions [N], (N,).
+    slack
+        How many periods begin with a slack cable that should pull, (N,).
+    exceeded
+        By how much tensions are above their upper limits at most, in proportion to the cable's range, (N,).
+    answers
+        How many steps were answered in each way of `ANSWERS`, (N, 4).
+    """
+
+    def __init__(self, references: Sequence[Reference], t_min: np.ndarray, t_max: np.ndarray, flights: int):
+        self._references, self._taut, self._t_max, self._range = references, t_min > 0, t_max, t_max - t_min
+        self._rows = np.arange(flights)
+        self.squares, self.error_max, self.slack = np.zeros(flights), np.zeros(flights), np.zeros(flights, dtype=int)
+        self.tension_min, self.tension_max = np.full(flights, np.inf), np.full(flights, -np.inf)
+        self.exceeded = np.zeros(flights)
+        self.answers = np.zeros((flights, len(ANSWERS)), dtype=int)
+
+    def take(self, k: int, motions: np.ndarray, lengths: np.ndarray, tensions: np.ndarray, command: Command) -> None:
+        """Keep a period; see `flying.Recorder`."""
+        off = motions[:, 0, :3] - self._references[k].pose[:3]
+        square = np.einsum("ij,ij->i", off, off)
+        self.squares += square
+        np.maximum(self.error_max, np.sqrt(square), out=self.error_max)
+        np.minimum(self.tension_min, tensions.min(axis=1), out=self.tension_min)
+        np.maximum(self.tension_max, tensions.max(axis=1), out=self.tension_max)
+        np.maximum(self.exceeded, ((tensions - self._t_max) / self._range).max(axis=1), out=self.exceeded)
+        self.slack += ((tensions <= 0) & self._taut).any(axis=1)
+        self.answers[self._rows, command.answered] += 1

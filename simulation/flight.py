@@ -1,0 +1,304 @@
+"""`Flight`: what a robot did along a reference, as data, dataset, file, figures and report."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..control import ANSWERS, Reference
+from ..inputs import file_path
+from ..models.parsing import to_yaml
+from ..models.part import COORDINATES
+from ..models.robot import Robot
+from ..netcdf import Contents, Variable, save_netcdf
+from ..text import quantity
+from .record import Record
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["TENSION_TOLERANCE", "Flight"]
+
+TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A flown motion.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    references
+        One for each period of the controller.
+    record
+        What happened, a row for each period.
+    period
+        Of the controller [s].
+    lasted
+        How many periods the flight lasted, fewer than there are references if the motion grew beyond all numbers.
+    tolerance
+        Largest error of the position [m] of a flight that passes.
+    wind
+        Velocity of the air in {G} [m/s], (K, 3); None if there is no air.
+    seconds
+        How long each step of the controller took [s], (K,).
+    wall
+        Wall time of the whole flight [s].
+    """
+
+    robot: Robot
+    references: list[Reference]
+    record: Record
+    period: float
+    lasted: int
+    tolerance: float
+    wind: np.ndarray | None
+    seconds: np.ndarray
+    wall: float
+
+    @property
+    def _recorded(self) -> int:
+        """Return how many periods have a row: the first one has, also if the motion does not survive it."""
+        return max(self.lasted, 1)
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Return the times at which the recorded periods begin [s], (n,)."""
+        return self.period * np.arange(self._recorded)
+
+    @cached_property
+    def error(self) -> np.ndarray:
+        """Return the distance of the platform from its reference [m], (n,)."""
+        wanted = np.stack([reference.pose[:3] for reference in self.references[: self._recorded]])
+        return np.linalg.norm(self.record.motions[: self._recorded, 0, :3] - wanted, axis=1)
+
+    @cached_property
+    def slack(self) -> np.ndarray:
+        """Return where a cable is slack that should pull, (n, m)."""
+        return (self.record.tensions[: self._recorded] <= 0) & (self.robot.t_min > 0)
+
+    @property
+    def passed(self) -> bool:
+        """Return whether the flight lasted, near its reference, with tensions inside their limits and cables taut."""
+        return not self.failures
+
+    @cached_property
+    def failures(self) -> tuple[str, ...]:
+        """Return why the flight did not pass, a line each."""
+        lines = []
+        if self.lasted < len(self.references):
+            lines.append(f"the motion grew beyond all numbers at t = {self.lasted * self.period:.3f} s")
+        at = int(self.error.argmax())  # the first nan, if there is one
+        if np.isnan(self.error[at]):
+            lines.append(f"no position at t = {self.times[at]:.3f} s")
+        elif self.error[at] > self.tolerance:
+            lines.append(
+                f"error of {quantity(1e3 * self.error[at], 'mm')} at t = {self.times[at]:.3f} s "
+                f"(tolerance {quantity(1e3 * self.tolerance, 'mm')})"
+            )
+        tensions = self.record.tensions[: self._recorded]
+        above = tensions - self.robot.t_max - TENSION_TOLERANCE * (self.robot.t_max - self.robot.t_min)
+        row, cable = np.unravel_index(np.nanargmax(above), above.shape)
+        if above[row, cable] > 0:
+            lines.append(
+                f"{quantity(tensions[row, cable], 'N')} in cable {cable + 1} at t = {self.times[row]:.3f} s "
+                f"(t_max {quantity(self.robot.t_max[cable], 'N')})"
+            )
+        if self.slack.any():
+            row, cable = np.argwhere(self.slack)[0]
+            lines.append(
+                f"slack for {quantity(self.slack_s, 's')}, first cable {cable + 1} at t = {self.times[row]:.3f} s"
+            )
+        return tuple(lines)
+
+    @property
+    def slack_s(self) -> float:
+        """Return for how long a cable was slack that should pull [s]."""
+        return float(self.slack.any(axis=1).sum() * self.period)
+
+    @property
+    def answered(self) -> dict[str, int]:
+        """Return how many steps were answered in each way."""
+        counts = np.bincount(self.record.answered[: self._recorded], minlength=len(ANSWERS))
+        return dict(zip(ANSWERS, counts.tolist(), strict=True))
+
+    def figures_of_merit(self) -> dict[str, Any]:
+        """Return what the flight is judged by, without times of the machine: the same for the same seed."""
+        tensions = self.record.tensions[: self._recorded]
+        shortfall = self.record.shortfall[: self._recorded]
+        return {
+            "passed": self.passed,
+            "failures": list(self.failures),
+            "error_rms": float(np.sqrt(np.mean(self.error**2))),
+            "error_max": float(self.error.max()),
+            "tension_min": float(tensions.min()),
+            "tension_max": float(tensions.max()),
+            "slack_s": self.slack_s,
+            "answered": self.answered,
+            "shortfall_max": None if np.isnan(shortfall).all() else float(np.nanmax(shortfall)),
+            "duration": self.lasted * self.period,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `towline simulate --json` prints, ready for JSON."""
+        micro = 1e6 * self.seconds
+        return self.figures_of_merit() | {
+            "step_us": {
+                "median": float(np.median(micro)),
+                "p99": float(np.percentile(micro, 99)),
+                "max": float(micro.max()),
+            },
+            "real_time_factor": self.lasted * self.period / self.wall,
+        }
+
+    @cached_property
+    def trajectory(self) -> xr.Dataset:
+        """Return the flight over time, with the variables of a plan and more, units as attributes.
+
+        Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
+        """
+        return self._contents().dataset()
+
+    def _contents(self) -> Contents:
+        robot, record, rows = self.robot, self.record, slice(self._recorded)
+        motions, references = record.motions[rows], self.references[: self._recorded]
+
+        def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Variable:
+            return Variable(dims, values, {"units": unit, "long_name": about})
+
+        body, base, cable = ("time", "coordinate"), ("time", "carrier", "coordinate"), ("time", "cable")
+        accelerations = (
+            np.gradient(motions[..., 6:], self.period, axis=0) if self._recorded > 1 else 0 * motions[..., 6:]
+        )
+        variables = {}
+        parts = {
+            "pose": (motions[..., :6], "m, rad"),
+            "velocity": (motions[..., 6:], "m/s, rad/s"),
+            "acceleration": (accelerations, "m/s^2, rad/s^2"),
+        }
+        for name, (values, unit) in parts.items():
+            variables[name] = over(body, values[:, 0], unit, f"{name} of the platform frame in G")
+            variables[f"carrier_{name}"] = over(base, values[:, 1:], unit, f"{name} of each carrier in G")
+        wanted = np.stack([reference.pose for reference in references])
+        variables["reference_pose"] = over(body, wanted, "m, rad", "pose that the platform should have")
+        stands = np.stack([reference.carrier_pose for reference in references])
+        variables["carrier_reference"] = over(base, stands, "m, rad", "pose that each carrier has in the reference")
+        variables["carrier_command"] = over(base, record.orders[rows], "m, rad", "pose that each carrier should have")
+        variables["tensions"] = over(cable, record.tensions[rows], "N", "cable tensions")
+        variables["tensions_commanded"] = over(
+            cable, record.commanded[rows], "N", "tensions that the controller orders"
+        )
+        variables["tensions_unlimited"] = over(cable, record.commanded[rows], "N", "the same as tensions_commanded")
+        variables["cable_lengths"] = over(cable, record.lengths[rows], "m", "from anchor to attachment")
+        missing = np.nan_to_num(record.shortfall[rows])
+        variables["violation"] = over(("time",), missing, "N", "shortfall of the wrench, moments over length")
+        variables["tracking_error"] = over(("time",), self.error, "m", "distance from the reference")
+        words = {"flag_values": np.arange(len(ANSWERS), dtype=np.int8), "flag_meanings": " ".join(_flags())}
+        about = {"long_name": "how the step was answered", **words}
+        variables["answered"] = Variable(("time",), record.answered[rows], about)
+        if self.wind is not None:
+            variables["wind"] = over(("time", "axis"), self.wind[rows], "m/s", "velocity of the air in G")
+        variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
+        variables["t_max"] = over(("cable",), robot.t_max, "N", "largest tension allowed")
+        attributes = {
+            "title": f"towline flight of {robot.name}",
+            "status": "passed" if self.passed else "failed",
+            "tolerance_m": self.tolerance,
+            "robot": to_yaml(robot),
+            "report": json.dumps(self.figures_of_merit()),
+        }
+        coordinates = {
+            "time": Variable(("time",), self.times, {"units": "s"}),
+            "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
+            "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),
+            "carrier_kind": Variable(("carrier",), np.array([carrier.kind for carrier in robot.carriers])),
+            "carrier_moves": Variable(("carrier",), np.array([carrier.moves for carrier in robot.carriers])),
+            "cable": Variable(("cable",), np.arange(1, robot.m + 1)),
+        }
+        return Contents(variables, coordinates, attributes)
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the flight as NetCDF, whole or not at all; the same seed gives the same bytes.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        return save_netcdf(self._contents(), file_path("file", file))
+
+    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Save the figures as PNG files in `folder`, and return their paths."""
+        from ..figures import style
+
+        into = file_path("folder", folder)
+        return [style.save(drawn, into / f"{name}.png") for name, drawn in self.figures().items()]
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw the flight, by the names of files: "flight", error, answers, wind and carriers over time; "tensions"."""
+        from ..figures import flight
+
+        return {"flight": flight.flight(self.trajectory), "tensions": flight.tensions(self.trajectory)}
+
+    def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
+        """Draw the robot in flight as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.
+
+        Cables are coloured by tension.
+
+        Parameters
+        ----------
+        file
+            Ends in .gif or .mp4.
+        speed
+            Seconds of the flight in one second of the film; 1 is real time.
+        fps
+            Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
+            motion keeps its speed.
+
+        Raises
+        ------
+        InputError
+            If the suffix, the speed or the rate is not valid, or the file cannot be written.
+        """
+        from ..figures import animation
+        from .scene import scene
+
+        path = file_path("file", file)
+        frames = animation.timing(path, self.times[-1], speed, fps)
+        return animation.draw(scene(self, frames.times), frames, path)
+
+    def report(self) -> str:
+        """Return the report as text: the result in the first line, then the facts behind it."""
+        merit = self.figures_of_merit()
+        word = "PASSED" if self.passed else "FAILED"
+        title = f"{self.robot.name}, flight of {quantity(merit['duration'], 's')}: {word}"
+        rows = {
+            "error of the position": f"{quantity(1e3 * merit['error_rms'], 'mm')} rms, "
+            f"{quantity(1e3 * merit['error_max'], 'mm')} at most",
+            "tensions": f"{quantity(merit['tension_min'], 'N')} to {quantity(merit['tension_max'], 'N')}",
+            "slack": quantity(merit["slack_s"], "s"),
+            "steps answered": ", ".join(
+                f"{quantity(count)} {name}" for name, count in merit["answered"].items() if count
+            ),
+            "controller": f"{np.median(1e6 * self.seconds):.0f} us a step, one every {quantity(self.period, 's')}",
+        }
+        if merit["shortfall_max"] is not None:
+            rows["shortfall of the wrench"] = f"up to {quantity(merit['shortfall_max'], 'N')}"
+        largest = f"error of at most {quantity(1e3 * merit['error_max'], 'mm')}"
+        lines = [f"{title}, {'; '.join(self.failures) or largest}"]
+        lines += [f"    {name:<24}{text}" for name, text in rows.items()]
+        return "\n".join(lines)
+
+
+def _flags() -> list[str]:
+    """Return the answers as the CF conventions write them, without blanks."""
+    return [answer.replace(" ", "_") for answer in ANSWERS]

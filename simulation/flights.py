@@ -1,0 +1,126 @@
+"""Many flights with one reference, each with its own seed: `fly_block`, and their dataset, `flights`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..control import ANSWERS, Controller
+from ..inputs import file_path
+from ..models.parsing import parse_yaml, to_yaml
+from ..models.plant import Plant
+from ..models.robot import Robot
+from ..netcdf import Contents, Variable, save_netcdf
+from ..text import quantity
+from .conditions import Conditions
+from .extremes import Extremes
+from .flight import TENSION_TOLERANCE
+from .flying import fly
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["flights", "fly_block", "report", "save", "summary"]
+
+
+def fly_block(plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int]) -> dict[str, Any]:
+    """Fly a block of flights side by side, and return the numbers of each, (N,) or (N, 4)."""
+    robot = plant.robot
+    kept = Extremes(conditions.references, robot.t_min, robot.t_max, len(seeds))
+    lasted, _ = fly(plant, controller, conditions, seeds, kept)
+    return {
+        "lasted": lasted,
+        "error_rms": np.sqrt(kept.squares / np.maximum(lasted, 1)),
+        "error_max": kept.error_max,
+        "tension_min": kept.tension_min,
+        "tension_max": kept.tension_max,
+        "exceeded": kept.exceeded,
+        "slack": kept.slack,
+        "answered": kept.answers,
+    }
+
+
+def flights(
+    robot: Robot, conditions: Conditions, seeds: Sequence[int], tolerance: float, parts: list[dict[str, Any]]
+) -> xr.Dataset:
+    """Return the numbers of all flights as a dataset, by their seeds."""
+    of = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    periods, period = len(conditions.references), conditions.period
+    passed = (of["lasted"] == periods) & (of["error_max"] <= tolerance)
+    passed &= (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
+
+    def over(values: np.ndarray, unit: str, about: str) -> Variable:
+        return Variable(("seed",), values, {"units": unit, "long_name": about})
+
+    variables = {
+        "passed": Variable(("seed",), passed, {"long_name": "whether error, tensions and tautness hold"}),
+        "duration": over(of["lasted"] * period, "s", "how long the flight lasted"),
+        "error_rms": over(of["error_rms"], "m", "error of the position"),
+        "error_max": over(of["error_max"], "m", "largest error of the position"),
+        "tension_min": over(of["tension_min"], "N", "smallest tension"),
+        "tension_max": over(of["tension_max"], "N", "largest tension"),
+        "slack_s": over(of["slack"] * period, "s", "how long a cable was slack that should pull"),
+        "answered": Variable(("seed", "answer"), of["answered"], {"long_name": "steps answered in each way"}),
+    }
+    coordinates = {
+        "seed": Variable(("seed",), np.array(seeds)),
+        "answer": Variable(("answer",), np.array(ANSWERS)),
+    }
+    attributes = {"title": f"towline flights of {robot.name}", "robot": to_yaml(robot), "tolerance_m": tolerance}
+    return Contents(variables, coordinates, attributes).dataset()
+
+
+def summary(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return what `towline simulate --runs N --json` prints of many flights, ready for JSON."""
+    worst = dataset["error_max"].values
+    return {
+        "runs": int(dataset.sizes["seed"]),
+        "passed": int(dataset["passed"].values.sum()),
+        "error_max": {
+            "median": float(np.median(worst)),
+            "p95": float(np.percentile(worst, 95)),
+            "worst": float(worst.max()),
+        },
+        "worst_seed": int(dataset["seed"].values[int(worst.argmax())]),
+    }
+
+
+def report(dataset: xr.Dataset) -> str:
+    """Return the report of many flights as text: how many passed in the first line, then the facts behind it."""
+    short = summary(dataset)
+    name = parse_yaml(dataset.attrs["robot"], Robot, "robot").name
+    word = "PASSED" if short["passed"] == short["runs"] else "FAILED"
+    longest = quantity(float(dataset["duration"].values.max()), "s")
+    counts = dataset["answered"].values.sum(axis=0)
+    largest, slack = short["error_max"], dataset["slack_s"].values
+    rows = {
+        "largest error": f"median {quantity(1e3 * largest['median'], 'mm')}, 95 % below "
+        f"{quantity(1e3 * largest['p95'], 'mm')}, worst {quantity(1e3 * largest['worst'], 'mm')} "
+        f"(seed {short['worst_seed']})",
+        "tolerance": quantity(1e3 * float(dataset.attrs["tolerance_m"]), "mm"),
+        "tensions": f"{quantity(float(dataset['tension_min'].values.min()), 'N')} to "
+        f"{quantity(float(dataset['tension_max'].values.max()), 'N')}",
+        "slack": f"in {int((slack > 0).sum())} flights, up to {quantity(float(slack.max()), 's')}"
+        if slack.any()
+        else "none",
+        "steps answered": ", ".join(
+            f"{quantity(int(count))} {answer}" for answer, count in zip(ANSWERS, counts, strict=True) if count
+        ),
+    }
+    lines = [f"{name}, {short['runs']} flights of {longest}: {word}, {short['passed']} passed"]
+    return "\n".join([*lines, *(f"    {name:<24}{text}" for name, text in rows.items())])
+
+
+def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:
+    """Save the numbers of many flights as NetCDF, whole or not at all; the same seeds give the same bytes.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    return save_netcdf(Contents.of(dataset), file_path("file", file))

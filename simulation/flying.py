@@ -1,0 +1,157 @@
+"""Close the loop of plant, sensors and controller, for one flight or many side by side: `fly`."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..control import Command, Controller, Reference, State
+from ..models.plant import Plant
+from ..models.plant.periods import Periods
+from .conditions import Conditions
+from .machine import sense_rows
+from .noise import Noise
+from .orders import Orders
+
+__all__ = ["Recorder", "fly"]
+
+DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
+
+
+class Recorder(Protocol):
+    """A record of flights."""
+
+    def take(self, k: int, motions: np.ndarray, lengths: np.ndarray, tensions: np.ndarray, command: Command) -> None:
+        """Keep what happens in period `k` from its beginning on.
+
+        Parameters
+        ----------
+        k
+            Number of the period.
+        motions, lengths
+            As `sensors.sense_rows` writes them; to be copied.
+        tensions
+            Under the command that begins, (N, m) [N].
+        command
+            Of all flights; of a single one its arrays have no leading dimension.
+        """
+        ...
+
+
+class Sensors:
+    """Sensors with noise, bias and delay, each flight with random numbers of its own."""
+
+    def __init__(self, noise: Noise, seeds: Sequence[int], period: float, m: int):
+        self._noise, self._delay = noise, round(noise.delay / period)
+        self._random = [np.random.default_rng([seed, 1]) for seed in seeds]
+        self._of_motion, self._m = noise.of_motion, m
+        self._exact = not (self._of_motion.any() or noise.bias_of_motion.any())
+        self._exact_tensions = not (noise.tension or noise.tension_bias)
+        draws = [random.normal(size=12 + m) for random in self._random]
+        self._bias = np.array(draws)[:, None, :12] * noise.bias_of_motion
+        self._tension_bias = np.array(draws)[:, 12:] * noise.tension_bias
+        self._late: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def report(self, k: int, motions: np.ndarray, tensions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what sensors report in period `k` of motions (N, 1 + c, 12) and tensions (N, m)."""
+        if not (self._exact and self._exact_tensions):
+            if k % DRAWN_AT_ONCE == 0:
+                size = (DRAWN_AT_ONCE, 12 + self._m)
+                self._drawn = np.stack([random.normal(size=size) for random in self._random], axis=1)
+            drawn = self._drawn[k % DRAWN_AT_ONCE]
+            motions = motions.copy()
+            motions[:, :1] += self._bias + drawn[:, None, :12] * self._of_motion
+            tensions = np.maximum(tensions + self._tension_bias + drawn[:, 12:] * self._noise.tension, 0.0)
+        if self._delay:
+            self._late.append((motions.copy(), tensions.copy()))
+            motions, tensions = self._late[0] if len(self._late) <= self._delay else self._late.pop(0)
+        return motions, tensions
+
+
+class Pilot:
+    """A controller for all flights, or a copy for each if it does not accept batches."""
+
+    def __init__(self, controller: Controller, flights: int):
+        self._controllers = [controller] if controller.batches else [copy.deepcopy(controller) for _ in range(flights)]
+        self._alone, self._together = flights == 1, controller.batches
+        for each in self._controllers:
+            each.reset()
+        self.seconds: list[float] = []
+
+    def step(self, time: float, motions: np.ndarray, tensions: np.ndarray, reference: Reference) -> Command:
+        """Return the command of the only flight, or those of all, and keep how long they took, per flight."""
+        start = perf_counter()
+        if self._alone:
+            command = self._controllers[0].step(time, _state(motions[0], tensions[0]), reference)
+        elif self._together:
+            command = self._controllers[0].step(time, _state(motions, tensions), reference)
+        else:
+            rows = zip(self._controllers, motions, tensions, strict=True)
+            single = [each.step(time, _state(*row), reference) for each, *row in rows]
+            command = _stacked(single)
+        self.seconds.append((perf_counter() - start) / len(motions))
+        return command
+
+
+def _state(motions: np.ndarray, tensions: np.ndarray) -> State:
+    pose, velocity = motions[..., :6], motions[..., 6:]
+    return State(pose[..., 0, :], velocity[..., 0, :], pose[..., 1:, :], velocity[..., 1:, :], tensions)
+
+
+def _stacked(commands: list[Command]) -> Command:
+    """Return the commands of all flights as one."""
+    parts: list[Any] = [None if part[0] is None else np.stack(part) for part in zip(*commands, strict=True)]
+    return Command(*parts)
+
+
+def fly(
+    plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int], recorder: Recorder
+) -> tuple[np.ndarray, list[float]]:
+    """Fly one flight for each seed, from the reference's beginning on.
+
+    Returns
+    -------
+    tuple
+        How many periods each flight lasted, (N,): fewer than there are references where the motion grew beyond all
+        numbers; and how long the steps of the controller took [s].
+    """
+    robot, flights, period = plant.robot, len(seeds), conditions.period
+    first, m = conditions.references[0], plant.robot.m
+    motion = (first.pose, first.velocity, first.carrier_pose, first.carrier_velocity)
+    start = np.zeros(m) if first.tensions is None else np.maximum(first.tensions, 0.0)
+    states = np.tile(plant.start(*motion, tensions=start), (flights, 1))
+    motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
+    history, tensions = np.zeros((flights, 2, states.shape[1])), np.zeros((flights, 2, m))
+    tensions[:, 1] = start
+    sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controller, flights)
+    orders = Orders(plant, conditions, seeds)
+    lasted, alive = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool)
+    sense, periods = sense_rows(), Periods(plant, period, conditions.substeps)
+    faults, silent_until, command = list(conditions.faults), -1.0, None
+    for k, reference in enumerate(conditions.references):
+        time = k * period
+        while faults and faults[0].at <= time + 1e-9 * period:
+            fault = faults.pop(0)
+            if fault.kind == "miss":
+                silent_until = fault.at + fault.lasting
+            else:
+                states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.cable)
+        sense(*periods.geometry, states, motions, lengths)
+        if command is None or time >= silent_until:
+            command = pilot.step(time, *sensors.report(k, motions, tensions[:, 1]), reference)
+        row = orders.rows(k, command, lengths, periods.unstrained(states))
+        periods.run(states, row, history, tensions)
+        recorder.take(k, motions, lengths, tensions[:, 0], command)
+        # What is not finite anywhere makes the platform's place so one step later.
+        if not np.isfinite(history[:, 1, 0]).all():
+            alive &= np.isfinite(history[:, 1, 0])
+            if not alive.any():
+                break
+            history[~alive, 1] = states[~alive]
+        lasted += alive
+        states = history[:, 1].copy()
+    return lasted, pilot.seconds

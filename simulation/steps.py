@@ -1,0 +1,46 @@
+"""`steps_in`: how many Runge-Kutta steps a period needs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..models.dynamics import dynamics_of
+from ..models.part import inertia_matrix
+from ..models.plant import Plant, layout
+
+__all__ = ["steps_in"]
+
+ANGLE = 0.5  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
+
+
+def steps_in(period: float, plant: Plant) -> int:
+    """Return how many steps in a period resolve the fastest motion of elastic cables at the robot's home.
+
+    With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
+    that unit tensions cause; the largest eigenvalues of G K and G C bound frequency and decay.
+    """
+    cables = plant.arrays[1]
+    stiffness, damping = cables[:, layout.STIFFNESS], cables[:, layout.DAMPING]
+    if plant.drive == "tensions" or not stiffness.all():
+        return 1
+    robot = plant.robot
+    A, mask = dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home), robot.dof_mask
+    inverse = np.zeros((6, 6))
+    inverse[:3, :3] = np.eye(3) / robot.platform.mass
+    inverse[3:, 3:] = np.linalg.pinv(robot.inertia)
+    A = A * mask[:, None]
+    G = A.T @ inverse @ A
+    for index, carrier in enumerate(robot.carriers):
+        if carrier.body is not None:
+            its = robot.carrier_of_cable == index
+            u = A[:3] * its
+            arms = (robot.home_anchors - robot.carrier_home[index, :3]).T * its
+            moments = np.cross(arms, u, axis=0)
+            G += u.T @ u / carrier.body.mass
+            G += moments.T @ np.linalg.solve(inertia_matrix(carrier.body.inertia), moments)
+    lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
+    frequency = math.sqrt(float(np.abs(np.linalg.eigvals(G * (stiffness / lengths))).max()))
+    decay = float(np.abs(np.linalg.eigvals(G * damping)).max())
+    return max(1, math.ceil(period * max(frequency, decay) / ANGLE))

@@ -1,0 +1,182 @@
+"""`Trajectory`: the reference of a flight over time, from a plan, its file, a timing, a path or a pose."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs import file_path, number, shown
+from ..models.part import LARGEST
+from ..models.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Trajectory", "read_trajectory"]
+
+ACCEPTED = "a plan, the NetCDF file of one, a timing, a path or a pose (6,)"
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class Trajectory(NamedTuple):
+    """A reference over time.
+
+    Attributes
+    ----------
+    duration
+        How long it lasts [s]; None for a rest without an end.
+    at
+        Returns platform and carriers at times (n,) [s]: pose, velocity and acceleration, (n, 6) each, and (n, c, 6)
+        each.
+    tensions
+        Returns the planned tensions at times, (n, m) [N]; None if none are planned.
+    """
+
+    duration: float | None
+    at: Callable[[np.ndarray], tuple[Motion, Motion]]
+    tensions: Callable[[np.ndarray], np.ndarray] | None = None
+
+
+def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
+    """Return what `reference` is over time.
+
+    Raises
+    ------
+    InputError
+        If it is none of the accepted kinds, or belongs to another robot.
+    """
+    if isinstance(reference, str | os.PathLike):
+        return _of_dataset(robot, _loaded(reference))
+    if hasattr(reference, "trajectory"):
+        return _of_dataset(robot, reference.trajectory)
+    if hasattr(reference, "data_vars"):
+        return _of_dataset(robot, reference)
+    if callable(getattr(reference, "motion", None)) and hasattr(reference, "bottlenecks"):
+        return _of_timing(reference)
+    if callable(getattr(reference, "at", None)):
+        return _of_path(robot, reference, duration)
+    try:
+        pose = np.asarray(reference, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        pose = np.empty(0)
+    if pose.shape != (6,) or not (np.abs(pose) <= LARGEST).all():
+        raise InputError(f"reference must be {ACCEPTED}, got {shown(reference)}")
+    return Trajectory(None, lambda times: (_still(times, pose), _still(times, robot.carrier_home)))
+
+
+def _loaded(file: str | os.PathLike[str]) -> xr.Dataset:
+    import xarray as xr
+
+    path = file_path("reference", file)
+    try:
+        return xr.load_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        # HDF5 has its own message of several lines, where others have a few words.
+        reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
+        raise InputError(f"reference must be {ACCEPTED}, got {shown(str(path))} ({reason})") from None
+
+
+def _still(times: np.ndarray, pose: np.ndarray) -> Motion:
+    poses = np.tile(pose, (len(times), *[1] * pose.ndim))
+    return poses, np.zeros_like(poses), np.zeros_like(poses)
+
+
+def _of_path(robot: Robot, path: Any, duration: float | None) -> Trajectory:
+    natural = getattr(path, "natural_duration", None)
+    lasting = (
+        number("duration", natural if duration is None else duration, 1e-3, 1e6) if (natural or duration) else None
+    )
+    if lasting is None:
+        raise InputError("duration must be the time that the path takes [s], got None")
+    if getattr(path, "frame", "world") != "world":
+        raise InputError(f"reference must be a path in the frame world, got one in {path.frame!r}")
+
+    def at(times: np.ndarray) -> tuple[Motion, Motion]:
+        return _resting(path.at(np.minimum(times, lasting), lasting), times, lasting), _still(times, robot.carrier_home)
+
+    return Trajectory(lasting, at)
+
+
+def _of_timing(timing: Any) -> Trajectory:
+    lasting = timing.duration
+    if lasting is None:
+        raise InputError("reference must be a feasible timing, got an infeasible one")
+
+    def at(times: np.ndarray) -> tuple[Motion, Motion]:
+        platform, carriers = timing.motion(np.minimum(times, lasting))
+        return _resting(platform, times, lasting), _resting(carriers, times, lasting)
+
+    return Trajectory(lasting, at)
+
+
+def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
+    """Return a motion that rests after its end."""
+    pose, velocity, acceleration = (np.array(part) for part in motion)
+    velocity[times > end] = acceleration[times > end] = 0.0
+    return pose, velocity, acceleration
+
+
+def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
+    """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes."""
+    missing = [
+        name
+        for name in (
+            "pose",
+            "velocity",
+            "acceleration",
+            "carrier_pose",
+            "carrier_velocity",
+            "carrier_acceleration",
+            "time",
+        )
+        if name not in dataset
+    ]
+    if missing:
+        raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
+    first, *_ = str(dataset.attrs.get("robot", "")).splitlines() or [""]
+    name = first.removeprefix("name:").strip().strip("\"'")
+    count, m = len(robot.carriers), robot.m
+    if (name and name != robot.name) or dataset["carrier_pose"].shape[1:] != (count, 6):
+        raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
+    nodes = dataset["time"].values
+    platform = [dataset[part].values for part in ("pose", "velocity", "acceleration")]
+    carriers = [dataset[f"carrier_{part}"].values for part in ("pose", "velocity", "acceleration")]
+    if len(nodes) < 2 or not all(np.isfinite(part).all() for part in (nodes, *platform, *carriers)):
+        raise InputError("reference must be a plan of finite poses at two times or more")
+
+    def at(times: np.ndarray) -> tuple[Motion, Motion]:
+        return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
+
+    planned = dataset["tensions"].values if "tensions" in dataset else np.full((len(nodes), m), np.nan)
+    known = np.isfinite(planned).all(axis=1)
+    if planned.shape[1:] != (m,):
+        raise InputError(f"reference must be a plan of {m} cables, got one of {planned.shape[1]}")
+    if not known.any():
+        return Trajectory(float(nodes[-1]), at)
+
+    def tensions(times: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
+
+    return Trajectory(float(nodes[-1]), at, tensions)
+
+
+def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:
+    """Return the polynomials of degree 5 between nodes that have their poses, velocities and accelerations."""
+    inside = np.clip(times, nodes[0], nodes[-1])
+    k = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, len(nodes) - 2)
+    shape = (-1, *[1] * (parts[0].ndim - 1))
+    h = np.reshape(nodes[k + 1] - nodes[k], shape)
+    s = np.reshape(inside - nodes[k], shape) / h
+    (p, q), (u, v), (a, b) = ((part[k], part[k + 1]) for part in parts)
+    u, v, a, b = h * u, h * v, h * h * a, h * h * b
+    # From the start of the piece on: p + u s + a s^2 / 2 + c3 s^3 + c4 s^4 + c5 s^5.
+    gap, speed, bend = q - p - u - a / 2, v - u - a, b - a
+    c3, c4, c5 = 10 * gap - 4 * speed + bend / 2, -15 * gap + 7 * speed - bend, 6 * gap - 3 * speed + bend / 2
+    pose = p + s * (u + s * (a / 2 + s * (c3 + s * (c4 + s * c5))))
+    velocity = (u + s * (a + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    acceleration = (a + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2
+    return _resting((pose, velocity, acceleration), times, float(nodes[-1]))

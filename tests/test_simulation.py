@@ -1,0 +1,190 @@
+"""Flights: plans flown by a controller, in wind, with sensors and faults; the same seed, the same flight."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from towline import load, plan
+from towline.control import Command, ComputedTorque, Controller, State
+from towline.errors import InputError
+from towline.models import Dynamics
+from towline.simulation import simulate
+from towline.simulation.trajectory import read_trajectory
+
+
+def planned(name, change, **task):
+    """Plan a line from home."""
+    robot = load(name)
+    line = {
+        "kind": "line",
+        "start": robot.home.tolist(),
+        "end": (robot.home + np.pad(change, (0, 6 - len(change)))).tolist(),
+    }
+    result = plan(name, {"path": line, "duration": 3, "steps": 25} | task)
+    assert result.feasible, result.report()
+    return result
+
+
+FREE = {"tube": {"position": 0.05, "attitude": 0.3}, "base": {"kind": "free"}}
+LINES = {
+    "cogiro": ([0.3, 0.2, 0.1], {}),
+    "caroca-pulleys": ([0.2, 0.1, 0.1], {}),
+    "planar-4": ([0.1, 0, 0.1], {}),
+    "wang-ctmrts": ([0.1, 0.05, 0.05], FREE),
+    "wang-flying-quadrotor": ([0.5, 0, 0], FREE | {"margin": 0.3}),
+    "multi-quadrotor-3": ([1.0, 0, 0], FREE),
+    "multi-quadrotor-4": ([1.0, 0, 0], FREE),
+    "flycrane": ([0.5, 0, 0], FREE),
+}
+
+
+@pytest.fixture(scope="module")
+def crane():
+    return planned("ipanema-1", [0.2, 0.1, 0.1], margin=5)
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_a_robot_of_each_kind_flies_its_plan(name):
+    change, task = LINES[name]
+    flight = simulate(name, planned(name, change, **task), tolerance=2e-3)
+    assert flight.passed, flight.report()
+    assert flight.error[-1] < 1e-3
+
+
+def test_a_flight_has_the_tensions_that_its_motion_requires(crane):
+    """Inverse dynamics, by CasADi, of the motion that the plant computed: its accelerations by differences."""
+    robot = load("ipanema-1")
+    flight = simulate(robot, crane, period=5e-4)
+    data, dynamics = flight.trajectory, Dynamics(robot)
+    inner = slice(2, -2)
+    pose, velocity, acceleration = (data[part].values[inner] for part in ("pose", "velocity", "acceleration"))
+    w = dynamics.required_wrench(pose, velocity, acceleration)
+    given = np.einsum("kij,kj->ki", dynamics.wrench_matrix(pose), data["tensions"].values[inner])
+    np.testing.assert_allclose(given, w, atol=2e-3 * np.abs(w).max())
+
+
+def test_references_are_the_plan_also_between_its_samples(crane):
+    trajectory = read_trajectory(load("ipanema-1"), crane, None)
+    (pose, velocity, acceleration), _ = trajectory.at(crane.audit.times)
+    np.testing.assert_allclose(pose, crane.audit.motion.pose, atol=1e-9)
+    np.testing.assert_allclose(velocity, crane.audit.motion.velocity, atol=1e-7)
+    np.testing.assert_allclose(acceleration, crane.audit.motion.acceleration, atol=1e-4)
+
+
+NOISE = {"position": 1e-3, "attitude": 1e-3, "velocity": 5e-3, "tension": 0.1, "delay": 2e-3}
+
+
+def test_the_same_seed_is_the_same_file_and_another_one_is_not(tmp_path, crane):
+    files = [
+        simulate("ipanema-1", crane, noise=NOISE, seed=seed, duration=1.0).save(tmp_path / f"{k}.nc").read_bytes()
+        for k, seed in enumerate((3, 3, 4))
+    ]
+    assert files[0] == files[1]
+    assert files[0] != files[2]
+
+
+def test_a_flight_of_many_is_the_flight_alone():
+    task = {"wind": (4, 2, 0.5), "gusts": 1.0, "noise": NOISE, "duration": 1.0, "tolerance": 0.02}
+    many = simulate("wang-flying", load("wang-flying").home, runs=3, seed=7, **task)
+    alone = simulate("wang-flying", load("wang-flying").home, seed=9, **task)
+    assert many["error_max"].values[2] == alone.error.max()
+    assert many["tension_max"].values[2] == alone.record.tensions.max()
+    assert bool(many["passed"].values[2]) == alone.passed
+    assert many["answered"].values[2].tolist() == list(alone.answered.values())
+    assert len(set(many["error_max"].values)) == 3
+
+
+def test_the_drag_of_a_steady_wind_is_what_the_observer_reports():
+    robot, wind = load("wang-flying"), (5.0, -2.0, 0.0)
+    controller = ComputedTorque(robot, observer=20.0)
+    flight = simulate(robot, robot.home, controller, wind=wind, duration=1.5)
+    rest = (robot.home, *np.zeros((2, 6)), robot.carrier_home, *np.zeros((2, 1, 6)))
+    dynamics = Dynamics(robot)
+    drag = dynamics.required_wrench(*rest) - dynamics.required_wrench(*rest, wind=np.array(wind))
+    np.testing.assert_allclose(controller.disturbance[0], drag, atol=1e-4)
+    assert flight.passed
+
+
+@pytest.mark.parametrize(("name", "survives"), [("caroca", True), ("ipanema-1", False)])
+def test_a_cut_cable_is_survived_where_the_others_can_do_without_it(name, survives):
+    """A linear program decides beforehand."""
+    robot = load(name)
+    rest = np.zeros((2, 6))
+    A, w = Dynamics(robot).wrench_matrix(robot.home), Dynamics(robot).required_wrench(robot.home, *rest)
+    bounds = list(zip(robot.t_min, robot.t_max, strict=True))
+    bounds[0] = (0, 0)
+    possible = linprog(np.zeros(robot.m), A_eq=A, b_eq=w, bounds=bounds).success
+    flight = simulate(robot, robot.home, faults=["cut 1 at 0.3"], duration=1.3, tolerance=0.02)
+    after = flight.record.answered[900:]
+    assert possible == survives
+    if survives:
+        assert flight.error.max() < 0.02, flight.report()
+        assert flight.error[-1] < 1e-3
+        assert (after == 0).all()
+        assert (flight.record.commanded[400:, 0] == 0).all()
+    else:
+        assert not flight.passed
+        assert (after > 0).any()
+        assert flight.figures_of_merit()["shortfall_max"] > 1.0
+
+
+def test_a_stuck_winch_and_a_controller_that_misses_its_time_are_felt(crane):
+    calm = simulate("ipanema-1", crane)
+    missed = simulate("ipanema-1", crane, faults=["miss 0.03 at 1.5"])
+    assert calm.error.max() < missed.error.max() < 5e-3
+    still = missed.record.commanded[1500:1530]
+    assert (still[1:] == still[:-1]).all() or (still[2:] == still[1:-1]).all()
+
+
+class Falling(Controller):
+    """Order nothing."""
+
+    def step(self, time, state: State, reference):
+        none = np.zeros(8)
+        carriers = (reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration)
+        return Command(none, *carriers, np.int8(0), np.full(6, np.nan), np.float64(np.nan))
+
+
+def test_a_controller_of_ones_own_that_orders_nothing_lets_the_load_fall():
+    robot = load("cogiro")
+    flight = simulate(robot, robot.home, Falling(), duration=0.3)
+    assert not flight.passed
+    fallen = robot.home[2] - flight.record.motions[:, 0, 2]
+    g = -robot.gravity[2]
+    # From the beginning of the first period on, in which the tensions end.
+    np.testing.assert_allclose(fallen, g * flight.times**2 / 2, atol=1e-9)
+    many = simulate(robot, robot.home, Falling(), duration=0.3, runs=2)
+    np.testing.assert_allclose(many["error_max"].values, flight.error.max())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"reference": "no.nc"}, "reference"),
+        ({"reference": [0, 0, 1]}, "reference"),
+        ({"reference": np.full(6, np.nan)}, "reference"),
+        ({"reference": 3}, "reference"),
+        ({"robot": "cogiro"}, "reference must be a plan of robot 'cogiro', got one of 'ipanema-1'"),
+        ({"duration": -1}, "duration"),
+        ({"duration": np.nan}, "duration"),
+        ({"noise": {"delay": -1}}, "delay"),
+        ({"noise": {"positon": 1}}, "positon"),
+        ({"faults": ["cut 9 at 1"]}, "1 to 8, got '9'"),
+        ({"faults": ["cut 1"]}, "faults"),
+        ({"faults": "cut 1 at 2"}, "faults"),
+        ({"faults": ["miss x at 2"]}, "faults"),
+        ({"wind": (1, 2, 3)}, "wind"),
+        ({"gusts": 1}, "gusts"),
+        ({"seed": -1}, "seed"),
+        ({"period": 0}, "period"),
+        ({"runs": 0}, "runs"),
+        ({"controller": 3}, "controller"),
+        ({"disturbance": [1, 2]}, "disturbance"),
+        ({"tolerance": -1}, "tolerance"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_in_one_line(crane, change, message):
+    with pytest.raises(InputError) as error:
+        simulate(**{"robot": "ipanema-1", "reference": crane} | change)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
