@@ -27,10 +27,12 @@ lint: .venv/dev.stamp
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
-# The machine code of solvers and plant, once; otherwise each of the tests' processes compiles it or computes without.
+# The machine code of solvers, plant and controllers, once; otherwise each of the tests' processes compiles it or computes without.
 kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
 	$(BIN)/python -c "from towline.models.plant import machine; machine.run_rows()"
+	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts()"
+	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once.
 unit: .venv/dev.stamp

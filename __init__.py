@@ -3,19 +3,21 @@
 `import towline` costs nothing: each name below loads its package when it is first used (PEP 562). Packages, from the
 ground up: `towline.models` (robots and their mechanics), `towline.solvers` (tension distribution on plain arrays),
 `towline.figures` (matplotlib), `towline.distribution` (one instant of a robot as a tension problem),
-`towline.workspace` (reachable poses), `towline.embedded` (a control step as C), `towline.ocp` (planning),
-`towline.studies` (the papers), `towline.cli`.
+`towline.workspace` (reachable poses), `towline.control` (one step of a controller), `towline.simulation` (flights),
+`towline.embedded` (a control step as C), `towline.ocp` (planning), `towline.studies` (the papers), `towline.cli`.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .control import Controller
     from .distribution import tensions
     from .embedded import export_step
     from .errors import InputError, SolverError, TowlineError
     from .models import Dynamics, Robot, available, load
     from .ocp import Plan, Planner, Sweep, Task, Timing, plan, read_task, sweep, time_along
+    from .simulation import Flight, simulate
     from .solvers import Certificate, TensionProblem, TensionSolution, methods, solve, solve_batch
     from .workspace import sample
 
@@ -27,6 +29,8 @@ _HOMES = {
     "distribution": ("tensions",),
     "ocp": ("Plan", "Planner", "Sweep", "Task", "Timing", "plan", "read_task", "sweep", "time_along"),
     "workspace": ("sample",),
+    "control": ("Controller",),
+    "simulation": ("Flight", "simulate"),
     "embedded": ("export_step",),
     "errors": ("InputError", "SolverError", "TowlineError"),
 }
@@ -34,7 +38,9 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Certificate",
+    "Controller",
     "Dynamics",
+    "Flight",
     "InputError",
     "Plan",
     "Planner",
@@ -53,6 +59,7 @@ __all__ = [
     "plan",
     "read_task",
     "sample",
+    "simulate",
     "solve",
     "solve_batch",
     "sweep",

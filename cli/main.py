@@ -23,13 +23,14 @@ from .options import PLAIN, Command
 from .stopping import end, requested
 
 COMMANDS = {
-    "demo": "Plan a circle of a flying cable robot and draw it: a first look.",
+    "demo": "Plan a circle of a flying cable robot, draw it and fly it: a first look.",
     "robots": "List the robots of the library, or diagnose one.",
     "tension": "Compute the cable tensions at one pose, by every method.",
     "plan": "Plan a motion that keeps every tension inside its limits.",
     "time": "Compute the fastest motion along a path.",
+    "simulate": "Fly a plan: wind, slack cables, sensors, faults, a controller.",
     "workspace": "Sample the poses that a robot can reach.",
-    "view": "Show robots, plans and workspaces in the browser.",
+    "view": "Show robots, plans, flights and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",
     "reproduce": "Compute a paper's results again, claim by claim.",
     "export": "Export a robot as a MuJoCo model or as C code.",

@@ -1,4 +1,4 @@
-"""`towline view`: show a robot, a plan or a workspace in the browser, or write a page that needs no server."""
+"""`towline view`: show a robot, plan, flight or workspace in the browser, or write a page that needs no server."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def view(
         str,
         typer.Argument(
             metavar="TARGET",
-            help="A robot (name or YAML file), or a plan or workspace file (NetCDF).",
+            help="A robot (name or YAML file), or a plan, flight or workspace file (NetCDF).",
             autocompletion=robot_names,
         ),
     ],
@@ -32,7 +32,7 @@ def view(
     port: Annotated[int, typer.Option(help="Port to listen on; if it is in use, one of the next; 0: any.")] = 8080,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a robot with sliders, a plan that plays, or a workspace, in the browser (extra viewer)."""
+    """Show a robot with sliders, a plan or a flight that plays, or a workspace, in the browser (extra viewer)."""
     import threading
 
     from ..viewer import read, save_page, serve

@@ -40,7 +40,10 @@ def figure(width: float = 5.0, height: float = 3.6) -> Figure:
 
 def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
     """Return axes with labels, a light grid and no box, at `place` (rows, columns, index)."""
-    ax = canvas.add_subplot(*place)
+    return _dressed(canvas.add_subplot(*place), xlabel, ylabel)
+
+
+def _dressed(ax: Axes, xlabel: str, ylabel: str) -> Axes:
     ax.set_xlabel(xlabel)
     ax.set_ylabel(ylabel)
     ax.grid(True, color="#dddddd", linewidth=0.6)
@@ -48,12 +51,18 @@ def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] =
     return ax
 
 
-def panels_below(canvas: Figure, xlabel: str, ylabels: Sequence[str]) -> list[Axes]:
-    """Return axes below each other, of which only the last has numbers and a label on its horizontal axis."""
+def panels_below(
+    canvas: Figure, xlabel: str, ylabels: Sequence[str], heights: Sequence[float] | None = None
+) -> list[Axes]:
+    """Return axes below each other, of which only the last has numbers and a label on its horizontal axis.
+
+    `heights` are relative; default: all are equal.
+    """
+    grid = canvas.add_gridspec(len(ylabels), 1, height_ratios=heights)
     every = []
-    for row, ylabel in enumerate(ylabels, 1):
-        last = row == len(ylabels)
-        every.append(axes(canvas, xlabel if last else "", ylabel, (len(ylabels), 1, row)))
+    for row, ylabel in enumerate(ylabels):
+        last = row == len(ylabels) - 1
+        every.append(_dressed(canvas.add_subplot(grid[row]), xlabel if last else "", ylabel))
         every[-1].tick_params(labelbottom=last)
     return every
 

@@ -36,7 +36,14 @@ def test_demo_shows_both_halves(demo):
     assert "FEASIBLE" in free
     assert "INFEASIBLE" not in free
     names = sorted(path.name for path in (folder / "towline-demo").iterdir())
-    assert names == ["base.png", "circle-free.nc", "circle-hovering.nc", "path.png", "tensions.png"]
+    files = ["circle-flight.nc", "circle-free.nc", "circle-hovering.nc"]
+    assert names == sorted(["base.png", "flight.png", "path.png", "tensions.png", *files])
+    assert all(f"towline-demo/{name}" in done.stdout for name in names)
+    assert "wang-flying, flight of 10 s: PASSED" in free
+    flight = xr.load_dataset(folder / "towline-demo" / "circle-flight.nc")
+    assert np.linalg.norm(flight["pose"].values[:, :2] - 50, axis=1) == pytest.approx(
+        1, abs=0.05
+    )  # the circle, in wind
     for name in names:
         if name.endswith(".png"):
             assert (folder / "towline-demo" / name).read_bytes().startswith(b"\x89PNG")
@@ -304,10 +311,10 @@ def test_version_and_help():
     """The version by a process of its own, as users start it."""
     version = subprocess.run([TOWLINE, "--version"], capture_output=True, text=True, check=True).stdout
     assert version.strip() == "towline 0.2.0"
-    for command in ("demo", "robots", "tension", "plan", "export"):
+    for command in ("demo", "robots", "tension", "plan", "simulate", "export"):
         assert run(command, "--help").returncode == 0
     # Units are in brackets, which a mark-up may take for its own.
-    for command, unit in (("workspace", "[rad]"), ("tension", "[m/s]")):
+    for command, unit in (("workspace", "[rad]"), ("tension", "[m/s]"), ("simulate", "[m/s]")):
         assert unit in run(command, "--help").stdout
 
 

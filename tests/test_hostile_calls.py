@@ -20,11 +20,20 @@ from pydantic import BaseModel
 
 import towline
 from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along
+from towline.control import ComputedTorque, Reference, State
 from towline.inputs import printable
 from towline.models import RelativeDynamics
 from towline.workspace import Places, Region, StaticEquilibrium, sample
 
-PACKAGES = ("towline", "towline.models", "towline.solvers", "towline.workspace", "towline.ocp")
+PACKAGES = (
+    "towline",
+    "towline.models",
+    "towline.solvers",
+    "towline.workspace",
+    "towline.ocp",
+    "towline.control",
+    "towline.simulation",
+)
 EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long
 ROBOT = "wang-flying"
@@ -44,6 +53,11 @@ NOT_CALLED = {
     "Certificate",
     "solvers.Margin",
     "Plan",
+    "Flight",
+    "ANSWERS",
+    "Command",  # what an author of a controller gets and writes
+    "Reference",
+    "State",
     "Sweep",
     "TensionSolution",
     "Timing",
@@ -123,6 +137,14 @@ def a_plan() -> towline.Plan:
     return plan(ROBOT, TASK)
 
 
+def a_state() -> State:
+    return State(robot().home, np.zeros(6), np.zeros((1, 6)), np.zeros((1, 6)))
+
+
+def a_reference() -> Reference:
+    return Reference(robot().home, *np.zeros((2, 6)), *np.zeros((3, 1, 6)))
+
+
 @cache
 def a_sweep() -> towline.Sweep:
     return towline.sweep(ROBOT, TASK, {"margin": [0, 1]})
@@ -182,6 +204,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "path": lambda: time_law().parametrised.path,
     "file": lambda: "file.nc",
     "Plan.animate.file": lambda: "film.gif",
+    "Flight.animate.file": lambda: "film.gif",
     "folder": lambda: "folder",
     "precision": lambda: "double",
     "speed": lambda: 1.0,
@@ -206,6 +229,33 @@ VALID: dict[str, Callable[[], Any]] = {
     "places": places,
     "carriers": lambda: np.zeros((1, 1, 6)),
     "rows": lambda: slice(0, 1),
+    "simulate.reference": lambda: robot().home,
+    "simulate.duration": lambda: 0.01,
+    "controller": lambda: None,
+    "noise": lambda: None,
+    "faults": lambda: ["cut 1 at 0.005"],
+    "gusts": lambda: 0.5,
+    "disturbance": lambda: np.zeros(6),
+    "period": lambda: 1e-3,
+    "substeps": lambda: None,
+    "tolerance": lambda: 0.1,
+    "drive": lambda: None,
+    "runs": lambda: None,
+    "simulate.progress": lambda: None,
+    "bandwidth": lambda: 5.0,
+    "damping": lambda: 1.0,
+    "integral": lambda: 0.0,
+    "observer": lambda: 10.0,
+    "rate": lambda: None,
+    "reach": lambda: (0.1, 0.1),
+    "carrier_bandwidth": lambda: 5.0,
+    "ComputedTorque.carrier_acceleration": lambda: 5.0,
+    "place": lambda: 5.0,
+    "ComputedTorque.attitude": lambda: 40.0,
+    "patience": lambda: 0.05,
+    "time": lambda: 0.0,
+    "state": a_state,
+    "reference": a_reference,
     "vary": lambda: {"margin": [0, 1]},
     "sweep.keep": lambda: None,
     "Sweep.plan.index": lambda: 0,
@@ -234,6 +284,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "Interference": {"between_cables": 0.1},
     "Lengths": {"min": 0.1, "max": 10.0},
     "Margin": {},
+    "Noise": {},
     "StaticEquilibrium": {},
     "WrenchClosure": {},
     "WrenchFeasible": {"box": [[0] * 6, [1] * 6]},
@@ -244,6 +295,8 @@ MODELS: dict[str, dict[str, Any]] = {
 OBJECTS: dict[str, Callable[[], Any]] = {
     "Dynamics": dynamics,
     "RelativeDynamics": lambda: RelativeDynamics(robot()),
+    "ComputedTorque": lambda: ComputedTorque(ROBOT),
+    "Flight": lambda: towline.simulate(ROBOT, robot().home, duration=0.02),
     "Planner": lambda: Planner(ROBOT, TASK),
     "Plan": a_plan,
     "Timing": time_law,
@@ -312,7 +365,9 @@ def subjects() -> dict[str, Subject]:
                 result[name] = of_function(name, value)
     workspace = import_module("towline.workspace")
     objects = {name: make() for name, make in OBJECTS.items()}
-    objects |= {name: getattr(workspace, name)(**MODELS[name]) for name in MODELS if name not in objects}
+    objects |= {
+        name: getattr(workspace, name)(**MODELS[name]) for name in MODELS if name not in objects and name != "Noise"
+    }
     for name, value in objects.items():
         for method, bound in public_methods(value):
             if method not in {"model_validate", *NOT_CALLED}:

@@ -12,7 +12,8 @@ ROOT = Path(__file__).parent.parent
 FLOORS = [
     {"models", "solvers", "figures"},
     {"distribution"},
-    {"workspace", "ocp", "embedded"},
+    {"control", "workspace", "ocp", "embedded"},
+    {"simulation"},
     {"studies"},
     {"benchmarks"},
     {"viewer"},
@@ -119,6 +120,7 @@ def test_no_name_hides_a_module():
         names = {path.stem for path in folder.glob("*.py")} | {
             path.parent.name for path in folder.glob("*/__init__.py")
         }
-        # `solve` and `methods` are what `towline.solvers` is called for; their modules are imported by their full path.
-        for name in names - {"__init__"} - ({"solve", "methods"} if package == "towline.solvers" else set()):
+        # These are what their packages are called for; their modules are imported by their full path.
+        called_for = {"towline.solvers": {"solve", "methods"}, "towline.simulation": {"simulate"}}
+        for name in names - {"__init__"} - called_for.get(package, set()):
             assert isinstance(getattr(module, name, module), types.ModuleType), f"{package}.{name} hides the module"

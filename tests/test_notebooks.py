@@ -31,7 +31,7 @@ def verdicts(notebook):
 
 def test_they_are_all_there():
     names = ["quickstart", "flying_cdpr", "ctmrts", "tension_distribution", "trajectory_planning", "qp_benchmark"]
-    wanted = [f"{index:02d}_{name}" for index, name in enumerate([*names, "multi_quadrotor"], start=1)]
+    wanted = [f"{index:02d}_{name}" for index, name in enumerate([*names, "multi_quadrotor", "closed_loop"], start=1)]
     assert [path.stem for path in NOTEBOOKS] == wanted
 
 

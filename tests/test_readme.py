@@ -187,12 +187,14 @@ def test_errata_are_current(study):
             assert section.startswith(titles[claim.verdict]), claim.id
 
 
-@pytest.mark.parametrize("package", ["models", "solvers", "workspace", "ocp", "viewer", "errors"])
+@pytest.mark.parametrize(
+    "package", ["models", "solvers", "workspace", "ocp", "control", "simulation", "viewer", "errors"]
+)
 def test_every_public_name_is_in_the_reference(package):
     page = PAGES[f"docs/api/{package}.md"]
     for name in importlib.import_module(f"towline.{package}").__all__:
         # A name that its module has too is given by its full path: `towline.solvers.solve.solve`.
-        assert re.search(rf"^::: towline\.{package}\.(solve\.)?{name}$", page, re.MULTILINE), name
+        assert re.search(rf"^::: towline\.{package}\.((solve|simulate)\.)?{name}$", page, re.MULTILINE), name
 
 
 def test_the_reference_lists_every_name_of_the_front_door():

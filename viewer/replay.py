@@ -1,4 +1,4 @@
-"""Replay a saved plan instant by instant, without interpolation: every instant shown was audited."""
+"""Replay a saved plan or flight without interpolation: every instant shown was audited, or flown."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_FRAMES = 1500  # of a page
 
 
 class Replay:
-    """A plan that `Plan.save` wrote.
+    """A plan that `Plan.save` wrote, or a flight that `Flight.save` wrote.
 
     Parameters
     ----------
@@ -38,6 +38,8 @@ class Replay:
     ----------
     robot, title, times
         Times of the saved instants (n,) [s].
+    reference
+        Origin of the platform's frame (n, 3) in {G} [m] where a flight should have it; None for a plan.
 
     Raises
     ------
@@ -49,12 +51,14 @@ class Replay:
         for name in (*NEEDED, "time"):
             if name not in dataset.variables:
                 raise InputError(f"{where} must be a plan saved by `towline plan`, got one without {name!r}")
-        for name in ("robot", "task"):
+        self._flown = "reference_pose" in dataset.variables
+        for name in ("robot",) if self._flown else ("robot", "task"):
             if not isinstance(dataset.attrs.get(name), str):
                 raise InputError(f"{where} must be a plan saved by `towline plan`, got one without its {name}")
         self.robot = parse_yaml(dataset.attrs["robot"], Robot, f"{where}, robot")
-        self._task = parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
-        self.title = f"{self.robot.name}, {self._task.name}: {dataset.attrs.get('status', 'a plan')}"
+        self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
+        what, status = "flight" if self._task is None else self._task.name, dataset.attrs.get("status", "a plan")
+        self.title = f"{self.robot.name}, {what}: {status}"
         self.geometry = Geometry(self.robot)
         self.times = _array(dataset, "time", (-1,), where)
         n, c = len(self.times), len(self.robot.carriers)
@@ -63,6 +67,8 @@ class Replay:
         )
         self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where)
         self._tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
+        self.reference = _array(dataset, "reference_pose", (n, 6), where)[:, :3] if self._flown else None
+        self._words = _answers(dataset) if self._flown else None
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
         self._points = self.geometry(self._pose, self._carriers)
@@ -91,6 +97,8 @@ class Replay:
     @property
     def obstacles(self) -> list[np.ndarray]:
         """Return lines (k, 3) in {G} [m] that outline the regions to keep out of."""
+        if self._task is None:
+            return []
         return [line for place in self._task.limits.keep_out if place.frame == "world" for line in outline(place)]
 
     def index_at(self, time: float) -> int:
@@ -108,13 +116,14 @@ class Replay:
         tensions = self._tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
-        certificate = None if there else self._certificate(index)
+        certificate = None if there or self._task is None else self._certificate(index)
+        status = "feasible" if there else "no tensions" if certificate is None else "infeasible"
         return Instant(
             pose=self._pose[index],
             carriers=self._carriers[index],
             points=type(self._points)(*(part[index] for part in self._points)),
             tensions=tensions,
-            status="feasible" if there else "no tensions" if certificate is None else "infeasible",
+            status=status if self._words is None else self._words[index],
             margin=margin,
             nearest=nearest,
             certificate=certificate,
@@ -136,13 +145,25 @@ class Replay:
     @cached_property
     def _t_min(self) -> np.ndarray:
         """Return the smallest tensions at each instant, (n, m) [N]: zero where a phase permits slack cables."""
-        if self._task.phases is None:
+        if self._task is None or self._task.phases is None:
             return np.tile(self.robot.t_min, (len(self.times), 1))
         return self._scenario.t_min_at(self.times)
 
     @cached_property
     def _scenario(self) -> Scenario:
+        assert self._task is not None  # a flight has tensions at all instants, and so no certificates
         return lay_out(self.robot, self._task)
+
+
+def _answers(dataset: xr.Dataset) -> list[str] | None:
+    """Return how each step of a flight was answered; None if the file does not have it."""
+    if "answered" not in dataset or "flag_meanings" not in dataset["answered"].attrs:
+        return None
+    words = str(dataset["answered"].attrs["flag_meanings"]).split()
+    numbers = dataset["answered"].to_numpy().astype(int)
+    if not ((numbers >= 0) & (numbers < len(words))).all():
+        return None
+    return [words[number].replace("_", " ") for number in numbers]
 
 
 def _array(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False) -> np.ndarray:

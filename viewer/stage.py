@@ -143,6 +143,8 @@ class Stage:
         self._lines("/reach", edges, rgb(style.colour(3)))
         if subject.replay is not None:
             self._lines("/path", [subject.replay.path], rgb(style.colour(0)), 2 * THIN)
+            if subject.replay.reference is not None:
+                self._lines("/reference", [subject.replay.reference], rgb(words.GHOST), THIN)
             self._lines("/carrier_paths", subject.replay.carrier_paths, GREY)
             self._lines("/keep_out", subject.replay.obstacles, rgb(style.colour(5)))
         self._cloud = None

@@ -1,4 +1,4 @@
-"""Read what to show: a robot, a plan or a workspace."""
+"""Read what to show: a robot, a plan, a flight or a workspace."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
     from .replay import Replay
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how NetCDF files begin
-ACCEPTED = "a robot, or a file that `towline plan` or `towline workspace` wrote"
+ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towline workspace` wrote"
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A robot, a plan or a workspace to show.
+    """A robot, a plan, a flight or a workspace to show.
 
     Attributes
     ----------
     title
         Its title, one line.
     robot
-        The robot, or that of the plan or workspace.
+        The robot, or that of the plan, flight or workspace.
     replay
-        The instants of a plan, or None.
+        The instants of a plan or a flight, or None.
     cloud
         The points of a workspace, or None.
     """
@@ -42,17 +42,20 @@ class Subject:
 
     @property
     def kind(self) -> str:
-        """Return "robot", "plan" or "workspace"."""
+        """Return "robot", "plan", "flight" or "workspace"."""
+        if self.replay is not None and self.replay.reference is not None:
+            return "flight"
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
 
 def read(target: str, robot: str | None = None) -> Subject:
-    """Read a robot, a plan or a workspace.
+    """Read a robot, a plan, a flight or a workspace.
 
     Parameters
     ----------
     target
-        A robot of the library or a robot file; a plan or a workspace as NetCDF, or a workspace as a Zarr folder.
+        A robot of the library or a robot file; a plan, a flight or a workspace as NetCDF, or a workspace as a Zarr
+        folder.
     robot
         The robot of a workspace, if it is not in the library: a workspace file has only the name.
 

@@ -18,6 +18,7 @@ from .instant import Instant, arrow
 from .subject import Subject
 
 MUTED = "#595959"
+GHOST = style.colour(2)  # of the reference of a flight
 STOPS = 9  # of the legend's gradient
 COLUMNS = (("cable", "left", 0), ("tension", "right", 10), ("", "left", 0), ("limits [N]", "left", 10))
 BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums"
@@ -102,6 +103,7 @@ def legend(subject: Subject, cell: float) -> str:
     )
     marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
     marks += [("path of the platform", style.colour(0))] if subject.replay else []
+    marks += [("reference of the platform", GHOST)] if subject.kind == "flight" else []
     marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
     marks += [("reach of a carrier", style.colour(3))] if any(c.drawing.boxes for c in robot.carriers) else []
     marks += [("direction of the wrench that is missing (its force)", style.colour(1))]

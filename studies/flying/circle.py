@@ -20,8 +20,10 @@ from ...ocp import Plan, Task, plan
 from ...ocp.nlp.solver import Progress
 from ...ocp.tasks.paths import AnyPath, CirclePath, RestPath
 from ...ocp.tasks.task import FreeBase, HoldBase
+from ...simulation import Flight, simulate
 
 HOVER = (50.0, 50.0, 100.0, 0.0, 0.0, 0.0)  # paper F, section VI.B [m, rad]
+WIND, GUSTS = (3.0, 2.0, 0.5), 0.5  # [m/s], the mean and the intensity of turbulence about it
 CIRCLE = CirclePath(kind="circle", centre=(50.0, 50.0, 99.0), radius=1.0, rate=0.2 * np.pi)
 
 
@@ -63,3 +65,10 @@ def run(folder: Path, progress: Progress | None = None) -> FlyingCircle:
     }
     pictures = [style.save(drawing, folder / f"{name}.png") for name, drawing in drawings.items()]
     return FlyingCircle(hovering, free, pictures, files)
+
+
+def fly(folder: Path, planned: Plan) -> tuple[Flight, list[Path]]:
+    """Fly a plan in gusts; return the flight, and the NetCDF file and the picture written into `folder`."""
+    flight = simulate(planned.scenario.robot, planned, wind=WIND, gusts=GUSTS)
+    file = flight.save(folder / "circle-flight.nc")
+    return flight, [file, style.save(flight.figures()["flight"], folder / "flight.png")]

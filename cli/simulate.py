@@ -1,0 +1,183 @@
+"""`towline simulate`: fly a plan, step by step, in wind, with sensors and faults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from ..inputs import one_of
+from ..processors import one_thread_each
+from .options import JsonOption, RobotArgument, numbers, print_json, print_written
+from .watching import COMPILING, watching
+
+if TYPE_CHECKING:
+    from ..models import Robot
+
+CONTROLLERS = ("computed-torque", "open-loop")
+
+
+def simulate(
+    robot: RobotArgument,
+    plan: Annotated[
+        Path,
+        typer.Argument(metavar="PLAN", help="A plan of this robot: a file that `towline plan` wrote (NetCDF)."),
+    ],
+    controller: Annotated[
+        str, typer.Option(help=f"The controller: {', '.join(CONTROLLERS)}; Python accepts controllers of your own.")
+    ] = CONTROLLERS[0],
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'X Y Z'",
+            help="Velocity of the air [m/s], for robots with platform.aero; default: no air, and so no drag.",
+        ),
+    ] = None,
+    gusts: Annotated[
+        float, typer.Option(metavar="SIGMA", help="With --wind: intensity of turbulence (Dryden) about it [m/s].")
+    ] = 0.0,
+    noise: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Errors and delay of the sensors (YAML), such as {position: 0.001, delay: 0.002}."
+        ),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="FAULT",
+            help="What breaks: 'cut 3 at 2.5' (cable 3 tears at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
+            "'miss 0.05 at 1.2' (no command for 0.05 s). Repeat the option for more.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(help="Time of the flight [s]; default: that of the plan, at whose end the robot rests."),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="Largest error of the position of a flight that passes [m].")] = 0.05,
+    seed: Annotated[int, typer.Option(help="Of gusts and noise; the same seed gives the same flight.")] = 0,
+    runs: Annotated[
+        int | None,
+        typer.Option(help="Number of flights, with the seeds from --seed on. Writes one table instead of one flight."),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="NetCDF file to write; default: PLAN-flight.nc in this folder, with --runs PLAN-flights.nc. An "
+            "existing file is overwritten.",
+        ),
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(
+            "--figures", help="Folder to draw in: error, tensions and answers; with --runs: errors of all flights."
+        ),
+    ] = None,
+    animate: Annotated[
+        Path | None, typer.Option("--animate", help="Film of the flight to write: .gif, or .mp4 with ffmpeg.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="Speed of the film; 1 is real time.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Frames per second of the film.")] = 20.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Fly a plan with a controller, in wind, with slack cables, sensors and faults.
+
+    A flight passes if it lasts, its error stays within --tolerance, no tension exceeds t_max and no cable goes slack.
+    The exit code is 0 if the flight passes, with --runs if all of them do, and else 1.
+    """
+    one_of("--controller", controller, CONTROLLERS)
+    if runs is None and workers != 1:
+        raise InputError("--workers must be left out without --runs: it is an option of many flights")
+    if runs is not None and animate is not None:
+        raise InputError(f"--animate must be left out with --runs, got {animate}")
+    # Before libraries load: the processes of --workers share the processors.
+    with one_thread_each():
+        from ..control import OpenLoop
+        from ..models import load
+        from ..models.parsing import read_yaml
+        from ..simulation import Noise
+        from ..writing import check_writable
+
+        loaded = load(robot)
+        if not plan.is_file():
+            raise InputError(f"{plan}: no such file")
+        target = out if out is not None else Path(f"{plan.stem}-flight{'' if runs is None else 's'}.nc")
+        if target.resolve() == plan.resolve():
+            raise InputError(f"--out must be another file than the plan, got {target}")
+        if animate is not None:
+            from ..figures.animation import check_film
+
+            check_film(animate, speed, fps)
+        for file in (target, animate, figures and figures / "error.png"):
+            if file is not None:
+                check_writable(file)
+        conditions = {
+            "wind": None if wind is None else numbers("--wind", wind, 3),
+            "controller": OpenLoop(loaded) if controller == "open-loop" else None,
+            "gusts": gusts,
+            "noise": None if noise is None else read_yaml(noise, Noise),
+            "faults": fault or (),
+            "duration": duration,
+            "tolerance": tolerance,
+            "seed": seed,
+        }
+        if runs is None:
+            film = None if animate is None else (animate, speed, fps)
+            passed = _fly_once(loaded, plan, conditions, target, figures, film, as_json)
+        else:
+            passed = _fly_often(loaded, plan, conditions | {"runs": runs, "workers": workers}, target, figures, as_json)
+    if not passed:
+        raise typer.Exit(1)
+
+
+def _fly_once(
+    robot: Robot,
+    plan: Path,
+    conditions: dict[str, Any],
+    target: Path,
+    figures: Path | None,
+    film: tuple[Path, float, float] | None,
+    as_json: bool,
+) -> bool:
+    """Fly once, save, draw and print; return whether the flight passed."""
+    from ..simulation import simulate
+
+    with watching(f"flying {plan.stem} {COMPILING}", quiet=as_json) as watch:
+        flight = simulate(robot, plan, **conditions)
+        written = {"file": flight.save(target)}
+        watch.now("drawing")
+        pictures = [] if figures is None else flight.plot(figures)
+        if film is not None:
+            written["animation"] = flight.animate(*film)
+    if as_json:
+        print_json({**flight.to_dict(), **written, "figures": pictures})
+    else:
+        typer.echo(flight.report())
+        print_written((*written.values(), *pictures))
+    return flight.passed
+
+
+def _fly_often(
+    robot: Robot, plan: Path, conditions: dict[str, Any], target: Path, figures: Path | None, as_json: bool
+) -> bool:
+    """Fly with many seeds, save, draw and print; return whether all flights passed."""
+    from ..figures import flight as drawn
+    from ..figures import style
+    from ..simulation import simulate
+    from ..simulation.flights import report, save, summary
+
+    with watching(f"flying {plan.stem} {conditions['runs']} times {COMPILING}", quiet=as_json):
+        flights = simulate(robot, plan, **conditions)
+        file = save(flights, target)
+        pictures = [] if figures is None else [style.save(drawn.errors(flights), figures / "errors.png")]
+    if as_json:
+        print_json({**summary(flights), "file": file, "figures": pictures})
+    else:
+        typer.echo(report(flights))
+        print_written((file, *pictures))
+    return bool(flights["passed"].all())

@@ -1,0 +1,222 @@
+"""Draw a flight over time: error, wind, carriers, tensions, how steps were answered; and the errors of many flights."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DASHES = ("-", "--", ":")
+OFFSET = 1e-6  # [m]; carriers that stay so near to their reference have no panel
+GREY = "#d4d4d4"
+GAP = 0.06  # of a panel's height, between the names of curves at its edge
+HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
+DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
+DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
+SCALES = ((1.0, "m"), (1e-4, "mm"), (1e-7, "µm"))  # the least lengths for which units are used
+UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}
+
+
+def flight(trajectory: xr.Dataset) -> Figure:
+    """Draw error, wind and carriers' offsets, as far as there are some, and how each step was answered, over time."""
+    time = trajectory["time"].values
+    draws: list[tuple[str, float, Any]] = [("", 1.7, _draw_error)]
+    if "wind" in trajectory:
+        draws.append(("wind [m/s]", 1.3, _draw_wind))
+    if _offsets(trajectory).max(initial=0.0) > OFFSET:
+        draws.append(("", 1.3, _draw_offsets))
+    answers = _answers(trajectory)
+    draws.append(("", 0.1 + 0.18 * len(answers), _draw_answers))
+    heights = [height for _, height, _ in draws]
+    canvas = style.figure(5.0, 0.9 + 1.15 * sum(heights))
+    panels = style.panels_below(canvas, "time [s]", [label for label, _, _ in draws], heights)
+    for ax, (_, _, draw) in zip(panels, draws, strict=True):
+        draw(ax, trajectory)
+        ax.set_xlim(time[0], _end(time))
+    canvas.align_ylabels(panels[:-1])
+    return canvas
+
+
+def tensions(trajectory: xr.Dataset) -> Figure:
+    """Draw real tensions, those commanded where they differ, their limits, and grey spans in which a cable is slack."""
+    canvas = style.figure(5.0, 3.8)
+    ax = style.axes(canvas, "time [s]", "tension [N]")
+    time, real, commanded = (trajectory[name].values for name in ("time", "tensions", "tensions_commanded"))
+    t_min, t_max = trajectory["t_min"].values, trajectory["t_max"].values
+    low, high = float(np.nanmin([real, commanded])), float(np.nanmax([real, commanded]))
+    differs = np.abs(real - commanded) > DIFFERENCE * max(high - low, 1e-9)
+    for index in range(real.shape[1]):
+        hue = style.colour(index)
+        ax.plot(time, real[:, index], linestyle=style.line_style(index), color=hue, linewidth=1.3)
+        ax.plot(time, np.where(differs[:, index], commanded[:, index], np.nan), "--", color=hue, linewidth=1.0)
+    ax.plot([], [], color="#444444", linewidth=1.3, label="real" if differs.any() else "real, and as commanded")
+    if differs.any():
+        ax.plot([], [], "--", color="#444444", linewidth=1.0, label="commanded, where it differs")
+    slack = (real <= 0) & (t_min > 0)
+    if slack.any():
+        for start, stop in _spans(time, np.asarray(slack.any(axis=1))):
+            ax.axvspan(start, stop, color=GREY, linewidth=1.0, zorder=0)
+        names = ", ".join(str(cable) for cable in trajectory["cable"].values[slack.any(axis=0)])
+        ax.fill_between([], [], color=GREY, label=f"slack: cable {names}")
+    reach = max(high - low, 0.3 * max(abs(low), abs(high)))  # limits farther away than this would flatten the curves
+    limits = [("t_min", float(limit)) for limit in np.unique(t_min)]
+    limits += [("t_max", float(limit)) for limit in np.unique(t_max)]
+    near = [limit for limit in limits if low - reach <= limit[1] <= high + reach]
+    low, high = min([low, *(limit for _, limit in near)]), max([high, *(limit for _, limit in near)])
+    ax.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
+    for name, limit in near:
+        style.limit_line(ax, limit, f"{name} = {limit:g} N", place=0.01, above=name == "t_max")
+    if far := [f"{name} = {limit:g} N" for name, limit in limits if (name, limit) not in near]:
+        ax.set_title(f"{', '.join(far)} (outside the plot)", fontsize=9)
+    ax.set_xlim(time[0], _end(time))
+    _name_at_the_end(ax, real[-1], [str(cable) for cable in trajectory["cable"].values])
+    style.legend_below(canvas, ax)
+    return canvas
+
+
+def errors(flights: xr.Dataset) -> Figure:
+    """Draw the largest error of each of many flights, from the smallest to the largest, with the tolerance."""
+    canvas = style.figure(5.0, 3.2)
+    largest, tolerance = np.sort(flights["error_max"].values), float(flights.attrs["tolerance_m"])
+    passed = flights["passed"].values[np.argsort(flights["error_max"].values, kind="stable")]
+    scale, unit = _scale(largest[-1])
+    ax = style.axes(canvas, "share of the flights [%]", f"largest error [{unit}]")
+    share = 100 * (np.arange(len(largest)) + 0.5) / len(largest)
+    ax.plot(share, largest / scale, color="#999999", linewidth=0.8)
+    ax.plot(share[passed], largest[passed] / scale, "o", markersize=3, color=style.colour(0), label="passed")
+    ax.plot(share[~passed], largest[~passed] / scale, "x", markersize=5, color=style.colour(1), label="failed")
+    if largest[0] * DECADES < largest[-1] and largest[0] > 0:
+        ax.set_yscale("log")
+    else:
+        ax.set_ylim(bottom=0.0)
+    _draw_tolerance(ax, tolerance, largest[-1], scale)
+    ax.set_xlim(0, 100)
+    ax.legend(fontsize="small", loc="best")
+    return canvas
+
+
+def _draw_error(ax: Axes, trajectory: xr.Dataset) -> None:
+    error = trajectory["tracking_error"].values
+    largest = float(error.max(initial=0.0, where=np.isfinite(error)))
+    scale, unit = _scale(largest)
+    ax.plot(trajectory["time"].values, error / scale, color=style.colour(0), linewidth=1.2)
+    ax.set_ylabel(f"error [{unit}]")
+    ax.set_ylim(bottom=0.0)
+    _draw_tolerance(ax, float(trajectory.attrs["tolerance_m"]), largest, scale)
+
+
+def _draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) -> None:
+    """Draw the tolerance if it is near, else name it."""
+    own, unit = _scale(tolerance)
+    text = f"tolerance {tolerance / own:g} {unit}"
+    if tolerance < 2 * largest:
+        style.limit_line(ax, tolerance / scale, text, place=0.01)
+        ax.set_ylim(top=1.2 * max(tolerance, largest) / scale)
+    else:
+        ax.set_title(f"{text} (outside the plot)", fontsize=9, loc="left")
+
+
+def _draw_wind(ax: Axes, trajectory: xr.Dataset) -> None:
+    for index, (axis, values) in enumerate(zip("xyz", trajectory["wind"].values.T, strict=True)):
+        ax.plot(trajectory["time"].values, values, DASHES[index], color=style.colour(index), linewidth=1.1, label=axis)
+    _legend_beside(ax)
+
+
+def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
+    offsets = _offsets(trajectory)
+    scale, unit = _scale(float(offsets.max()))
+    ax.set_ylabel(f"offset of\ncarriers [{unit}]")
+    names = trajectory["carrier"].values[trajectory["carrier_moves"].values]
+    for index, name in enumerate(names):
+        look = {"color": style.colour(index), "linestyle": DASHES[index % len(DASHES)], "linewidth": 1.1}
+        ax.plot(trajectory["time"].values, offsets[:, index] / scale, **look, label=str(name))
+    ax.set_ylim(bottom=0.0)
+    _legend_beside(ax)
+
+
+def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
+    """Draw a row for each kind of answer, black where steps were answered so."""
+    time, answered = trajectory["time"].values, trajectory["answered"].values
+    answers = _answers(trajectory)
+    for row, flag in enumerate(answers.values()):
+        spans = [(start, stop - start) for start, stop in _spans(time, answered == flag)]
+        ax.broken_barh(spans, (row - 0.35, 0.7), facecolor="#444444", edgecolor="#444444", linewidth=0.8)
+    ax.set_yticks(range(len(answers)), list(answers))
+    ax.set_ylim(len(answers) - 0.5, -0.5)
+    ax.grid(False)
+    ax.tick_params(axis="y", length=0)
+    ax.set_title("how each step was answered", fontsize=9, loc="left")
+
+
+def _answers(trajectory: xr.Dataset) -> dict[str, int]:
+    """Return the answers that the flight has, with their numbers."""
+    variable = trajectory["answered"]
+    words = str(variable.attrs["flag_meanings"]).split()
+    known = zip(words, np.ravel(variable.attrs["flag_values"]).tolist(), strict=True)
+    there = set(np.unique(variable.values).tolist())
+    return {word.replace("_", " "): flag for word, flag in known if flag in there}
+
+
+def _offsets(trajectory: xr.Dataset) -> np.ndarray:
+    """Return the distances of the carriers that move from their reference, (n, c) [m]."""
+    moves = trajectory["carrier_moves"].values
+    off = trajectory["carrier_pose"].values[:, moves, :3] - trajectory["carrier_reference"].values[:, moves, :3]
+    return np.linalg.norm(off, axis=2)
+
+
+def _spans(time: np.ndarray, where: np.ndarray) -> list[tuple[float, float]]:
+    """Return the spans of periods for which `where` holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
+    ends = np.append(time, _end(time))
+    return [(float(ends[start]), float(ends[stop])) for start, stop in edges.reshape(-1, 2)]
+
+
+def _end(time: np.ndarray) -> float:
+    """Return the end of the last period."""
+    return float(time[-1] + (time[-1] - time[-2] if len(time) > 1 else 1e-3))
+
+
+def _scale(largest: float) -> tuple[float, str]:
+    """Return the unit in which the largest of some lengths reads best, with its size [m]."""
+    unit = next((name for least, name in SCALES if largest >= least), SCALES[-1][1])
+    return UNITS[unit], unit
+
+
+def _legend_beside(ax: Axes) -> None:
+    ax.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, handlelength=1.6)
+
+
+def _name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
+    """Write the numbers of cables beside the ends of their curves, so that they are distinct without colours."""
+    low, high = ax.get_ylim()
+    places = (np.clip(values, low, high) - low) / (high - low)
+    order = np.argsort(places)
+    for cable, place in zip(order, _spread(places[order]), strict=True):
+        ax.annotate(
+            names[cable],
+            (1.0, places[cable]),
+            xytext=(1.05, place),
+            xycoords="axes fraction",
+            va="center",
+            fontsize=9,
+            arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
+            annotation_clip=False,
+        )
+    ax.annotate("cable", (1.0, 1.02), xycoords="axes fraction", fontsize=9)
+
+
+def _spread(places: np.ndarray) -> np.ndarray:
+    """Return increasing places with distances of at least `GAP`, moved as much up as down."""
+    gaps = GAP * np.arange(len(places))
+    up = np.maximum.accumulate(places - gaps) + gaps
+    down = np.minimum.accumulate((places - gaps)[::-1])[::-1] + gaps
+    apart = (up + down) / 2
+    apart += max(0.0, -apart[0])  # all of them, so that none leaves the panel below
+    return np.minimum(apart, HIGHEST - gaps[::-1])
