@@ -98,9 +98,10 @@ class ComputedTorque(Controller):
         self._gains = np.zeros((GAINS, 6))
         self._gains[KP], self._gains[KD], self._gains[KI] = w**2, 2 * z * w, _positive("integral", integral, 6)
         self._gains[OBSERVER] = number("observer", observer, 0.0, 1e4)
-        self._gains[CARRIERS, :2] = (
+        self._gains[CARRIERS, :3] = (
             number("carrier_bandwidth", carrier_bandwidth, 0.0, 1e3),
             number("carrier_acceleration", carrier_acceleration, 0.0, 1e4),
+            float(few),
         )
         patience = number("patience", patience, 1e-6, 1e6)
         self._patience = patience if self.robot.fixed_lengths is None else np.inf

@@ -31,7 +31,7 @@ from ..models.plant.layout import (
     U,
 )
 from ..models.plant.lines import run_cables
-from .reaction import add_offsets, react
+from .reaction import CORRECTS, add_offsets, react
 
 # Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has the bandwidth of their
 # reaction and its largest acceleration.
@@ -106,6 +106,7 @@ def write_rows(
     count, m = bodies.shape[0], cables.shape[0]
     places = BODY * count
     state, wanted, momentum = np.zeros(places + CABLE_BLOCKS * m), np.zeros(6), np.zeros(6)
+    missing = np.zeros(6)
     command = np.zeros(COMMANDS + m + CARRIER * count)
     on_bodies, on_cables = np.zeros((count, BODY_WORK)), np.zeros((m, CABLE_WORK))
     columns, gram = np.zeros((6 * reach.shape[0], 6)), np.zeros((6, 7))
@@ -136,8 +137,14 @@ def write_rows(
         for k in range(6):
             w[row, k] = mask[k] * (w[row, k] - memory[row, DISTURBANCE, k])
         if reach.shape[0] > 0:
+            for k in range(6):
+                missing[k] = -mask[k] * memory[row, DISTURBANCE, k]
+                if gains[CARRIERS, CORRECTS] == 1.0:
+                    missing[k] = w[row, k]
+                    for i in range(m):
+                        missing[k] -= A[row, k, i] * t_ref[row, i]
             react(
-                settings, gains[CARRIERS], dt, reach, cables, on_cables, A[row], w[row], t_ref[row], reactions[row],
+                settings, gains[CARRIERS], dt, reach, cables, on_cables, A[row], missing, t_ref[row], reactions[row],
                 columns, gram, carriers[row],
             )  # fmt: skip
 

@@ -1,11 +1,15 @@
 """Kernel: how carriers move off their reference to help the tensions.
 
-The wrench of tensions t at the places p of the carriers is A(p) t. To first order the wanted change of it,
+The wrench of tensions t at the places p of the carriers is A(p) t. To first order a wanted change of it is
 
-    dw = w - A t_ref = A dt + G dp        G: turns or moves the cables of a carrier, with t_ref in them
+    dw = A dt + G dp        G: moves or turns the cables of a carrier, with t_ref in them
 
-has the solution of least norm, each coordinate of a carrier measured by its reach and each tension by a share of the
-weight. Carriers go there as a critically damped lag of second order does, so that their command is smooth.
+of which the solution of least norm is taken, each coordinate of a carrier measured by its reach and each tension by a
+share of the weight. Carriers go there as a critically damped lag of second order does: their command is smooth.
+
+With as many cables as degrees of freedom or more, dw = -d, the disturbance: the carriers take over what is steady, and
+the tensions correct errors. With fewer the carriers have to correct them too: dw = w - A t_ref where they are now, and
+dp adds to the offset that they have.
 """
 
 import math
@@ -23,17 +27,21 @@ from ..models.plant.layout import (
 SHARE = 0.05  # of the weight: the change of a tension that costs as much as a carrier at the end of its reach
 DAMPED = 1e-4  # of the largest entry of the gram matrix
 OFFSET, OFFSET_RATE = 0, 1  # of the memory of a reaction
+BANDWIDTH, STRONGEST, CORRECTS = 0, 1, 2  # of its gains
 
 
-def react(settings, gains, dt, reach, cables, on_cables, A, w, t_ref, memory, columns, gram, carriers):
+def react(settings, gains, dt, reach, cables, on_cables, A, missing, t_ref, memory, columns, gram, carriers):
     """Update the memory of a row, and add it to the motion that carriers should have.
 
     Parameters
     ----------
     gains
-        Bandwidth of the lag [rad/s], and its largest acceleration in a coordinate [m/s^2, rad/s^2].
+        BANDWIDTH of the lag [rad/s], its STRONGEST acceleration in a coordinate [m/s^2, rad/s^2], and 1 if it CORRECTS
+        errors, else 0.
     reach
         (c, 6), how far each coordinate may go [m, rad].
+    missing
+        dw, (6,) [N, N m].
     memory
         (2, c, 6), offset and its rate.
     columns, gram
@@ -41,16 +49,14 @@ def react(settings, gains, dt, reach, cables, on_cables, A, w, t_ref, memory, co
     carriers
         (c, 3, 6), pose, velocity and acceleration of the reference; those of the command afterwards.
     """
-    bandwidth, most = gains[0], gains[1]
+    bandwidth, most = gains[BANDWIDTH], gains[STRONGEST]
     scale = 1.0 / settings[LENGTH_SCALE]
     share = SHARE * settings[FORCE_SCALE]
     write_columns(scale, reach, cables, on_cables, t_ref, columns)
     largest = 0.0
     for j in range(6):
         by = 1.0 if j < 3 else scale
-        gram[j, 6] = by * w[j]
-        for i in range(A.shape[1]):
-            gram[j, 6] -= by * A[j, i] * t_ref[i]
+        gram[j, 6] = by * missing[j]
         for k in range(6):
             gram[j, k] = 0.0
             for i in range(A.shape[1]):
@@ -66,8 +72,8 @@ def react(settings, gains, dt, reach, cables, on_cables, A, w, t_ref, memory, co
             offset, rate, change = memory[OFFSET, c, k], memory[OFFSET_RATE, c, k], 0.0
             for j in range(6):
                 change += columns[6 * c + k, j] * gram[j, 6]
-            # dw is what the tensions lack where the carrier is now.
-            wanted = min(max(offset + change * reach[c, k], -reach[c, k]), reach[c, k])
+            wanted = gains[CORRECTS] * offset + change * reach[c, k]
+            wanted = min(max(wanted, -reach[c, k]), reach[c, k])
             bend = bandwidth * (bandwidth * (wanted - offset) - 2.0 * rate)
             bend = min(max(bend, -most), most)
             if dt > 0.0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -51,3 +51,24 @@ class Conditions(NamedTuple):
     disturbance: np.ndarray
     noise: Noise
     faults: tuple[Fault, ...]
+
+    def should_pull(self, t_min: np.ndarray, periods: np.ndarray) -> np.ndarray:
+        """Return where a slack cable is a failure, (n, m): one with a lowest tension (m,) [N] that no fault has cut.
+
+        `periods`, (n,), are their numbers.
+        """
+        result = np.tile(t_min > 0, (len(periods), 1))
+        for fault in self.faults:
+            if fault.kind == "cut":
+                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.cable] = False
+        return result
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the references do not hold, ready for JSON."""
+        return {
+            "period": self.period,
+            "substeps": self.substeps,
+            "disturbance": self.disturbance.tolist(),
+            "noise": self.noise.model_dump(exclude_defaults=True),
+            "faults": [fault._asdict() for fault in self.faults],
+        }

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from ..control import ANSWERS, Command, Reference
+from ..control import ANSWERS, Command
+from .conditions import Conditions
 
 __all__ = ["Extremes"]
 
@@ -28,8 +27,9 @@ class Extremes:
         How many steps were answered in each way of `ANSWERS`, (N, 4).
     """
 
-    def __init__(self, references: Sequence[Reference], t_min: np.ndarray, t_max: np.ndarray, flights: int):
-        self._references, self._taut, self._t_max, self._range = references, t_min > 0, t_max, t_max - t_min
+    def __init__(self, conditions: Conditions, t_min: np.ndarray, t_max: np.ndarray, flights: int):
+        self._references, self._t_max, self._range = conditions.references, t_max, t_max - t_min
+        self._taut = conditions.should_pull(t_min, np.arange(len(conditions.references)))
         self._rows = np.arange(flights)
         self.squares, self.error_max, self.slack = np.zeros(flights), np.zeros(flights), np.zeros(flights, dtype=int)
         self.tension_min, self.tension_max = np.full(flights, np.inf), np.full(flights, -np.inf)
@@ -45,5 +45,5 @@ class Extremes:
         np.minimum(self.tension_min, tensions.min(axis=1), out=self.tension_min)
         np.maximum(self.tension_max, tensions.max(axis=1), out=self.tension_max)
         np.maximum(self.exceeded, ((tensions - self._t_max) / self._range).max(axis=1), out=self.exceeded)
-        self.slack += ((tensions <= 0) & self._taut).any(axis=1)
+        self.slack += ((tensions <= 0) & self._taut[k]).any(axis=1)
         self.answers[self._rows, command.answered] += 1

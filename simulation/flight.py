@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +19,7 @@ from ..models.part import COORDINATES
 from ..models.robot import Robot
 from ..netcdf import Contents, Variable, save_netcdf
 from ..text import quantity
+from .conditions import Conditions
 from .record import Record
 
 if TYPE_CHECKING:
@@ -37,12 +39,12 @@ class Flight:
     ----------
     robot
         The robot.
-    references
-        One for each period of the controller.
+    conditions
+        References, faults and noise, see `Conditions`.
+    seed
+        Of wind and noise.
     record
         What happened, a row for each period.
-    period
-        Of the controller [s].
     lasted
         How many periods the flight lasted, fewer than there are references if the motion grew beyond all numbers.
     tolerance
@@ -56,14 +58,24 @@ class Flight:
     """
 
     robot: Robot
-    references: list[Reference]
+    conditions: Conditions
+    seed: int
     record: Record
-    period: float
     lasted: int
     tolerance: float
     wind: np.ndarray | None
     seconds: np.ndarray
     wall: float
+
+    @property
+    def references(self) -> Sequence[Reference]:
+        """Return the reference of each period."""
+        return self.conditions.references
+
+    @property
+    def period(self) -> float:
+        """Return the period of the controller [s]."""
+        return self.conditions.period
 
     @property
     def _recorded(self) -> int:
@@ -84,7 +96,8 @@ class Flight:
     @cached_property
     def slack(self) -> np.ndarray:
         """Return where a cable is slack that should pull, (n, m)."""
-        return (self.record.tensions[: self._recorded] <= 0) & (self.robot.t_min > 0)
+        pulls = self.conditions.should_pull(self.robot.t_min, np.arange(self._recorded))
+        return (self.record.tensions[: self._recorded] <= 0) & pulls
 
     @property
     def passed(self) -> bool:
@@ -214,6 +227,7 @@ class Flight:
             "status": "passed" if self.passed else "failed",
             "tolerance_m": self.tolerance,
             "robot": to_yaml(robot),
+            "conditions": json.dumps({"seed": self.seed, **self.conditions.to_dict()}),
             "report": json.dumps(self.figures_of_merit()),
         }
         coordinates = {

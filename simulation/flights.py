@@ -30,7 +30,7 @@ __all__ = ["flights", "fly_block", "report", "save", "summary"]
 def fly_block(plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int]) -> dict[str, Any]:
     """Fly a block of flights side by side, and return the numbers of each, (N,) or (N, 4)."""
     robot = plant.robot
-    kept = Extremes(conditions.references, robot.t_min, robot.t_max, len(seeds))
+    kept = Extremes(conditions, robot.t_min, robot.t_max, len(seeds))
     lasted, _ = fly(plant, controller, conditions, seeds, kept)
     return {
         "lasted": lasted,

@@ -220,9 +220,9 @@ def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int
     wind = Orders(plant, conditions, [seed]).wind
     return Flight(
         robot=robot,
-        references=list(conditions.references),
+        conditions=conditions,
+        seed=seed,
         record=record,
-        period=conditions.period,
         lasted=int(lasted[0]),
         tolerance=tolerance,
         wind=None if wind is None else wind[:, 0],

@@ -12,7 +12,7 @@ from ..models.plant import Plant, layout
 
 __all__ = ["steps_in"]
 
-ANGLE = 0.5  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
+ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
 
 
 def steps_in(period: float, plant: Plant) -> int:

@@ -118,7 +118,7 @@ def test_a_cut_cable_is_survived_where_the_others_can_do_without_it(name, surviv
     after = flight.record.answered[900:]
     assert possible == survives
     if survives:
-        assert flight.error.max() < 0.02, flight.report()
+        assert flight.passed, flight.report()
         assert flight.error[-1] < 1e-3
         assert (after == 0).all()
         assert (flight.record.commanded[400:, 0] == 0).all()
