@@ -134,6 +134,16 @@ class ComputedTorque(Controller):
         reach = self._reach if len(self._reach) else np.zeros((len(self.robot.carriers), 6))
         return uncontrolled(self.robot, reach)
 
+    @property
+    def cut(self) -> np.ndarray:
+        """Return which cables count as cut, (n, m)."""
+        return self._silent >= self._patience
+
+    @property
+    def problems(self) -> InPlace:
+        """Return the problem of the last step, for each row: wrench matrix, wrench and bounds of the tensions."""
+        return self._problems
+
     def _begin(self, rows: int) -> None:
         """Make the memory of one robot, or of as many as a batch has rows."""
         m, count = self.robot.m, len(self.robot.carriers)

@@ -40,6 +40,8 @@ COM, TOTAL_MASS = SETTINGS, SETTINGS + 3
 # Rows of `limits`, and tensions that a cable reports after it is cut and may be commanded before, of its upper limit.
 LOWEST, HIGHEST, RATE_MAX = 0, 1, 2
 NOTHING, SOMETHING = 1e-4, 1e-3
+# No sensor reports more [m, rad, m/s, rad/s, N]; beyond, squares would fill the memory with infinities.
+LARGEST = 1e9
 # Rows of `memory`: integral of the error, estimated disturbance, and momentum less what the estimate explains.
 INTEGRAL, DISTURBANCE, EXPLAINED, MEMORY = 0, 1, 2, 3
 
@@ -66,7 +68,8 @@ def write_rows(
 ):
     """Update the memory of each row of a batch, and write its wrench matrix, wrench and bounds of tensions.
 
-    A row with a number that is not finite keeps its memory, and gets a wrench of nan.
+    A row with a number that is not finite or beyond LARGEST, or a cable without length, keeps its memory, and gets a
+    wrench of nan.
 
     Parameters
     ----------
@@ -112,18 +115,21 @@ def write_rows(
     columns, gram = np.zeros((6 * reach.shape[0], 6)), np.zeros((6, 7))
     for row in range(measured.shape[0]):
         write_bounds(limits, patience, dt, pulls[row], silent[row], bounds[:, row])
-        if not is_finite(measured[row], reference[row], pulls[row]):
+        usable = is_usable(measured[row], reference[row], pulls[row])
+        if usable:
+            for b in range(count):
+                put_body(state, BODY * b, measured[row, b])
+            place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
+            move_to_com(settings, state, on_bodies)
+            run_cables(cables, state, on_bodies, on_cables, places)
+            write_wrench_matrix(mask, on_cables, A[row])
+            usable = is_finite(A[row])
+        if not usable:
             for k in range(6):
                 w[row, k] = math.nan
             if reach.shape[0] > 0:
                 add_offsets(reactions[row], carriers[row])
             continue
-        for b in range(count):
-            put_body(state, BODY * b, measured[row, b])
-        place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
-        move_to_com(settings, state, on_bodies)
-        run_cables(cables, state, on_bodies, on_cables, places)
-        write_wrench_matrix(mask, on_cables, A[row])
         for k in range(6):
             error = reference[row, k] - measured[row, 0, k]
             if k >= 3:
@@ -154,7 +160,7 @@ def write_bounds(limits, patience, dt, pulls, silent, bounds):
     for i in range(limits.shape[1]):
         step, last, highest = limits[RATE_MAX, i] * dt, pulls[1, i], limits[HIGHEST, i]
         if pulls[0, i] <= NOTHING * highest and last >= SOMETHING * highest:
-            silent[i] += dt
+            silent[i] += min(dt, patience / 4.0)  # a step after a long pause is no more than one report
         elif silent[i] < patience:
             silent[i] = 0.0
         if silent[i] >= patience:
@@ -166,16 +172,25 @@ def write_bounds(limits, patience, dt, pulls, silent, bounds):
             bounds[0, i], bounds[1, i] = limits[LOWEST, i], highest
 
 
-def is_finite(measured, reference, pulls):
-    """Return whether all numbers of a row are finite."""
-    total = 0.0
+def is_usable(measured, reference, pulls):
+    """Return whether all numbers of a row are finite and at most LARGEST."""
+    usable = True
     for b in range(measured.shape[0]):
         for k in range(12):
-            total += 0.0 * measured[b, k]
+            usable &= abs(measured[b, k]) <= LARGEST
     for k in range(18):
-        total += 0.0 * reference[k]
+        usable &= abs(reference[k]) <= LARGEST
     for i in range(pulls.shape[1]):
-        total += 0.0 * pulls[0, i]
+        usable &= abs(pulls[0, i]) <= LARGEST
+    return usable
+
+
+def is_finite(A):
+    """Return whether all entries of a matrix are finite."""
+    total = 0.0
+    for k in range(6):
+        for i in range(A.shape[1]):
+            total += 0.0 * A[k, i]
     return total == 0.0
 
 

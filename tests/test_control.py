@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from towline.benchmarks.control_steps import random_steps
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State
 from towline.distribution import tensions as distribute
 from towline.errors import InputError
@@ -222,3 +223,13 @@ def test_open_loop_orders_the_plan_and_drifts_where_computed_torque_stays():
     assert adrift.error[-1] > 10 * stays.error[-1]
     with pytest.raises(InputError, match="quad1"):
         OpenLoop("multi-quadrotor-3")
+
+
+@pytest.mark.parametrize("name", ["ipanema-2", "wang-flying-quadrotor", "wang-ctmrts-4"])
+def test_random_steps_of_closed_loops_keep_every_promise(name):
+    """With kicks, jumps, pauses and sensors that report nonsense, as the benchmark does a million times."""
+    steps = random_steps(load(name), 3000, 5)
+    assert not steps.faults
+    assert steps.answered.sum() == 3000
+    assert steps.proofs > 1000
+    assert steps.answered[ANSWERS.index("hold")] > 300
