@@ -99,7 +99,7 @@ def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
         Naming the argument whose shape or value does not fit; also if the leading dimensions do not broadcast.
     """
     checked = {name: as_array(name, value, core) for name, (value, core) in values.items()}
-    _leading(checked, {name: core for name, (_, core) in values.items()})
+    leading({name: array.shape[: array.ndim - len(values[name][1])] for name, array in checked.items()})
     return list(checked.values())
 
 
@@ -139,7 +139,7 @@ class _Evaluator:
         arrays = self._arrays(arguments)
         if all(array.shape == core for array, core in zip(arrays.values(), self._cores.values(), strict=True)):
             return self._single(arrays)
-        batch = _leading(arrays, self._cores)
+        batch = leading({name: array.shape[: array.ndim - len(self._cores[name])] for name, array in arrays.items()})
         count = math.prod(batch)
         rows = [_rows(arrays[name], batch, size) for name, size in self.inputs.items()]
         outputs = {name: np.empty((count, *size)) for name, size in self.outputs.items()}
@@ -284,14 +284,19 @@ def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, A
     return result
 
 
-def _leading(arrays: dict[str, np.ndarray], cores: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the common leading dimensions."""
-    leading = {name: array.shape[: array.ndim - len(cores[name])] for name, array in arrays.items()}
+def leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the common leading dimensions of arguments, from those of each.
+
+    Raises
+    ------
+    InputError
+        If they differ where none is 1.
+    """
     try:
-        return np.broadcast_shapes(*leading.values())
+        return np.broadcast_shapes(*shapes.values())
     except ValueError:
-        shapes = ", ".join(str(shape) for shape in leading.values())
-        message = f"{', '.join(leading)} must have leading dimensions that are equal or 1, got {shapes}"
+        given = ", ".join(str(shape) for shape in shapes.values())
+        message = f"{', '.join(shapes)} must have leading dimensions that are equal or 1, got {given}"
         raise InputError(message) from None
 
 

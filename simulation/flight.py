@@ -14,8 +14,8 @@ import numpy as np
 
 from ..control import ANSWERS, Reference
 from ..inputs import file_path
+from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
-from ..models.part import COORDINATES
 from ..models.robot import Robot
 from ..netcdf import Contents, Variable, save_netcdf
 from ..text import quantity
@@ -230,15 +230,7 @@ class Flight:
             "conditions": json.dumps({"seed": self.seed, **self.conditions.to_dict()}),
             "report": json.dumps(self.figures_of_merit()),
         }
-        coordinates = {
-            "time": Variable(("time",), self.times, {"units": "s"}),
-            "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
-            "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),
-            "carrier_kind": Variable(("carrier",), np.array([carrier.kind for carrier in robot.carriers])),
-            "carrier_moves": Variable(("carrier",), np.array([carrier.moves for carrier in robot.carriers])),
-            "cable": Variable(("cable",), np.arange(1, robot.m + 1)),
-        }
-        return Contents(variables, coordinates, attributes)
+        return Contents(variables, dimensions(robot, self.times), attributes)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the flight as NetCDF, whole or not at all; the same seed gives the same bytes.

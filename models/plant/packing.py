@@ -11,7 +11,7 @@ from ..part import COORDINATES, inertia_matrix
 from ..robot import Robot
 from . import layout
 
-__all__ = ["bodies_of", "cables_of", "leading", "place", "settings_of"]
+__all__ = ["bodies_of", "cables_of", "place", "settings_of"]
 
 
 def bodies_of(robot: Robot) -> np.ndarray:
@@ -87,16 +87,6 @@ def settings_of(robot: Robot) -> np.ndarray:
         settings[layout.DRAG], settings[layout.LIFT] = area * aero.drag, area * aero.lift
         settings[layout.PRINTED] = float(aero.form == "printed")
     return settings
-
-
-def leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the common leading dimensions."""
-    try:
-        return np.broadcast_shapes(*shapes.values())
-    except ValueError:
-        given = ", ".join(str(shape) for shape in shapes.values())
-        message = f"{', '.join(shapes)} must have leading dimensions that are equal or 1, got {given}"
-        raise InputError(message) from None
 
 
 def place(block: np.ndarray, pose: np.ndarray, velocity: np.ndarray, com: np.ndarray) -> None:

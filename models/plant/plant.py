@@ -13,13 +13,13 @@ import numpy as np
 from ... import processors
 from ...errors import InputError, SolverError
 from ...inputs import number, one_of, shown, whole_number
-from ..batch import as_array
+from ..batch import as_array, leading
 from ..dynamics import dynamics_of
 from ..files import as_robot
 from ..robot import Robot
 from . import layout
 from .machine import run_rows
-from .packing import bodies_of, cables_of, leading, place, settings_of
+from .packing import bodies_of, cables_of, place, settings_of
 from .reading import Reading
 
 __all__ = ["History", "Plant"]

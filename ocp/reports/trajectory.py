@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 
+from ...models.dimensions import dimensions
 from ...models.parsing import to_yaml
-from ...models.part import COORDINATES
 from ...netcdf import Contents, Variable
 from ..result import Plan
 
@@ -56,14 +56,7 @@ def trajectory(plan: Plan) -> Contents:
         "task": to_yaml(task.in_file()),
         "report": json.dumps(plan.to_dict()),
     }
-    coordinates |= {
-        "time": Variable(("time",), audit.times[rows], {"units": "s"}),
-        "coordinate": Variable(("coordinate",), np.array(COORDINATES)),
-        "carrier": Variable(("carrier",), np.array([carrier.name for carrier in robot.carriers])),
-        "carrier_kind": Variable(("carrier",), np.array([carrier.kind for carrier in robot.carriers])),
-        "carrier_moves": Variable(("carrier",), np.array([carrier.moves for carrier in robot.carriers])),
-        "cable": Variable(("cable",), np.arange(1, robot.m + 1)),
-    }
+    coordinates |= dimensions(robot, audit.times[rows])
     return Contents(variables, coordinates, attributes)
 
 
