@@ -137,6 +137,10 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     ]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
+    if "phase_load" in dataset and (loads := dataset["phase_load"].values).any():
+        raise InputError(
+            f"reference must be a plan without loads, which flights do not carry, got one of {loads.max():g} kg"
+        )
     first, *_ = str(dataset.attrs.get("robot", "")).splitlines() or [""]
     name = first.removeprefix("name:").strip().strip("\"'")
     count, m = len(robot.carriers), robot.m

@@ -157,6 +157,12 @@ def test_a_controller_of_ones_own_that_orders_nothing_lets_the_load_fall():
     np.testing.assert_allclose(many["error_max"].values, flight.error.max())
 
 
+def test_a_plan_whose_loads_the_plant_would_not_carry_is_refused(crane):
+    loaded = crane.trajectory.assign(phase_load=("phase", [0.0, 12.0]))
+    with pytest.raises(InputError, match="without loads, which flights do not carry, got one of 12 kg"):
+        simulate("ipanema-1", loaded)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
