@@ -36,14 +36,25 @@ class Extremes:
         self.exceeded = np.zeros(flights)
         self.answers = np.zeros((flights, len(ANSWERS)), dtype=int)
 
-    def take(self, k: int, motions: np.ndarray, lengths: np.ndarray, tensions: np.ndarray, command: Command) -> None:
+    def take(
+        self,
+        k: int,
+        alive: np.ndarray,
+        motions: np.ndarray,
+        lengths: np.ndarray,
+        tensions: np.ndarray,
+        command: Command,
+    ) -> None:
         """Keep a period; see `flying.Recorder`."""
+        rows = slice(None) if alive.all() else np.flatnonzero(alive)
+        motions, tensions = motions[rows], tensions[rows]
         off = motions[:, 0, :3] - self._references[k].pose[:3]
         square = np.einsum("ij,ij->i", off, off)
-        self.squares += square
-        np.maximum(self.error_max, np.sqrt(square), out=self.error_max)
-        np.minimum(self.tension_min, tensions.min(axis=1), out=self.tension_min)
-        np.maximum(self.tension_max, tensions.max(axis=1), out=self.tension_max)
-        np.maximum(self.exceeded, ((tensions - self._t_max) / self._range).max(axis=1), out=self.exceeded)
-        self.slack += ((tensions <= 0) & self._taut[k]).any(axis=1)
-        self.answers[self._rows, command.answered] += 1
+        self.squares[rows] += square
+        self.error_max[rows] = np.maximum(self.error_max[rows], np.sqrt(square))
+        self.tension_min[rows] = np.minimum(self.tension_min[rows], tensions.min(axis=1))
+        self.tension_max[rows] = np.maximum(self.tension_max[rows], tensions.max(axis=1))
+        above = ((tensions - self._t_max) / self._range).max(axis=1)
+        self.exceeded[rows] = np.maximum(self.exceeded[rows], above)
+        self.slack[rows] += ((tensions <= 0) & self._taut[k]).any(axis=1)
+        self.answers[self._rows[rows], np.broadcast_to(command.answered, len(self._rows))[rows]] += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from math import isfinite
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -12,6 +13,7 @@ import numpy as np
 from ..control import Command, Controller, Reference, State
 from ..models.plant import Plant
 from ..models.plant.periods import Periods
+from .checking import check_command
 from .conditions import Conditions
 from .machine import sense_rows
 from .noise import Noise
@@ -19,19 +21,30 @@ from .orders import Orders
 
 __all__ = ["Recorder", "fly"]
 
+BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
 DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
 
 
 class Recorder(Protocol):
     """A record of flights."""
 
-    def take(self, k: int, motions: np.ndarray, lengths: np.ndarray, tensions: np.ndarray, command: Command) -> None:
+    def take(
+        self,
+        k: int,
+        alive: np.ndarray,
+        motions: np.ndarray,
+        lengths: np.ndarray,
+        tensions: np.ndarray,
+        command: Command,
+    ) -> None:
         """Keep what happens in period `k` from its beginning on.
 
         Parameters
         ----------
         k
             Number of the period.
+        alive
+            Which flights survive it, (N,); the others are over.
         motions, lengths
             As `sensors.sense_rows` writes them; to be copied.
         tensions
@@ -117,7 +130,12 @@ def fly(
     -------
     tuple
         How many periods each flight lasted, (N,): fewer than there are references where the motion grew beyond all
-        numbers; and how long the steps of the controller took [s].
+        numbers, and 1 for those that did at once; and how long the steps of the controller took [s].
+
+    Raises
+    ------
+    InputError
+        If the controller returns what no plant can follow.
     """
     robot, flights, period = plant.robot, len(seeds), conditions.period
     first, m = conditions.references[0], plant.robot.m
@@ -137,21 +155,25 @@ def fly(
         while faults and faults[0].at <= time + 1e-9 * period:
             fault = faults.pop(0)
             if fault.kind == "miss":
-                silent_until = fault.at + fault.lasting
+                silent_until = max(silent_until, fault.at + fault.lasting)
             else:
                 states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.cable)
         sense(*periods.geometry, states, motions, lengths)
+        reported = sensors.report(k, motions, tensions[:, 1])
         if command is None or time >= silent_until:
-            command = pilot.step(time, *sensors.report(k, motions, tensions[:, 1]), reference)
+            command = pilot.step(time, *reported, reference)
+        if k == 0:
+            check_command(command, robot, flights, time)
         row = orders.rows(k, command, lengths, periods.unstrained(states))
         periods.run(states, row, history, tensions)
-        recorder.take(k, motions, lengths, tensions[:, 0], command)
-        # What is not finite anywhere makes the platform's place so one step later.
-        if not np.isfinite(history[:, 1, 0]).all():
-            alive &= np.isfinite(history[:, 1, 0])
-            if not alive.any():
-                break
+        if not isfinite(np.vdot(history, history)):
+            check_command(command, robot, flights, time)
+            alive &= (np.abs(history[:, 1]) < BEYOND).all(axis=1)
             history[~alive, 1] = states[~alive]
+        if k == 0 or alive.any():
+            recorder.take(k, alive if k else np.ones(flights, dtype=bool), motions, lengths, tensions[:, 0], command)
+        if not alive.any():
+            break
         lasted += alive
         states = history[:, 1].copy()
-    return lasted, pilot.seconds
+    return np.maximum(lasted, 1), pilot.seconds

@@ -7,10 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..control import Command
+from ..errors import InputError
 from ..models.plant import Plant, layout
-from .conditions import Conditions
+from .conditions import Conditions, Wind
 
 __all__ = ["Orders"]
+
+FASTEST = 1e3  # [m/s], of the air
 
 
 class Orders:
@@ -37,9 +40,8 @@ class Orders:
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
         self._robot, self._period, self._drive = robot, conditions.period, plant.drive
         self._stiffness, self._damping = (plant.arrays[1][:, column] for column in (layout.STIFFNESS, layout.DAMPING))
-        self.wind = (
-            None if conditions.wind is None else np.stack([conditions.wind(times, seed) for seed in seeds], axis=1)
-        )
+        wind = conditions.wind
+        self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
         self._rows = np.tile(plant.command(np.ones(robot.m), wind=calm, wrench=conditions.disturbance), (len(seeds), 1))
         m, first = robot.m, layout.REFERENCE_POSE
@@ -73,3 +75,17 @@ class Orders:
         if command.actuation is not None:
             self._actuation[:] = command.actuation
         return rows
+
+
+def _air(wind: Wind, times: np.ndarray, seed: int) -> np.ndarray:
+    """Return the velocity of the air of one flight, (K, 3) [m/s]; refuse what a user's function may return instead."""
+    try:
+        velocity = np.asarray(wind(times, seed), dtype=float)
+    except (TypeError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"wind must be a function of times and a seed that returns (n, 3) [m/s]: {reason}") from None
+    if velocity.shape != (len(times), 3) or not (np.abs(velocity) <= FASTEST).all():
+        raise InputError(
+            f"wind must return ({len(times)}, 3) numbers up to {FASTEST:g} m/s, got shape {velocity.shape}"
+        )
+    return velocity

@@ -19,7 +19,15 @@ class Record:
         self.direction, self.shortfall = np.full((periods, 6), np.nan), np.full(periods, np.nan)
         self.orders = np.full((periods, carriers, 6), np.nan)
 
-    def take(self, k: int, motions: np.ndarray, lengths: np.ndarray, tensions: np.ndarray, command: Command) -> None:
+    def take(
+        self,
+        k: int,
+        alive: np.ndarray,
+        motions: np.ndarray,
+        lengths: np.ndarray,
+        tensions: np.ndarray,
+        command: Command,
+    ) -> None:
         """Keep a period; see `flying.Recorder`."""
         self.motions[k], self.lengths[k], self.tensions[k] = motions[0], lengths[0, 0], tensions[0]
         self.commanded[k], self.answered[k], self.orders[k] = command.tensions, command.answered, command.carrier_pose

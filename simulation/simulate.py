@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -161,9 +162,10 @@ def simulate(
     pilot = ComputedTorque(the_robot) if controller is None else controller
     first, error = whole_number("seed", seed, 0, 2**63 - 1), number("tolerance", tolerance, 0.0, 1e6)
     prepare()  # not in the time of the flight
+    processes = whole_number("workers", workers, 1, 1024)
     if runs is None:
         return _one(plant, pilot, conditions, first, error)
-    count, processes = whole_number("runs", runs, 1, 10**7), whole_number("workers", workers, 1, 1024)
+    count = whole_number("runs", runs, 1, 10**7)
     return _many(plant, pilot, conditions, range(first, first + count), error, processes)
 
 
@@ -239,6 +241,13 @@ def _many(
     if workers == 1:
         parts = [fly_block(*each) for each in given]
     else:
+        try:
+            pickle.dumps((controller, conditions))
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            reason = str(error).splitlines()[0]
+            raise InputError(
+                f"workers must be 1 for a controller or a wind that no process can receive: {reason}"
+            ) from None
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
             parts = list(pool.map(fly_block, *zip(*given, strict=True)))
     return flights(plant.robot, conditions, seeds, tolerance, parts)

@@ -194,3 +194,70 @@ def test_what_cannot_be_flown_is_refused_in_one_line(crane, change, message):
         simulate(**{"robot": "ipanema-1", "reference": crane} | change)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+class Wrong(Controller):
+    """Return what no plant can follow, from the second step on."""
+
+    def __init__(self, change):
+        self.change = change
+
+    def step(self, time, state: State, reference):
+        carriers = (reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration)
+        command = Command(np.zeros(8), *carriers, 0)
+        if callable(self.change):
+            return self.change(command)
+        return command._replace(**self.change)
+
+
+@pytest.mark.parametrize("runs", [None, 2])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda command: None, "must return a Command"),
+        (tuple, "must return a Command"),
+        ({"tensions": np.zeros(3)}, "tensions of shape"),
+        ({"tensions": np.full(8, np.nan)}, "finite tensions"),
+        ({"answered": 9}, "answered from 0 to 3, got 9"),
+        ({"carrier_pose": np.zeros(6)}, "carrier_pose of shape"),
+    ],
+)
+def test_what_a_controller_may_return_is_checked(change, message, runs):
+    if runs and callable(change):
+        return
+    with pytest.raises(InputError, match=message) as error:
+        simulate("cogiro", load("cogiro").home, Wrong(change), duration=0.01, runs=runs)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "wind", [lambda times: times, lambda times, seed: np.zeros(3), lambda times, seed: np.full((len(times), 3), np.nan)]
+)
+def test_what_a_wind_may_return_is_checked(wind):
+    with pytest.raises(InputError, match="wind must") as error:
+        simulate("wang-flying", load("wang-flying").home, wind=wind, duration=0.01)
+    assert "\n" not in str(error.value)
+
+
+def test_a_motion_that_no_numbers_hold_never_passes():
+    """A force of 1e300 N: alone and beside others the flight ends, and its figures are those of what was before."""
+    robot = load("cogiro")
+    push = {"disturbance": np.full(6, 1e300), "duration": 0.05}
+    alone = simulate(robot, robot.home, **push)
+    assert not alone.passed
+    assert "beyond all numbers" in alone.report()
+    many = simulate(robot, robot.home, **push, runs=2)
+    assert not many["passed"].values.any()
+    assert np.isfinite(many["error_max"].values).all()
+
+
+def test_processes_fly_as_one_does_and_refuse_what_they_cannot_receive():
+    robot = load("wang-flying")
+    given = {"noise": NOISE, "duration": 0.05, "runs": 251}
+    np.testing.assert_array_equal(
+        simulate(robot, robot.home, **given, workers=2)["error_max"], simulate(robot, robot.home, **given)["error_max"]
+    )
+    with pytest.raises(InputError, match="workers must be 1"):
+        simulate(
+            robot, robot.home, wind=lambda times, seed: np.zeros((len(times), 3)), duration=0.01, runs=2, workers=2
+        )

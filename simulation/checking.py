@@ -1,0 +1,40 @@
+"""`check_command`: refuse what a controller of a user returned and no plant can follow, in one line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..control import ANSWERS, Command
+from ..errors import InputError
+from ..inputs import shown
+from ..models.robot import Robot
+
+__all__ = ["check_command"]
+
+
+def check_command(command: Any, robot: Robot, flights: int, time: float) -> None:
+    """Check a command of all flights, or of the only one.
+
+    Raises
+    ------
+    InputError
+        If it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown answer.
+    """
+    if not isinstance(command, Command):
+        raise InputError(f"controller must return a Command from step, got {shown(command)}")
+    count, lead = len(robot.carriers), () if flights == 1 else (flights,)
+    shapes: dict[str, tuple[int, ...]] = {"tensions": (robot.m,), "answered": ()}
+    shapes |= {f"carrier_{part}": (count, 6) for part in ("pose", "velocity", "acceleration")}
+    if command.actuation is not None:
+        shapes["actuation"] = (count, max(len(carrier.actuators) for carrier in robot.carriers))
+    for name, core in shapes.items():
+        values = np.asarray(getattr(command, name))
+        if values.shape != (*lead, *core):
+            raise InputError(f"controller must return {name} of shape {(*lead, *core)}, got shape {values.shape}")
+        if values.dtype.kind not in "fiu" or not np.isfinite(values).all():
+            raise InputError(f"controller must return finite {name}, got others at t = {time:g} s")
+    answered = np.asarray(command.answered)
+    if not ((answered >= 0) & (answered < len(ANSWERS))).all():
+        raise InputError(f"controller must return answered from 0 to {len(ANSWERS) - 1}, got {answered.max()}")
