@@ -9,6 +9,7 @@ import typer
 
 from ..errors import InputError
 from .options import JsonOption, RobotArgument, print_json, print_written
+from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
 from .watching import watching
 
@@ -61,26 +62,9 @@ def plan(
         ),
     ] = None,
     workers: Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")] = 1,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="With --vary: Dask scheduler to use instead of --workers, such as tcp://host:8786 (extra cluster).",
-        ),
-    ] = None,
-    checkpoint: Annotated[
-        Path | None,
-        typer.Option(
-            "--checkpoint",
-            help="With --vary: file in which to store progress; must not exist. Continue later with --resume.",
-        ),
-    ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            "--resume", metavar="FILE", help="With --vary: checkpoint to continue, or to create if there is none."
-        ),
-    ] = None,
+    scheduler: Annotated[str | None, scheduler_option("With --vary: ")] = None,
+    checkpoint: Annotated[Path | None, checkpoint_option("With --vary: ")] = None,
+    resume: Annotated[Path | None, resume_option("With --vary: ")] = None,
     keep: Annotated[
         Path | None,
         typer.Option("--keep", metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF)."),

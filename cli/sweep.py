@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import typer
 from ..errors import InputError
 from ..processors import one_thread_each
 from .options import print_json
+from .resuming import checkpoint_of, resumable
 from .stopping import add_to_message
 from .watching import counting
 
@@ -44,9 +43,7 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     from ..ocp.sweeps.axis import check_figure, read_axes, read_option
     from ..writing import check_writable
 
-    checkpoint, resume = options.checkpoint, options.resume
-    if checkpoint is not None and resume is not None:
-        raise InputError(f"--checkpoint must not be given with --resume, got {checkpoint} and {resume}")
+    stored = checkpoint_of(options.checkpoint, options.resume)
     loaded, read = load(robot), read_task(task)
     vary = read_option(options.vary)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-sweep.nc")
@@ -55,7 +52,7 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     picture = None if figures is None else figures / "sweep.png"
     if picture is not None:
         check_figure(read_axes(vary))
-    taken = None if (stored := checkpoint or resume) is None else stored.resolve()
+    taken = None if stored is None else stored.resolve()
     for what, file in (("--out", target), ("--out", target.with_suffix(".csv")), ("--figures", picture)):
         if file is not None and check_writable(file) == taken:
             raise InputError(f"{what} must be another file than the checkpoint, got {file}")
@@ -67,9 +64,9 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
             workers=options.workers,
             scheduler=options.scheduler,
             checkpoint=stored,
-            resume=resume is not None,
+            resume=options.resume is not None,
             keep=options.keep,
-            progress=_resumable(show, stored),
+            progress=resumable(show, stored, "plans"),
         )
     add_to_message("")
     files = list(result.save(target))
@@ -89,17 +86,3 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
             typer.echo(f"    {path}")
     if not result.feasible:
         raise typer.Exit(1)
-
-
-def _resumable(show: Callable[[int, int, int], None], checkpoint: Path | None) -> Callable[[int, int, int], None]:
-    """Return a function that shows progress, and keeps the line for Ctrl-C true."""
-
-    def progress(done: int, total: int, feasible: int) -> None:
-        show(done, total, feasible)
-        if checkpoint is not None:
-            more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
-        else:
-            more = "the table is lost: only --checkpoint and --resume store it"
-        add_to_message(f" after {done} of {total} plans; {more}")
-
-    return progress

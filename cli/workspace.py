@@ -9,6 +9,7 @@ import typer
 
 from ..errors import InputError
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
+from .resuming import checkpoint_of, checkpoint_option, resume_option, scheduler_option
 from .watching import counting
 
 if TYPE_CHECKING:
@@ -70,24 +71,9 @@ def workspace(
         ),
     ] = None,
     workers: Annotated[int, typer.Option(help="Number of processes on this machine.")] = 1,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Dask scheduler to use instead of --workers, such as tcp://host:8786 (extra cluster).",
-        ),
-    ] = None,
-    checkpoint: Annotated[
-        Path | None,
-        typer.Option(
-            "--checkpoint",
-            help="File in which to store progress; must not exist. Continue later with --resume.",
-        ),
-    ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option("--resume", metavar="FILE", help="Checkpoint to continue, or to create if there is none."),
-    ] = None,
+    scheduler: Annotated[str | None, scheduler_option()] = None,
+    checkpoint: Annotated[Path | None, checkpoint_option()] = None,
+    resume: Annotated[Path | None, resume_option()] = None,
     keep: Annotated[
         str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")
     ] = "accepted",
@@ -123,11 +109,10 @@ def workspace(
     required = _condition(condition)
     region = _region(box, attitude, carriers, lengths)
     target = out if out is not None else Path(f"{loaded.name}-workspace.nc")
-    if checkpoint is not None and resume is not None:
-        raise InputError(f"--checkpoint must not be given with --resume, got {checkpoint} and {resume}")
+    stored = checkpoint_of(checkpoint, resume)
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh must be of a region in which only positions vary, got {mesh} of another")
-    taken = {kept.resolve(): "the checkpoint" for kept in (checkpoint, resume) if kept is not None}
+    taken = {} if stored is None else {stored.resolve(): "the checkpoint"}
     if target.suffix == ".zarr" and target.exists():
         raise InputError(f"--out must be a new .zarr folder or a NetCDF file, got {target}, which exists")
     for what, file in (("--out", target), ("--figure", figure), ("--mesh", mesh)):
@@ -149,7 +134,7 @@ def workspace(
             size=size,
             workers=workers,
             scheduler=scheduler,
-            checkpoint=checkpoint or resume,
+            checkpoint=stored,
             resume=resume is not None,
             progress=progress,
             keep=keep,

@@ -1,0 +1,67 @@
+"""Long runs on workers and with a checkpoint: their options, and what the line of an interrupt adds."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from ..errors import InputError
+from .stopping import add_to_message
+
+__all__ = ["checkpoint_of", "checkpoint_option", "resumable", "resume_option", "scheduler_option"]
+
+
+def scheduler_option(when: str = "") -> Any:
+    """Return --scheduler, with `when` it may be used, such as "With --runs: "."""
+    text = f"{when}Dask scheduler to use instead of --workers, such as tcp://host:8786 (extra cluster)."
+    return typer.Option(metavar="ADDRESS", help=_sentence(text))
+
+
+def checkpoint_option(when: str = "") -> Any:
+    """Return --checkpoint, with `when` it may be used."""
+    text = f"{when}file in which to store progress; must not exist. Continue later with --resume."
+    return typer.Option("--checkpoint", help=_sentence(text))
+
+
+def resume_option(when: str = "") -> Any:
+    """Return --resume, with `when` it may be used."""
+    return typer.Option(
+        "--resume", metavar="FILE", help=_sentence(f"{when}checkpoint to continue, or to create if there is none.")
+    )
+
+
+def _sentence(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def checkpoint_of(checkpoint: Path | None, resume: Path | None) -> Path | None:
+    """Return the file of --checkpoint or --resume.
+
+    Raises
+    ------
+    InputError
+        If both are given.
+    """
+    if checkpoint is not None and resume is not None:
+        raise InputError(f"--checkpoint must not be given with --resume, got {checkpoint} and {resume}")
+    return checkpoint or resume
+
+
+def resumable(
+    show: Callable[[int, int, int], None], checkpoint: Path | None, unit: str
+) -> Callable[[int, int, int], None]:
+    """Return a function that shows progress in `unit`, such as "plans", and keeps the line for Ctrl-C true."""
+
+    def progress(done: int, total: int, counted: int) -> None:
+        show(done, total, counted)
+        if checkpoint is not None:
+            more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
+        else:
+            more = "the table is lost: only --checkpoint and --resume store it"
+        add_to_message(f" after {done} of {total} {unit}; {more}")
+
+    return progress
