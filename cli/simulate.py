@@ -11,11 +11,14 @@ from ..errors import InputError
 from ..inputs import one_of
 from ..processors import one_thread_each
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
-from .watching import COMPILING, watching
+from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
+from .stopping import add_to_message
+from .watching import COMPILING, counting, watching
 
 if TYPE_CHECKING:
     from ..models import Robot
 
+_MANY = "With --runs: "
 CONTROLLERS = ("computed-torque", "open-loop")
 
 
@@ -50,7 +53,8 @@ def simulate(
             "--fault",
             metavar="FAULT",
             help="What breaks: 'cut 3 at 2.5' (cable 3 tears at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
-            "'miss 0.05 at 1.2' (no command for 0.05 s). Repeat the option for more.",
+            "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s). Repeat the "
+            "option for more.",
         ),
     ] = None,
     duration: Annotated[
@@ -64,6 +68,9 @@ def simulate(
         typer.Option(help="Number of flights, with the seeds from --seed on. Writes one table instead of one flight."),
     ] = None,
     workers: Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")] = 1,
+    scheduler: Annotated[str | None, scheduler_option(_MANY)] = None,
+    checkpoint: Annotated[Path | None, checkpoint_option(_MANY)] = None,
+    resume: Annotated[Path | None, resume_option(_MANY)] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -91,8 +98,11 @@ def simulate(
     The exit code is 0 if the flight passes, with --runs if all of them do, and else 1.
     """
     one_of("--controller", controller, CONTROLLERS)
-    if runs is None and workers != 1:
-        raise InputError("--workers must be left out without --runs: it is an option of many flights")
+    many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
+    for name, given in many.items():
+        if given and runs is None:
+            raise InputError(f"{name} must be left out without --runs: it is an option of many flights")
+    stored = checkpoint_of(checkpoint, resume)
     if runs is not None and animate is not None:
         raise InputError(f"--animate must be left out with --runs, got {animate}")
     # Before libraries load: the processes of --workers share the processors.
@@ -114,8 +124,8 @@ def simulate(
 
             check_film(animate, speed, fps)
         for file in (target, animate, figures and figures / "error.png"):
-            if file is not None:
-                check_writable(file)
+            if file is not None and check_writable(file) == (stored and stored.resolve()):
+                raise InputError(f"--out must be another file than the checkpoint, got {file}")
         conditions = {
             "wind": None if wind is None else numbers("--wind", wind, 3),
             "controller": OpenLoop(loaded) if controller == "open-loop" else None,
@@ -130,7 +140,9 @@ def simulate(
             film = None if animate is None else (animate, speed, fps)
             passed = _fly_once(loaded, plan, conditions, target, figures, film, as_json)
         else:
-            passed = _fly_often(loaded, plan, conditions | {"runs": runs, "workers": workers}, target, figures, as_json)
+            conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
+            conditions |= {"resume": resume is not None}
+            passed = _fly_often(loaded, plan, conditions, target, figures, as_json)
     if not passed:
         raise typer.Exit(1)
 
@@ -170,11 +182,16 @@ def _fly_often(
     from ..figures import style
     from ..simulation import simulate
     from ..simulation.flights import report, save, summary
+    from ..simulation.machine import prepare
 
-    with watching(f"flying {plan.stem} {conditions['runs']} times {COMPILING}", quiet=as_json):
-        flights = simulate(robot, plan, **conditions)
-        file = save(flights, target)
-        pictures = [] if figures is None else [style.save(drawn.errors(flights), figures / "errors.png")]
+    with watching(f"flying {plan.stem} {COMPILING}", quiet=as_json):
+        prepare()
+    with counting(f"flying {plan.stem}", "passed", quiet=as_json) as show:
+        progress = resumable(show, conditions["checkpoint"], "flights")
+        flights = simulate(robot, plan, **conditions, progress=progress)
+    add_to_message("")
+    file = save(flights, target)
+    pictures = [] if figures is None else [style.save(drawn.errors(flights), figures / "errors.png")]
     if as_json:
         print_json({**summary(flights), "file": file, "figures": pictures})
     else:

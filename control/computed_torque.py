@@ -113,10 +113,12 @@ class ComputedTorque(Controller):
         none, platform = np.zeros(self.robot.m), self.robot.platform
         settings = np.array([*settings_of(self.robot), *platform.com, platform.mass])
         self._robot = (bodies, cables_of(self.robot, none, none), settings, self.robot.dof_mask.astype(float))
-        self._write = mechanics()
+        mechanics()  # loaded now, not in the first step
         self._inverses, self._actuators = _inverses(self.robot)
         self._loops = np.array([number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3)])
-        self._thrusts = thrusts() if self._inverses.any() else None
+        self._flies = bool(self._inverses.any())
+        if self._flies:
+            thrusts()
         self.reset()
 
     @override
@@ -152,7 +154,7 @@ class ComputedTorque(Controller):
         self._pulls, self._integrates = np.zeros((rows, 2, m)), np.ones(rows, dtype=bool)
         self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
         # Carriers have a command of their own where they react or fly.
-        self._carriers = np.zeros((rows, count if self._thrusts or len(self._reach) else 0, 3, 6))
+        self._carriers = np.zeros((rows, count if self._flies or len(self._reach) else 0, 3, 6))
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
         self._problems = InPlace(rows, 6, m, self.robot.length)
@@ -189,7 +191,7 @@ class ComputedTorque(Controller):
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
         self._take(state, reference)
-        self._write(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
+        mechanics()(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
         problems, answered, proof = self._problems, self._as_planned, self._nowhere
         if not problems.solve():
             answered, proof = self._answer_others(), (problems.direction.copy(), problems.shortfall.copy())
@@ -205,8 +207,8 @@ class ComputedTorque(Controller):
             own = own[0] if alone else own
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
         actuation = None
-        if self._thrusts is not None:
-            self._thrusts(
+        if self._flies:
+            thrusts()(
                 self._robot, self._loops, self._inverses, self._measured, self._carriers, tensions, self._actuation
             )
             # A state that is no state leaves its actuators as they were.

@@ -21,17 +21,20 @@ HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
 SCALES = ((1.0, "m"), (1e-4, "mm"), (1e-7, "µm"))  # the least lengths for which units are used
+THRUST = "thrust"  # an actuator of carriers that fly
 UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}
 
 
 def flight(trajectory: xr.Dataset) -> Figure:
-    """Draw error, wind and carriers' offsets, as far as there are some, and how each step was answered, over time."""
+    """Draw error, wind, carriers' offsets and thrusts, as far as there are some, and how each step was answered."""
     time = trajectory["time"].values
     draws: list[tuple[str, float, Any]] = [("", 1.7, _draw_error)]
     if "wind" in trajectory:
         draws.append(("wind [m/s]", 1.3, _draw_wind))
     if _offsets(trajectory).max(initial=0.0) > OFFSET:
         draws.append(("", 1.3, _draw_offsets))
+    if "actuation" in trajectory and THRUST in trajectory["actuator"].values:
+        draws.append(("thrust\ncommanded [N]", 1.3, _draw_thrusts))
     answers = _answers(trajectory)
     draws.append(("", 0.1 + 0.18 * len(answers), _draw_answers))
     heights = [height for _, height, _ in draws]
@@ -138,6 +141,15 @@ def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
         look = {"color": style.colour(index), "linestyle": DASHES[index % len(DASHES)], "linewidth": 1.1}
         ax.plot(trajectory["time"].values, offsets[:, index] / scale, **look, label=str(name))
     ax.set_ylim(bottom=0.0)
+    _legend_beside(ax)
+
+
+def _draw_thrusts(ax: Axes, trajectory: xr.Dataset) -> None:
+    thrusts = trajectory["actuation"].sel(actuator=THRUST).values
+    for index, name in enumerate(trajectory["carrier"].values):
+        if np.isfinite(thrusts[:, index]).any():
+            look = {"color": style.colour(index), "linestyle": DASHES[index % len(DASHES)], "linewidth": 1.1}
+            ax.plot(trajectory["time"].values, thrusts[:, index], **look, label=str(name))
     _legend_beside(ax)
 
 

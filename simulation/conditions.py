@@ -60,7 +60,7 @@ class Conditions(NamedTuple):
         result = np.tile(t_min > 0, (len(periods), 1))
         for fault in self.faults:
             if fault.kind == "cut":
-                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.cable] = False
+                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.part] = False
         return result
 
     def to_dict(self) -> dict[str, Any]:

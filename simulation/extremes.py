@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..control import ANSWERS, Command
+from ..control import ANSWERS
 from .conditions import Conditions
+from .recorder import Period
 
 __all__ = ["Extremes"]
 
@@ -36,19 +37,12 @@ class Extremes:
         self.exceeded = np.zeros(flights)
         self.answers = np.zeros((flights, len(ANSWERS)), dtype=int)
 
-    def take(
-        self,
-        k: int,
-        alive: np.ndarray,
-        motions: np.ndarray,
-        lengths: np.ndarray,
-        tensions: np.ndarray,
-        command: Command,
-    ) -> None:
-        """Keep a period; see `flying.Recorder`."""
+    def take(self, period: Period) -> None:
+        """Keep a period."""
+        alive, command = period.alive, period.command
         rows = slice(None) if alive.all() else np.flatnonzero(alive)
-        motions, tensions = motions[rows], tensions[rows]
-        off = motions[:, 0, :3] - self._references[k].pose[:3]
+        motions, tensions = period.motions[rows], period.tensions[rows]
+        off = motions[:, 0, :3] - self._references[period.number].pose[:3]
         square = np.einsum("ij,ij->i", off, off)
         self.squares[rows] += square
         self.error_max[rows] = np.maximum(self.error_max[rows], np.sqrt(square))
@@ -56,5 +50,5 @@ class Extremes:
         self.tension_max[rows] = np.maximum(self.tension_max[rows], tensions.max(axis=1))
         above = ((tensions - self._t_max) / self._range).max(axis=1)
         self.exceeded[rows] = np.maximum(self.exceeded[rows], above)
-        self.slack[rows] += ((tensions <= 0) & self._taut[k]).any(axis=1)
+        self.slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
         self.answers[self._rows[rows], np.broadcast_to(command.answered, len(self._rows))[rows]] += 1

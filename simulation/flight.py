@@ -210,14 +210,18 @@ class Flight:
         variables["tensions_commanded"] = over(
             cable, record.commanded[rows], "N", "tensions that the controller orders"
         )
-        variables["tensions_unlimited"] = over(cable, record.commanded[rows], "N", "the same as tensions_commanded")
         variables["cable_lengths"] = over(cable, record.lengths[rows], "m", "from anchor to attachment")
+        variables["tensions_unlimited"] = over(cable, record.commanded[rows], "N", "the same as tensions_commanded")
         missing = np.nan_to_num(record.shortfall[rows])
         variables["violation"] = over(("time",), missing, "N", "shortfall of the wrench, moments over length")
         variables["tracking_error"] = over(("time",), self.error, "m", "distance from the reference")
         words = {"flag_values": np.arange(len(ANSWERS), dtype=np.int8), "flag_meanings": " ".join(_flags())}
         about = {"long_name": "how the step was answered", **words}
         variables["answered"] = Variable(("time",), record.answered[rows], about)
+        actuators = [actuator.name for actuator in max((c.actuators for c in robot.carriers), key=len)]
+        if actuators:
+            about = "what the actuators of each carrier are commanded"
+            variables["actuation"] = over(("time", "carrier", "actuator"), record.actuation[rows], "N, N m", about)
         if self.wind is not None:
             variables["wind"] = over(("time", "axis"), self.wind[rows], "m/s", "velocity of the air in G")
         variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
@@ -230,7 +234,10 @@ class Flight:
             "conditions": json.dumps({"seed": self.seed, **self.conditions.to_dict()}),
             "report": json.dumps(self.figures_of_merit()),
         }
-        return Contents(variables, dimensions(robot, self.times), attributes)
+        coordinates = dimensions(robot, self.times)
+        if actuators:
+            coordinates["actuator"] = Variable(("actuator",), np.array(actuators))
+        return Contents(variables, coordinates, attributes)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the flight as NetCDF, whole or not at all; the same seed gives the same bytes.

@@ -24,40 +24,49 @@ from .flying import fly
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["flights", "fly_block", "report", "save", "summary"]
+__all__ = ["FIGURES", "flights", "fly_block", "passed", "report", "save", "summary"]
 
 
-def fly_block(plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int]) -> dict[str, Any]:
-    """Fly a block of flights side by side, and return the numbers of each, (N,) or (N, 4)."""
+# What is kept of a flight: the periods that it lasted, errors [m], tensions [N], by how much they exceed t_max in
+# proportion to the cable's range, the periods that begin with a slack cable, and those answered in each way.
+FIGURES = np.dtype(
+    [
+        ("lasted", "<i8"),
+        *((name, "<f8") for name in ("error_rms", "error_max", "tension_min", "tension_max", "exceeded")),
+        ("slack", "<i8"),
+        ("answered", "<i8", (len(ANSWERS),)),
+    ]
+)
+
+
+def fly_block(plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int]) -> np.ndarray:
+    """Fly a block of flights side by side, and return the figures of each, (N,) of `FIGURES`."""
     robot = plant.robot
     kept = Extremes(conditions, robot.t_min, robot.t_max, len(seeds))
     lasted, _ = fly(plant, controller, conditions, seeds, kept)
-    return {
-        "lasted": lasted,
-        "error_rms": np.sqrt(kept.squares / np.maximum(lasted, 1)),
-        "error_max": kept.error_max,
-        "tension_min": kept.tension_min,
-        "tension_max": kept.tension_max,
-        "exceeded": kept.exceeded,
-        "slack": kept.slack,
-        "answered": kept.answers,
-    }
+    figures = np.zeros(len(seeds), dtype=FIGURES)
+    figures["lasted"], figures["error_rms"] = lasted, np.sqrt(kept.squares / np.maximum(lasted, 1))
+    figures["answered"] = kept.answers
+    for name in ("error_max", "tension_min", "tension_max", "exceeded", "slack"):
+        figures[name] = getattr(kept, name)
+    return figures
 
 
-def flights(
-    robot: Robot, conditions: Conditions, seeds: Sequence[int], tolerance: float, parts: list[dict[str, Any]]
-) -> xr.Dataset:
-    """Return the numbers of all flights as a dataset, by their seeds."""
-    of = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
+    """Return which flights passed, (N,), from their figures: lasted, near the reference, with tensions in range."""
+    lasted_near = (of["lasted"] == periods) & (of["error_max"] <= tolerance)
+    return lasted_near & (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
+
+
+def flights(robot: Robot, conditions: Conditions, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
+    """Return the figures of all flights, (N,) of `FIGURES`, as a dataset, by their seeds."""
     periods, period = len(conditions.references), conditions.period
-    passed = (of["lasted"] == periods) & (of["error_max"] <= tolerance)
-    passed &= (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
 
     def over(values: np.ndarray, unit: str, about: str) -> Variable:
         return Variable(("seed",), values, {"units": unit, "long_name": about})
 
     variables = {
-        "passed": Variable(("seed",), passed, {"long_name": "whether error, tensions and tautness hold"}),
+        "passed": Variable(("seed",), passed(of, periods, tolerance), {"long_name": "error, tensions and slack hold"}),
         "duration": over(of["lasted"] * period, "s", "how long the flight lasted"),
         "error_rms": over(of["error_rms"], "m", "error of the position"),
         "error_max": over(of["error_max"], "m", "largest error of the position"),

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Sequence
 from math import isfinite
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -18,41 +18,12 @@ from .conditions import Conditions
 from .machine import sense_rows
 from .noise import Noise
 from .orders import Orders
+from .recorder import Period, Recorder
 
-__all__ = ["Recorder", "fly"]
+__all__ = ["fly"]
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
 DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
-
-
-class Recorder(Protocol):
-    """A record of flights."""
-
-    def take(
-        self,
-        k: int,
-        alive: np.ndarray,
-        motions: np.ndarray,
-        lengths: np.ndarray,
-        tensions: np.ndarray,
-        command: Command,
-    ) -> None:
-        """Keep what happens in period `k` from its beginning on.
-
-        Parameters
-        ----------
-        k
-            Number of the period.
-        alive
-            Which flights survive it, (N,); the others are over.
-        motions, lengths
-            As `sensors.sense_rows` writes them; to be copied.
-        tensions
-            Under the command that begins, (N, m) [N].
-        command
-            Of all flights; of a single one its arrays have no leading dimension.
-        """
-        ...
 
 
 class Sensors:
@@ -156,8 +127,10 @@ def fly(
             fault = faults.pop(0)
             if fault.kind == "miss":
                 silent_until = max(silent_until, fault.at + fault.lasting)
+            elif fault.kind == "lose":
+                periods.lose(fault.part)
             else:
-                states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.cable)
+                states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.part)
         sense(*periods.geometry, states, motions, lengths)
         reported = sensors.report(k, motions, tensions[:, 1])
         if command is None or time >= silent_until:
@@ -171,7 +144,8 @@ def fly(
             alive &= (np.abs(history[:, 1]) < BEYOND).all(axis=1)
             history[~alive, 1] = states[~alive]
         if k == 0 or alive.any():
-            recorder.take(k, alive if k else np.ones(flights, dtype=bool), motions, lengths, tensions[:, 0], command)
+            lived = alive if k else np.ones(flights, dtype=bool)
+            recorder.take(Period(k, lived, motions, lengths, tensions[:, 0], command))
         if not alive.any():
             break
         lasted += alive

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..control import Command
+from ..models.robot import Robot
+from .recorder import Period
 
 __all__ = ["Record"]
 
@@ -12,24 +13,21 @@ __all__ = ["Record"]
 class Record:
     """Keep motions, lengths, tensions and commands of one flight, a row for each period."""
 
-    def __init__(self, periods: int, carriers: int, m: int):
+    def __init__(self, robot: Robot, periods: int):
+        carriers, m = len(robot.carriers), robot.m
+        self.actuation = np.full((periods, carriers, max(len(carrier.actuators) for carrier in robot.carriers)), np.nan)
         self.motions = np.full((periods, 1 + carriers, 12), np.nan)
         self.lengths, self.tensions, self.commanded = (np.full((periods, m), np.nan) for _ in range(3))
         self.answered = np.zeros(periods, dtype=np.int8)
         self.direction, self.shortfall = np.full((periods, 6), np.nan), np.full(periods, np.nan)
         self.orders = np.full((periods, carriers, 6), np.nan)
 
-    def take(
-        self,
-        k: int,
-        alive: np.ndarray,
-        motions: np.ndarray,
-        lengths: np.ndarray,
-        tensions: np.ndarray,
-        command: Command,
-    ) -> None:
-        """Keep a period; see `flying.Recorder`."""
-        self.motions[k], self.lengths[k], self.tensions[k] = motions[0], lengths[0, 0], tensions[0]
+    def take(self, period: Period) -> None:
+        """Keep a period."""
+        k, command = period.number, period.command
+        self.motions[k], self.lengths[k], self.tensions[k] = period.motions[0], period.lengths[0, 0], period.tensions[0]
         self.commanded[k], self.answered[k], self.orders[k] = command.tensions, command.answered, command.carrier_pose
         if command.answered:
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
+        if command.actuation is not None:
+            self.actuation[k] = command.actuation

@@ -3,69 +3,41 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..control import ComputedTorque, Controller, Reference
 from ..errors import InputError
-from ..inputs import finite_array, number, shown, whole_number
-from ..models import air
+from ..execution import check_workers
+from ..inputs import file_path, finite_array, flag, number, shown, whole_number
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..models.plant import Plant
 from ..models.robot import Robot
 from ..solvers import solve_batch
-from .conditions import Conditions, Wind
+from .conditions import Conditions
 from .faults import read_faults
 from .flight import Flight
-from .flights import flights, fly_block
+from .flights import flights
 from .flying import fly
 from .machine import prepare
 from .noise import Noise
 from .orders import Orders
 from .record import Record
+from .runs import Execution, Progress, fly_many
 from .steps import steps_in
 from .trajectory import Motion, Trajectory, read_trajectory
-
-if TYPE_CHECKING:
-    import xarray as xr
+from .winds import read_wind
 
 __all__ = ["simulate"]
 
 LONGEST = 1e6  # periods of one flight
 SOFT = 1e8  # weight of the wrench where no tensions give it
-SIDE_BY_SIDE = 250  # flights in one block
-
-
-class ConstantWind:
-    """The same wind at all times."""
-
-    def __init__(self, velocity: np.ndarray):
-        self._velocity = velocity
-
-    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
-        """Return it, (K, 3) [m/s]."""
-        return air.constant(times, self._velocity.tolist())
-
-
-class Gusts(ConstantWind):
-    """Dryden turbulence about a mean wind, with half of the intensity upwards."""
-
-    def __init__(self, velocity: np.ndarray, intensity: float):
-        super().__init__(velocity)
-        self._intensity = intensity
-
-    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
-        """Return the wind of a seed, (K, 3) [m/s]."""
-        intensity = (self._intensity, self._intensity, self._intensity / 2)
-        return air.dryden(times, self._velocity.tolist(), intensity, seed=seed)
+MOST_RUNS = 10_000_000
 
 
 def simulate(
@@ -86,6 +58,10 @@ def simulate(
     drive: str | None = None,
     runs: int | None = None,
     workers: int = 1,
+    scheduler: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
 ) -> Any:
     """Fly a reference: the plant, a controller, wind, sensors and faults, step by step.
 
@@ -103,7 +79,8 @@ def simulate(
     noise
         Of the sensors, see `Noise`; default: none.
     faults
-        Lines: "cut 3 at 2.5" (cables count from 1, times in [s]), "stick 2 at 1", "miss 0.05 at 1.2".
+        Lines: "cut 3 at 2.5", a cable tears (they count from 1; times in [s]); "stick 2 at 1", its winch stops; "lose
+        quad-1 at 2", the actuators of a carrier give nothing any more; "miss 0.05 at 1.2", the controller is late.
     duration
         [s]; default: that of the reference. A reference that ends earlier rests at its end.
     seed
@@ -125,7 +102,15 @@ def simulate(
     runs
         How many flights, with the seeds from `seed` on; default: one.
     workers
-        How many processes share many flights.
+        Processes of this machine that share many flights; 1: this process. The figures do not depend on it.
+    scheduler
+        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
+    checkpoint
+        File to which the figures of many flights are appended as they come.
+    resume
+        Whether to continue the checkpoint if the file exists. It must be of the same flights.
+    progress
+        Function that is called with (flights done, flights in total, those that passed) of many flights.
 
     Returns
     -------
@@ -135,7 +120,10 @@ def simulate(
     Raises
     ------
     InputError
-        If an argument has a wrong value, or the reference belongs to another robot.
+        If an argument has a wrong value, the reference belongs to another robot, the checkpoint cannot be written, is
+        damaged or of other flights, or there is no such scheduler.
+    SolverError
+        If workers end before their work is done, or the extra `cluster` is not installed.
     """
     the_robot = as_robot(robot)
     trajectory = read_trajectory(the_robot, reference, duration)
@@ -154,19 +142,35 @@ def simulate(
         period=step,
         substeps=steps_in(step, plant) if substeps is None else whole_number("substeps", substeps, 1, 1000),
         references=_references(the_robot, trajectory, step * np.arange(periods)),
-        wind=_wind(the_robot, wind, number("gusts", gusts, 0.0, 100.0)),
+        wind=read_wind(the_robot, wind, number("gusts", gusts, 0.0, 100.0)),
         disturbance=finite_array("disturbance", np.zeros(6) if disturbance is None else disturbance, (6,)),
         noise=noise if isinstance(noise, Noise) else validate({} if noise is None else noise, Noise, "noise"),
-        faults=read_faults(the_robot, faults),
+        faults=read_faults(the_robot, faults, periods * step),
     )
     pilot = ComputedTorque(the_robot) if controller is None else controller
     first, error = whole_number("seed", seed, 0, 2**63 - 1), number("tolerance", tolerance, 0.0, 1e6)
+    execution = _execution(runs, workers, scheduler, checkpoint, resume, progress)
     prepare()  # not in the time of the flight
-    processes = whole_number("workers", workers, 1, 1024)
     if runs is None:
         return _one(plant, pilot, conditions, first, error)
-    count = whole_number("runs", runs, 1, 10**7)
-    return _many(plant, pilot, conditions, range(first, first + count), error, processes)
+    seeds = range(first, first + whole_number("runs", runs, 1, MOST_RUNS))
+    return flights(the_robot, conditions, seeds, error, fly_many(plant, pilot, conditions, seeds, error, execution))
+
+
+def _execution(
+    runs: int | None, workers: int, scheduler: Any, checkpoint: Any, resume: Any, progress: Any
+) -> Execution:
+    check_workers(workers, scheduler)
+    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    if runs is None and (file is not None or scheduler is not None):
+        name, value = ("checkpoint", file) if file is not None else ("scheduler", scheduler)
+        raise InputError(f"{name} must be None without runs, got {shown(str(value))}")
+    if flag("resume", resume) and file is None:
+        raise InputError("checkpoint must be a path if resume is True, got None")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function or None, got {shown(progress)}")
+    show: Any = progress
+    return Execution(workers, scheduler, file, resume, show)
 
 
 def _drive(robot: Robot) -> str:
@@ -192,30 +196,9 @@ def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndar
     return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions
 
 
-def _wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
-    if wind is None:
-        if gusts:
-            raise InputError(f"gusts must be 0 without a wind, got {gusts:g} m/s")
-        return None
-    if robot.platform.aero is None:
-        raise InputError(f"wind must be None for robot {robot.name!r}, which has no platform.aero, got a wind")
-    if callable(wind):
-        function: Any = wind
-        if gusts:
-            raise InputError(f"gusts must be 0 with a wind that is a function, got {gusts:g} m/s")
-        return function
-    try:
-        velocity = np.asarray(wind, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        velocity = np.empty(0)
-    if velocity.shape != (3,) or not (np.abs(velocity) <= 1e3).all():
-        raise InputError(f"wind must be three numbers from -1000 to 1000 m/s or a function of times, got {shown(wind)}")
-    return Gusts(velocity, gusts) if gusts else ConstantWind(velocity)
-
-
 def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int, tolerance: float) -> Flight:
     robot, periods = plant.robot, len(conditions.references)
-    record = Record(periods, len(robot.carriers), robot.m)
+    record = Record(robot, periods)
     start = perf_counter()
     lasted, seconds = fly(plant, controller, conditions, [seed], record)
     wall = perf_counter() - start
@@ -231,23 +214,3 @@ def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int
         seconds=np.array(seconds),
         wall=wall,
     )
-
-
-def _many(
-    plant: Plant, controller: Controller, conditions: Conditions, seeds: range, tolerance: float, workers: int
-) -> xr.Dataset:
-    blocks = [seeds[first : first + SIDE_BY_SIDE] for first in range(0, len(seeds), SIDE_BY_SIDE)]
-    given = [(plant, controller, conditions, block) for block in blocks]
-    if workers == 1:
-        parts = [fly_block(*each) for each in given]
-    else:
-        try:
-            pickle.dumps((controller, conditions))
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            reason = str(error).splitlines()[0]
-            raise InputError(
-                f"workers must be 1 for a controller or a wind that no process can receive: {reason}"
-            ) from None
-        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-            parts = list(pool.map(fly_block, *zip(*given, strict=True)))
-    return flights(plant.robot, conditions, seeds, tolerance, parts)

@@ -128,12 +128,65 @@ def test_a_cut_cable_is_survived_where_the_others_can_do_without_it(name, surviv
         assert flight.figures_of_merit()["shortfall_max"] > 1.0
 
 
-def test_a_stuck_winch_and_a_controller_that_misses_its_time_are_felt(crane):
+def test_a_stuck_winch_holds_the_unstrained_length_of_its_cable():
+    """By Hooke's law and the damper, from lengths and tensions: before the fault the unstrained length changes."""
+    made = planned("wang-flying", [0.03, 0, -0.05])
+    cable = load("wang-flying").cables[1]
+    flight = simulate("wang-flying", made, faults=["stick 2 at 1.4"], tolerance=0.5)
+    t, length = flight.record.tensions[:, 1], flight.record.lengths[:, 1]
+    t = t - (cable.damping or 0.0) * np.gradient(length, flight.period)
+    unstrained = cable.stiffness * length / (t + cable.stiffness)
+    np.testing.assert_allclose(unstrained[1410:-1], unstrained[1410], rtol=1e-6)
+    assert np.ptp(unstrained[1000:1390]) > 1e-3
+    assert np.abs(flight.record.tensions - flight.record.commanded)[1410:, 1].max() > 1.0
+
+
+def test_a_controller_that_misses_its_time_leaves_the_last_command(crane):
     calm = simulate("ipanema-1", crane)
     missed = simulate("ipanema-1", crane, faults=["miss 0.03 at 1.5"])
     assert calm.error.max() < missed.error.max() < 5e-3
-    still = missed.record.commanded[1500:1530]
-    assert (still[1:] == still[:-1]).all() or (still[2:] == still[1:-1]).all()
+    ordered = missed.record.commanded
+    assert (ordered[1500:1530] == ordered[1499]).all()
+    assert (ordered[1530] != ordered[1499]).any()
+
+
+def test_a_carrier_that_loses_its_thrust_has_its_weight_and_its_cable_alone():
+    """By Newton, from the flight's velocities, tensions and the direction of the cable."""
+    robot = load("multi-quadrotor-3")
+    flight = simulate(robot, robot.home, faults=["lose quad2 at 0.2"], duration=0.4)
+    assert not flight.passed
+    poses = flight.record.motions[:, :, :6]
+    anchors, attachments = Dynamics(robot).points(poses[:, 0], poses[:, 1:])
+    along = (attachments - anchors)[:, 1]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    expected = robot.gravity + flight.record.tensions[:, 1, None] / robot.carriers[1].mass * along
+    acceleration = np.gradient(flight.record.motions[:, 2, 6:9], flight.period, axis=0)
+    np.testing.assert_allclose(acceleration[205:-1], expected[205:-1], atol=0.02)
+    assert np.nanmax(flight.trajectory["actuation"].sel(carrier="quad2", actuator="thrust").values[200:]) > 0
+
+
+def test_sensors_report_late_and_with_the_noise_that_is_stated():
+    """A controller that writes down what it receives beside what is true, from the flight's record."""
+    robot = load("cogiro")
+    heard = []
+
+    class Listening(ComputedTorque):
+        batches = False
+
+        def step(self, time, state, reference):
+            heard.append(np.concatenate([state.pose, state.velocity]))
+            return super().step(time, state, reference)
+
+    noise = {"position": 1e-3, "attitude_rate": 2e-2, "attitude_bias": 3e-3, "delay": 4e-3}
+    flight = simulate(robot, robot.home, Listening(robot, bandwidth=1.0, observer=0.0), noise=noise, duration=2.0)
+    added = np.array(heard)[4:] - flight.record.motions[:-4, 0]
+    spread = added.std(axis=0)
+    np.testing.assert_allclose(spread[:3], 1e-3, rtol=0.1)
+    np.testing.assert_allclose(spread[9:], 2e-2, rtol=0.1)
+    np.testing.assert_allclose(np.ptp(added[:, 3:9], axis=0), 0, atol=1e-12)
+    assert (np.abs(added[0, 3:6]) > 1e-6).all()
+    assert (added[0, 6:9] == 0).all()
+    assert (np.array(heard)[:4, 3:9] == np.array(heard)[0, 3:9]).all()  # nothing newer has arrived yet
 
 
 class Falling(Controller):
@@ -179,6 +232,12 @@ def test_a_plan_whose_loads_the_plant_would_not_carry_is_refused(crane):
         ({"faults": ["cut 1"]}, "faults"),
         ({"faults": "cut 1 at 2"}, "faults"),
         ({"faults": ["miss x at 2"]}, "faults"),
+        ({"faults": ["lose winch at 1"]}, "with actuators (it has none), got 'winch'"),
+        ({"faults": ["cut 1 at 3"]}, "faults[0] must begin before the end at 3 s, got 3 s"),
+        ({"checkpoint": "file"}, "checkpoint must be None without runs"),
+        ({"scheduler": "tcp://no"}, "scheduler must be None without runs"),
+        ({"runs": 2, "resume": True}, "checkpoint must be a path if resume is True"),
+        ({"runs": 2, "progress": 3}, "progress"),
         ({"wind": (1, 2, 3)}, "wind"),
         ({"gusts": 1}, "gusts"),
         ({"seed": -1}, "seed"),
@@ -252,11 +311,13 @@ def test_a_motion_that_no_numbers_hold_never_passes():
 
 
 def test_processes_fly_as_one_does_and_refuse_what_they_cannot_receive():
+    """Also with a checkpoint, of which a part is lost."""
     robot = load("wang-flying")
     given = {"noise": NOISE, "duration": 0.05, "runs": 251}
-    np.testing.assert_array_equal(
-        simulate(robot, robot.home, **given, workers=2)["error_max"], simulate(robot, robot.home, **given)["error_max"]
-    )
+    alone, done = simulate(robot, robot.home, **given), []
+    assert alone.identical(simulate(robot, robot.home, **given, workers=2, progress=lambda *all: done.append(all)))
+    assert done[-1] == (251, 251, int(alone["passed"].sum()))
+    assert len(done) >= 4
     with pytest.raises(InputError, match="workers must be 1"):
         simulate(
             robot, robot.home, wind=lambda times, seed: np.zeros((len(times), 3)), duration=0.01, runs=2, workers=2

@@ -37,6 +37,13 @@ class Periods:
         """Return the unstrained lengths in states (N, n) of elastic cables, (N, m) [m]."""
         return states[:, self._unstrained]
 
+    def lose(self, carrier: int) -> None:
+        """Let the actuators of a carrier give nothing from the next period on, whatever they are commanded."""
+        bodies, *rest = self._arrays
+        bodies = bodies.copy()
+        bodies[1 + carrier, layout.ACTUATORS :] = 0.0
+        self._arrays = (bodies, *rest)
+
     def run(self, states: np.ndarray, commands: np.ndarray, history: np.ndarray, tensions: np.ndarray) -> None:
         """Write states and tensions at the beginning and at the end of a period.
 

@@ -1,0 +1,67 @@
+"""Winds of flights: constant, with gusts, or a function of a user's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs import shown
+from ..models import air
+from ..models.robot import Robot
+from .conditions import Wind
+
+__all__ = ["ConstantWind", "Gusts", "read_wind"]
+
+
+class ConstantWind:
+    """The same wind at all times."""
+
+    def __init__(self, velocity: np.ndarray):
+        self._velocity = velocity
+
+    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
+        """Return it, (K, 3) [m/s]."""
+        return air.constant(times, self._velocity.tolist())
+
+
+class Gusts(ConstantWind):
+    """Dryden turbulence about a mean wind, with half of the intensity upwards."""
+
+    def __init__(self, velocity: np.ndarray, intensity: float):
+        super().__init__(velocity)
+        self._intensity = intensity
+
+    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
+        """Return the wind of a seed, (K, 3) [m/s]."""
+        intensity = (self._intensity, self._intensity, self._intensity / 2)
+        return air.dryden(times, self._velocity.tolist(), intensity, seed=seed)
+
+
+def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
+    """Return the wind of flights from what a user gives `simulate`, see there.
+
+    Raises
+    ------
+    InputError
+        If the robot has no `platform.aero`, or an argument has a wrong value.
+    """
+    if wind is None:
+        if gusts:
+            raise InputError(f"gusts must be 0 without a wind, got {gusts:g} m/s")
+        return None
+    if robot.platform.aero is None:
+        raise InputError(f"wind must be None for robot {robot.name!r}, which has no platform.aero, got a wind")
+    if callable(wind):
+        function: Any = wind
+        if gusts:
+            raise InputError(f"gusts must be 0 with a wind that is a function, got {gusts:g} m/s")
+        return function
+    try:
+        velocity = np.asarray(wind, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        velocity = np.empty(0)
+    if velocity.shape != (3,) or not (np.abs(velocity) <= 1e3).all():
+        raise InputError(f"wind must be three numbers from -1000 to 1000 m/s or a function of times, got {shown(wind)}")
+    return Gusts(velocity, gusts) if gusts else ConstantWind(velocity)

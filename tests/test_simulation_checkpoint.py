@@ -1,0 +1,95 @@
+"""Many flights with a checkpoint: killed and resumed they are the same; those of other flights are refused."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from towline import load, simulate
+from towline.control import ComputedTorque
+from towline.errors import InputError
+from towline.simulation.flights import save
+
+GIVEN = {"wind": (3, 2, 0.5), "gusts": 1.0, "duration": 0.03, "seed": 5}
+SCRIPT = """\
+from towline import load, simulate
+
+if __name__ == "__main__":
+    simulate("wang-flying", load("wang-flying").home, wind=(3, 2, 0.5), gusts=1.0, duration=0.03, seed=5, runs=1000,
+             checkpoint="flights", resume=True, progress=lambda *done: print(*done, flush=True))
+"""
+LOST = 700  # bytes
+
+
+def fly(file, runs=300, **changed):
+    robot = load("wang-flying")
+    return simulate(robot, robot.home, **GIVEN | changed, runs=runs, checkpoint=file, resume=True)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
+def test_killed_and_resumed_they_are_the_same(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    process = subprocess.Popen([sys.executable, "script.py"], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline().split()[1] == "1000"
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    begun = []
+    resumed = fly(tmp_path / "flights", 1000, progress=lambda done, *_: begun.append(done))
+    assert 500 <= begun[0] <= begun[-1] == 1000
+    alone = simulate("wang-flying", load("wang-flying").home, **GIVEN, runs=1000)
+    files = [save(table, tmp_path / name).read_bytes() for table, name in ((resumed, "a.nc"), (alone, "b.nc"))]
+    assert files[0] == files[1]
+
+
+def test_a_damaged_end_is_flown_again(tmp_path):
+    file = tmp_path / "flights"
+    whole = fly(file)
+    content = file.read_bytes()
+    assert whole.identical(fly(file))  # nothing is left to fly
+    assert file.read_bytes() == content
+    file.write_bytes(content[:-LOST])
+    assert whole.identical(fly(file))
+    assert len(file.read_bytes()) == len(content)
+
+
+@pytest.mark.parametrize(
+    ("changed", "name"),
+    [
+        ({"runs": 301}, "seeds"),
+        ({"seed": 6}, "seeds"),
+        ({"gusts": 2.0}, "wind"),
+        ({"duration": 0.04}, "reference"),
+        ({"disturbance": np.ones(6)}, "disturbance"),
+        ({"noise": {"position": 1e-3}}, "noise"),
+        ({"faults": ["cut 1 at 0.01"]}, "faults"),
+        ({"controller": ComputedTorque("wang-flying", bandwidth=9.0)}, "controller"),
+        ({"drive": "tensions"}, "robot"),
+    ],
+)
+def test_a_checkpoint_of_other_flights_is_refused(tmp_path, changed, name):
+    file = tmp_path / "flights"
+    fly(file)
+    content = file.read_bytes()
+    with pytest.raises(InputError, match=f"of another run, whose {name} is"):
+        fly(file, **changed)
+    assert file.read_bytes() == content
+
+
+def test_what_cannot_be_stored_is_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(InputError, match="checkpoint must be None for a controller or a wind that cannot be stored"):
+        fly(tmp_path / "flights", wind=lambda times, seed: np.zeros((len(times), 3)), gusts=0.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_cluster_flies_as_one_process_does():
+    distributed = pytest.importorskip("distributed")
+    alone = simulate("wang-flying", load("wang-flying").home, **GIVEN, runs=60)
+    options = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**options, protocol="tcp://") as cluster:
+        address = cluster.scheduler_address
+        there = simulate("wang-flying", load("wang-flying").home, **GIVEN, runs=60, scheduler=address)
+    assert alone.identical(there)
