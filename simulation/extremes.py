@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..control import ANSWERS
+from ..control.command import PLANNED
 from .conditions import Conditions
 from .recorder import Period
 
@@ -14,16 +15,14 @@ __all__ = ["Extremes"]
 class Extremes:
     """Keep a few numbers of each flight while it is flown.
 
+    Each period costs a few operations on whole arrays; the properties reduce them to a number for each flight.
+
     Attributes
     ----------
-    squares, error_max
-        Sum of the squared errors of the position, and the largest error [m], (N,).
-    tension_min, tension_max
-        Extreme tensions [N], (N,).
+    squares
+        Sum of the squared errors of the position [m^2], (N,).
     slack
         How many periods begin with a slack cable that should pull, (N,).
-    exceeded
-        By how much tensions are above their upper limits at most, in proportion to the cable's range, (N,).
     answers
         How many steps were answered in each way of `ANSWERS`, (N, 4).
     """
@@ -32,23 +31,47 @@ class Extremes:
         self._references, self._t_max, self._range = conditions.references, t_max, t_max - t_min
         self._taut = conditions.should_pull(t_min, np.arange(len(conditions.references)))
         self._rows = np.arange(flights)
-        self.squares, self.error_max, self.slack = np.zeros(flights), np.zeros(flights), np.zeros(flights, dtype=int)
-        self.tension_min, self.tension_max = np.full(flights, np.inf), np.full(flights, -np.inf)
-        self.exceeded = np.zeros(flights)
+        self.squares, self.slack = np.zeros(flights), np.zeros(flights, dtype=int)
         self.answers = np.zeros((flights, len(ANSWERS)), dtype=int)
+        self._largest = np.zeros(flights)  # squared error
+        self._least, self._most = np.full((flights, len(t_max)), np.inf), np.full((flights, len(t_max)), -np.inf)
 
     def take(self, period: Period) -> None:
         """Keep a period."""
         alive, command = period.alive, period.command
         rows = slice(None) if alive.all() else np.flatnonzero(alive)
-        motions, tensions = period.motions[rows], period.tensions[rows]
-        off = motions[:, 0, :3] - self._references[period.number].pose[:3]
-        square = np.einsum("ij,ij->i", off, off)
+        tensions = period.tensions[rows]
+        off = period.motions[rows, 0, :3] - self._references[period.number].pose[:3]
+        off *= off
+        square = off[:, 0] + off[:, 1] + off[:, 2]
         self.squares[rows] += square
-        self.error_max[rows] = np.maximum(self.error_max[rows], np.sqrt(square))
-        self.tension_min[rows] = np.minimum(self.tension_min[rows], tensions.min(axis=1))
-        self.tension_max[rows] = np.maximum(self.tension_max[rows], tensions.max(axis=1))
-        above = ((tensions - self._t_max) / self._range).max(axis=1)
-        self.exceeded[rows] = np.maximum(self.exceeded[rows], above)
-        self.slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
-        self.answers[self._rows[rows], np.broadcast_to(command.answered, len(self._rows))[rows]] += 1
+        self._largest[rows] = np.maximum(self._largest[rows], square)
+        self._least[rows] = np.minimum(self._least[rows], tensions)
+        self._most[rows] = np.maximum(self._most[rows], tensions)
+        if not tensions.min() > 0:
+            self.slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
+        answered = np.broadcast_to(command.answered, len(self._rows))[rows]
+        if answered.any():
+            self.answers[self._rows[rows], answered] += 1
+        else:
+            self.answers[rows, PLANNED] += 1
+
+    @property
+    def error_max(self) -> np.ndarray:
+        """Return the largest error of the position [m], (N,)."""
+        return np.sqrt(self._largest)
+
+    @property
+    def tension_min(self) -> np.ndarray:
+        """Return the smallest tension [N], (N,)."""
+        return self._least.min(axis=1)
+
+    @property
+    def tension_max(self) -> np.ndarray:
+        """Return the largest tension [N], (N,)."""
+        return self._most.max(axis=1)
+
+    @property
+    def exceeded(self) -> np.ndarray:
+        """Return by how much tensions are above t_max at most, in proportion to the cable's range, at least 0, (N,)."""
+        return np.maximum(((self._most - self._t_max) / self._range).max(axis=1), 0.0)

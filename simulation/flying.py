@@ -23,6 +23,7 @@ from .recorder import Period, Recorder
 __all__ = ["fly"]
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
+FEW = 1000  # numbers that BLAS adds with one thread
 DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
 
 
@@ -118,7 +119,7 @@ def fly(
     tensions[:, 1] = start
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controller, flights)
     orders = Orders(plant, conditions, seeds)
-    lasted, alive = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool)
+    lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
     sense, periods = sense_rows(), Periods(plant, period, conditions.substeps)
     faults, silent_until, command = list(conditions.faults), -1.0, None
     for k, reference in enumerate(conditions.references):
@@ -137,17 +138,23 @@ def fly(
             command = pilot.step(time, *reported, reference)
         if k == 0:
             check_command(command, robot, flights, time)
-        row = orders.rows(k, command, lengths, periods.unstrained(states))
+        row = orders.rows(k, command, lengths, states)
         periods.run(states, row, history, tensions)
-        if not isfinite(np.vdot(history, history)):
+        if not isfinite(_square(history)):
             check_command(command, robot, flights, time)
             alive &= (np.abs(history[:, 1]) < BEYOND).all(axis=1)
             history[~alive, 1] = states[~alive]
-        if k == 0 or alive.any():
+            going = bool(alive.any())
+        if k == 0 or going:
             lived = alive if k else np.ones(flights, dtype=bool)
             recorder.take(Period(k, lived, motions, lengths, tensions[:, 0], command))
-        if not alive.any():
+        if not going:
             break
         lasted += alive
         states = history[:, 1].copy()
     return np.maximum(lasted, 1), pilot.seconds
+
+
+def _square(values: np.ndarray) -> float:
+    """Return the sum of squares; of large arrays without BLAS, whose threads would wait for each other."""
+    return float(np.vdot(values, values) if values.size < FEW else np.einsum("ijk,ijk->", values, values))

@@ -1,4 +1,4 @@
-"""Compile the kernel of `sensors`, with the plant's kernels that it uses; `prepare` compiles those of flights."""
+"""Compile the kernels of `sensors` and `winding`, with those of the plant that they use; `prepare`, all of flights."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ..models.kernel import Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined, run_rows
 
-__all__ = ["prepare", "sense_rows"]
+__all__ = ["prepare", "sense_rows", "write_lengths"]
 
-_PLANT = Path(machine.__file__).parent
-_MODULES = (*(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines")), Path(__file__).parent / "sensors.py")
+_PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
+_MODULES = (*(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines")), _HERE / "sensors.py")
 _SIGNATURE = (
     "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 )
@@ -25,10 +25,20 @@ def sense_rows() -> Kernel:
     return compile_function(joined(_MODULES, "sense_rows"), "sense_rows", _SIGNATURE)
 
 
+@cache
+def write_lengths() -> Kernel:
+    """Return `winding.write_lengths` as machine code; compiling takes a second once on a machine."""
+    signature = (
+        "void(float64[:, ::1], intp, float64[:, :, ::1], float64[:, ::1], float64[::1], float64[::1], float64, "
+        "float64, float64[:, ::1], intp)"
+    )
+    return compile_function(joined([_HERE / "winding.py"], "write_lengths"), "write_lengths", signature)
+
+
 def prepare() -> None:
     """Load the machine code of flights, so that the first one does not wait for it.
 
     A machine compiles it once, which takes some 30 s; loading takes less than a second.
     """
-    for kernel in (run_rows, mechanics, sense_rows):
+    for kernel in (run_rows, mechanics, sense_rows, write_lengths):
         kernel()

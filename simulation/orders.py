@@ -10,6 +10,7 @@ from ..control import Command
 from ..errors import InputError
 from ..models.plant import Plant, layout
 from .conditions import Conditions, Wind
+from .machine import write_lengths
 
 __all__ = ["Orders"]
 
@@ -20,11 +21,8 @@ class Orders:
     """Translate commands.
 
     Tensions are commanded as they are if the plant's drive has them, or winches that pull with a force. Elastic cables
-    without winches in their file are assumed to have some that measure their tension and reach it within the period:
-
-        t = E A e / L0 + (C + E A dt / L0) v,    v = dl/dt - dL0/dt
-
-    gives the rate of the unstrained length L0, with the elongation e and the rate of the length l at its beginning.
+    without winches in their file are assumed to have some that measure their tension and reach it within the period,
+    see `winding`.
 
     Parameters
     ----------
@@ -38,8 +36,11 @@ class Orders:
 
     def __init__(self, plant: Plant, conditions: Conditions, seeds: Sequence[int]):
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
-        self._robot, self._period, self._drive = robot, conditions.period, plant.drive
-        self._stiffness, self._damping = (plant.arrays[1][:, column] for column in (layout.STIFFNESS, layout.DAMPING))
+        self._period, self._drive, self._fixed = conditions.period, plant.drive, robot.fixed_lengths
+        columns = plant.arrays[1]
+        self._elastic = columns[:, layout.STIFFNESS].copy(), columns[:, layout.DAMPING].copy()
+        self._first = layout.BODY * (1 + len(robot.carriers))  # of the unstrained lengths in a state
+        self._shape, self._write = (len(seeds), robot.m), write_lengths()
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
@@ -53,22 +54,22 @@ class Orders:
         self._actuation = carriers[..., : max(len(carrier.actuators) for carrier in robot.carriers)]
         self._moves = any(carrier.moves for carrier in robot.carriers)
 
-    def rows(self, k: int, command: Command, lengths: np.ndarray, unstrained: np.ndarray) -> np.ndarray:
-        """Return the rows of period `k`, (N, k), from lengths and rates (N, 2, m) and L0 (N, m), all at its beginning.
+    def rows(self, k: int, command: Command, lengths: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Return the rows of period `k`, (N, k), from lengths and rates (N, 2, m) and states (N, n) at its beginning.
 
         Each call overwrites the rows of the last.
         """
         rows = self._rows
         if self.wind is not None:
             rows[:, layout.WIND : layout.WRENCH] = self.wind[k]
-        cables = command.tensions
-        if self._drive == "lengths" and self._robot.fixed_lengths is not None:
-            cables = self._robot.fixed_lengths
-        elif self._drive == "lengths":
-            k_of = self._stiffness / unstrained
-            relative = (cables - k_of * (lengths[:, 0] - unstrained)) / (self._damping + k_of * self._period)
-            cables = np.maximum(unstrained + self._period * (lengths[:, 1] - relative), layout.SHORTEST)
-        self._cables[:] = cables
+        if self._drive != "lengths":
+            self._cables[:] = command.tensions
+        elif self._fixed is not None:
+            self._cables[:] = self._fixed
+        else:
+            tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._shape)
+            at = self._period, layout.SHORTEST, rows, layout.COMMANDS
+            self._write(states, self._first, lengths, tensions, *self._elastic, *at)
         if self._moves:
             self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
             self._accelerations[:] = command.carrier_acceleration

@@ -18,8 +18,6 @@ class Periods:
     ----------
     geometry
         Bodies, all of them free, and cables in the columns of `layout`, and the place of the CoM in the platform, (3,).
-    stiffness, damping
-        E A [N] and C [N s/m] of the cables, (m,); without stiffness a cable never stretches.
     """
 
     def __init__(self, plant: Plant, period: float, substeps: int):
@@ -29,13 +27,6 @@ class Periods:
         bodies = bodies.copy()
         bodies[:, layout.MOTION] = layout.FREE
         self.geometry = (bodies, cables, np.array(plant.robot.platform.com))
-        self.stiffness, self.damping = cables[:, layout.STIFFNESS], cables[:, layout.DAMPING]
-        first = layout.BODY * len(bodies)
-        self._unstrained = slice(first, first + len(cables))
-
-    def unstrained(self, states: np.ndarray) -> np.ndarray:
-        """Return the unstrained lengths in states (N, n) of elastic cables, (N, m) [m]."""
-        return states[:, self._unstrained]
 
     def lose(self, carrier: int) -> None:
         """Let the actuators of a carrier give nothing from the next period on, whatever they are commanded."""
