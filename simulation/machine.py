@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from ..control.machine import mechanics
-from ..models.kernel import Kernel, compile_function
+from ..models.kernel import GIVEN, Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined, run_rows
 
@@ -29,7 +29,7 @@ def sense_rows() -> Kernel:
 def write_lengths() -> Kernel:
     """Return `winding.write_lengths` as machine code; compiling takes a second once on a machine."""
     signature = (
-        "void(float64[:, ::1], intp, float64[:, :, ::1], float64[:, ::1], float64[::1], float64[::1], float64, "
+        f"void(float64[:, ::1], intp, float64[:, :, ::1], {GIVEN.format(2)}, float64[::1], float64[::1], float64, "
         "float64, float64[:, ::1], intp)"
     )
     return compile_function(joined([_HERE / "winding.py"], "write_lengths"), "write_lengths", signature)
