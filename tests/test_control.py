@@ -5,10 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.benchmarks.control_steps import random_steps
-from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State
+from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State, mechanics
+from towline.control.reaction import write_columns
 from towline.distribution import tensions as distribute
 from towline.errors import InputError
 from towline.models import Dynamics, load
+from towline.models.plant import layout
+from towline.models.plant.bodies import place_bodies
+from towline.models.plant.lines import run_cables
 from towline.simulation import simulate
 
 ROBOTS = ["cogiro", "wang-flying", "caroca-pulleys", "planar-4", "wang-ctmrts-6", "multi-quadrotor-4", "flycrane"]
@@ -135,6 +139,55 @@ def test_the_observer_finds_a_force_and_a_moment_that_nobody_reports():
     expected = np.linalg.norm(push[:3]) / (robot.platform.mass * 10.0**2)
     assert without.error[-1] == pytest.approx(expected, rel=0.05)
     assert flight.error[-1] < 1e-3 * without.error[-1] + 1e-6
+
+
+def test_an_integral_brings_a_platform_back_that_a_force_has_moved():
+    robot, push = load("cogiro"), np.array([30.0, 0, 0, 0, 0, 0])
+    gains = {"bandwidth": 5.0, "observer": 0.0}
+    errors = [
+        simulate(
+            robot, robot.home, ComputedTorque(robot, integral=integral, **gains), duration=6.0, disturbance=push
+        ).error
+        for integral in (0.0, 30.0)
+    ]
+    offset = push[0] / robot.platform.mass / 5.0**2
+    assert errors[0][-1] == pytest.approx(offset, rel=0.05)
+    assert errors[1][-1] < 0.05 * offset
+
+
+def test_whole_turns_of_a_reference_change_nothing():
+    robot = load("cogiro")
+    state, reference = at_home(robot)
+    turned = reference._replace(pose=robot.home + 2 * np.pi * np.array([0, 0, 0, 1, -2, 1]))
+    commands = [ComputedTorque(robot).step(0.0, state, each).tensions for each in (reference, turned)]
+    np.testing.assert_allclose(commands[0], commands[1], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["wang-flying-quadrotor", "wang-ctmrts-6", "flycrane"])
+def test_carriers_change_the_wrench_as_their_columns_predict(name):
+    """The kernel's derivatives beside differences of the symbolic wrench matrix, at a pose away from home."""
+    robot, rng = load(name), np.random.default_rng(3)
+    dynamics, count, m = Dynamics(robot), len(robot.carriers), robot.m
+    pose = robot.home + rng.normal(scale=0.1, size=6)
+    carriers = robot.carrier_home + rng.normal(scale=0.1, size=(count, 6))
+    bodies, cables, settings, _ = ComputedTorque(robot)._robot
+    state, command = np.zeros(layout.BODY * (1 + count) + layout.CABLE_BLOCKS * m), np.zeros(400)
+    on_bodies, on_cables = np.zeros((1 + count, layout.BODY_WORK)), np.zeros((m, layout.CABLE_WORK))
+    for b, motion in enumerate([pose, *carriers]):
+        mechanics.put_body(state, layout.BODY * b, np.concatenate([motion, np.zeros(6)]))
+    place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
+    mechanics.move_to_com(settings, state, on_bodies)
+    run_cables(cables, state, on_bodies, on_cables, layout.BODY * (1 + count))
+    t, far = rng.uniform(1, 5, m), np.tile([0.3, 0.3, 0.3, 0.0, 0.0, 0.0], (count, 1))
+    columns = np.zeros((6 * count, 6))
+    write_columns(1.0, far, cables, on_cables, t, columns)
+    for c in range(count):
+        for k in range(3):
+            step = np.zeros((count, 6))
+            step[c, k] = 1e-5
+            both = [dynamics.wrench_matrix(pose, carriers + side * step) @ t for side in (1, -1)]
+            expected = 0.3 * (both[0] - both[1]) / 2e-5
+            np.testing.assert_allclose(columns[6 * c + k], expected, atol=1e-6)
 
 
 def test_a_base_that_may_react_gives_back_what_a_side_force_takes_of_the_tensions():

@@ -9,6 +9,7 @@ from towline.control import Command, ComputedTorque, Controller, State
 from towline.errors import InputError
 from towline.models import Dynamics
 from towline.simulation import simulate
+from towline.simulation.machine import write_lengths
 from towline.simulation.trajectory import read_trajectory
 
 
@@ -94,6 +95,20 @@ def test_a_flight_of_many_is_the_flight_alone():
     assert len(set(many["error_max"].values)) == 3
 
 
+def test_slack_cables_count_in_many_flights_as_alone_and_cut_ones_never():
+    """Cable 3 of wang-flying tears: the platform swings, others get slack."""
+    task = {"faults": ["cut 3 at 0.1"], "duration": 1.0, "tolerance": 10.0}
+    alone = simulate("wang-flying", load("wang-flying").home, **task)
+    taut = alone.record.tensions > 0
+    assert not taut[100:, 2].any()
+    others = np.delete(np.arange(6), 2)
+    slack_s = (~taut[:, others]).any(axis=1).sum() * alone.period
+    assert slack_s > 0.05
+    assert alone.slack_s == pytest.approx(slack_s)
+    many = simulate("wang-flying", load("wang-flying").home, **task, runs=2)
+    np.testing.assert_allclose(many["slack_s"].values, slack_s)
+
+
 def test_the_drag_of_a_steady_wind_is_what_the_observer_reports():
     robot, wind = load("wang-flying"), (5.0, -2.0, 0.0)
     controller = ComputedTorque(robot, observer=20.0)
@@ -163,6 +178,19 @@ def test_a_carrier_that_loses_its_thrust_has_its_weight_and_its_cable_alone():
     acceleration = np.gradient(flight.record.motions[:, 2, 6:9], flight.period, axis=0)
     np.testing.assert_allclose(acceleration[205:-1], expected[205:-1], atol=0.02)
     assert np.nanmax(flight.trajectory["actuation"].sel(carrier="quad2", actuator="thrust").values[200:]) > 0
+
+
+def test_winding_makes_the_tension_that_is_ordered_at_the_end_of_the_period():
+    """The tension of a linear cable with damper, after a period in which length and unstrained length change evenly."""
+    rng, period = np.random.default_rng(2), 1e-3
+    own, order = rng.uniform(1, 5, (3, 4)), rng.uniform(5, 50, (3, 4))
+    lengths = np.stack([own * rng.uniform(1, 1.002, (3, 4)), rng.normal(size=(3, 4))], axis=1)
+    EA, C = rng.uniform(1e4, 1e6, 4), rng.uniform(0, 300, 4)
+    rows = np.zeros((3, 9))
+    write_lengths()(np.pad(own, ((0, 0), (2, 0))), 2, lengths, order, EA, C, period, 1e-3, rows, 5)
+    rate = lengths[:, 1] - (rows[:, 5:] - own) / period  # of the elongation
+    reached = EA * (lengths[:, 0] - own + period * rate) / own + C * rate
+    np.testing.assert_allclose(reached, order, rtol=1e-8)
 
 
 def test_sensors_report_late_and_with_the_noise_that_is_stated():
