@@ -24,8 +24,9 @@ from towline import Robot, Task, load, plan
 from towline.cli.main import app
 from towline.models.parsing import parse_yaml
 from towline.studies.accounts.claim import Verdict
-from towline.studies.flying import repair, vibration
+from towline.studies.flying import flights, repair, shaken, vibration
 from towline.studies.flying import study as flying
+from towline.studies.towing import flights as towed
 from towline.studies.towing import modes, ranges
 from towline.studies.towing import study as towing
 
@@ -37,7 +38,7 @@ BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 TUTORIAL = "docs/tutorial.md"
-SLOW = {repair.chapter, vibration.chapter, ranges.chapter, modes.chapter}  # seconds each
+SLOW = {part.chapter for part in (repair, vibration, shaken, flights, ranges, modes, towed)}  # seconds each
 COMPILER = shutil.which("cc")
 
 

@@ -272,6 +272,8 @@ def test_the_command_reproduces_the_paper(tmp_path):
     assert by_name["circle-repair"]["verdict"] == "reproduced"
     assert by_name["helix-repair"]["verdict"] == "reproduced"
     assert by_name["fig-11"]["verdict"] == "not determined"
+    assert by_name["VI.A-flown"]["verdict"] == by_name["VI.B-flown"]["verdict"] == "reproduced"
+    assert by_name["flown-positive"]["verdict"] == by_name["eq-6-flown"]["verdict"] == "reproduced"
     assert by_name["fig-10-tension"]["computed"] < -0.9
     assert all(Path(file).stat().st_size > 0 for file in printed["files"])
     drawn = {Path(file).stem for file in printed["files"] if file.endswith(".png")}

@@ -13,9 +13,13 @@ by `PITCH` sin(0.2 pi t), and along x the surge that a quadrotor has when its th
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Literal
+
 import numpy as np
 
-from ...ocp import Task
+from ...models import load
+from ...ocp import Plan, Task, plan
 from ...ocp.tasks.paths import CirclePath, LinePath, SamplePath
 from ...ocp.tasks.task import FreeBase, GivenBase
 from .circle import tasks
@@ -26,6 +30,7 @@ BELOW = 1.0  # of the circle's centre under the quadrotor [m]
 PITCH = 0.1  # [rad], assumed
 GRAVITY = 9.81
 Vector = tuple[float, float, float]
+Name = Literal["circle", "helix", "pitching"]
 
 
 def circle() -> Task:
@@ -51,6 +56,12 @@ def pitching() -> Task:
     """Return VI.C: a small circle in the frame of a quadrotor that moves and pitches."""
     path = CirclePath(kind="circle", frame="quad", centre=(0, 0, -BELOW), radius=0.15, rate=RATE)
     return Task(name="circle-pitching", path=path, base=GivenBase(kind="given", paths={"quad": pitching_flight()}))
+
+
+@cache
+def planned(name: Name) -> Plan:
+    """Return the plan of one of the three motions, computed once in a process."""
+    return plan(load("wang-flying"), {"circle": circle, "helix": helix, "pitching": pitching}[name]())
 
 
 def pitching_flight(largest: float = PITCH) -> SamplePath:

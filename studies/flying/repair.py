@@ -19,9 +19,8 @@ ON_CIRCLE = 0.01  # [m], allowed distance of the platform from its circle
 
 def chapter() -> Chapter:
     """Plan the circle under a hovering quadrotor, and circle and helix with the quadrotor free."""
-    robot = load("wang-flying")
-    hovering_task, free_task = tasks()
-    hovering, circle, helix = (plan(robot, task) for task in (hovering_task, free_task, plans.helix()))
+    hovering = plan(load("wang-flying"), tasks()[0])
+    circle, helix = plans.planned("circle"), plans.planned("helix")
     claims = [
         _hovering(hovering),
         _repaired("circle-repair", "VI.B", "circle", circle, "repair"),

@@ -7,6 +7,7 @@ from . import (
     balance,
     cable,
     disturbance,
+    flights,
     helix,
     pairing,
     parameters,
@@ -14,6 +15,7 @@ from . import (
     radius,
     repair,
     rotations,
+    shaken,
     vibration,
     wind,
 )
@@ -34,7 +36,9 @@ CHAPTERS = {
     "A circle of radius 1 m, and what makes it possible (section VI.B)": repair.chapter,
     "The largest circle (section VI.B)": radius.chapter,
     "A vibrating platform (section VI.B)": vibration.chapter,
+    "A vibration in the elastic plant (sections III, V)": shaken.chapter,
     "A moving quadrotor (section VI.C)": disturbance.chapter,
+    "The three motions flown in the wind (section VI)": flights.chapter,
 }
 
 

@@ -6,13 +6,12 @@ import numpy as np
 
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
-from ...ocp import Plan, plan
+from ...ocp import Plan
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, stated
 from .equations import SIZES
-from .plans import DRIVES, FIXED, Drive, robot, task
+from .plans import DRIVES, FIXED, Drive, planned
 
-STEPS = 50
 CHANGES = {
     "fixed-length": "by changing only the positions of the robot-ends, with cables of 1.2 m",
     "variable-length": "by changing only the lengths of the cables",
@@ -24,8 +23,7 @@ SECTIONS = {"fixed-length": "5.1", "variable-length": "5.2", "both": "5.3"}
 def chapter() -> Chapter:
     """Plan for every drive and every m."""
     plans: dict[Drive, dict[int, Plan]] = {
-        drive: {m: plan(robot(name, drive), task(robot(name, drive), "effort", STEPS)) for m, name in SIZES.items()}
-        for drive in DRIVES
+        drive: {m: planned(name, drive) for m, name in SIZES.items()} for drive in DRIVES
     }
     claims = [_carried(drive, by_m) for drive, by_m in plans.items()]
     claims.append(_kept(plans["fixed-length"]))

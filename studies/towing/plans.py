@@ -8,6 +8,7 @@ between, including the attitude of the load.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from ...models import Robot, load
 from ...models.ranges import PositiveRange
 from ...models.statics import equilibria
-from ...ocp import Task
+from ...ocp import Plan, Task, plan
 from ...ocp.tasks.paths import AnyPath, LinePath
 from ...ocp.tasks.task import AnyBase, FreeBase, HoldBase, Objective, Tube
 
@@ -67,6 +68,13 @@ def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
         steps=steps,
         objective=OBJECTIVES[aim],
     )
+
+
+@cache
+def planned(name: str, drive: Drive) -> Plan:
+    """Return the plan with least effort of a robot of the library with a drive, computed once in a process."""
+    mover = robot(name, drive)
+    return plan(mover, task(mover, "effort"))
 
 
 def _pose(values: np.ndarray) -> tuple[float, float, float, float, float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..accounts.account import Account, Paper, Progress, gather
-from . import equations, modes, ranges, tensions
+from . import equations, flights, modes, ranges, tensions
 
 PAPER = Paper(
     "ctmrts",
@@ -15,6 +15,7 @@ CHAPTERS = {
     "Tensions, Eqs. 11, 16, 17": tensions.chapter,
     "Workspaces, figures 2 to 6": ranges.chapter,
     "Three drives, three to six robots": modes.chapter,
+    "The load towed": flights.chapter,
 }
 
 

@@ -1,0 +1,303 @@
+"""Paper F's section V beside the elastic plant: the same vibration, the tensions of a simulation and the procedure's.
+
+The platform moves on the circle of radius 0.15 m under a hovering quadrotor, by commanded lengths (`wound`), once still
+and once shaken by a small force along each axis, at 5, 6 and 7 Hz as in `vibration`. What the force adds to the pose is
+the vibration that the procedure receives; what it adds to the tensions is what the procedure should give.
+
+Its dT has two parts. Both take the displacement of the platform from its steady motion, and the damping divides it by
+the time step, which is no part of the vibration. If the displacement is instead that of one time step, the damping is
+right and the elasticity is not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...models import Dynamics, Robot, load
+from ...models.air import trapezoid
+from ...models.cables.driving_force import DrivingForce, driving_force
+from ...models.plant import Plant
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated, undetermined
+from .motion import FEASIBLE, circle
+from .vibration import ELEMENTS, HERTZ, PHASES, RATIO
+from .wind import NOISE, PEAK
+from .wound import FLIGHT, PERIOD, unstrained, wind_up
+
+FORCE = 0.1  # amplitude along each axis [N]: it takes no tension below zero
+SHAKEN = FLIGHT[:3001]  # instants of the vibration [s]
+BEGUN = slice(1000, -200)  # its rows without its begin and its end
+STEPS = (1, 10, 100)  # time steps of the procedure, in periods
+USED = STEPS[1]  # that of `vibration`
+SHOWN = slice(2000, 2801)  # the rows of the figure
+SAME = 0.01  # of what is compared
+RELEASED = np.diag([1e-4] * 6)  # velocities of the platform in the beginning [m/s, rad/s], one coordinate in each row
+COORDINATES: tuple[str, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+LASTS = 2.0  # of a free vibration [s]
+TENTH, SLOW = 0.1, 10.0  # what is left of a vibration, and how many of its periods that takes if it decays slowly
+HOLDS = (10, 100)  # periods between two samples of the wind's noise
+
+
+class Shaken(NamedTuple):
+    """Vibration of cable 1 at the instants `SHAKEN`, (n,) each.
+
+    Attributes
+    ----------
+    vibration
+        Of the platform's pose, (n, 6) [m, rad].
+    added
+        By the vibration to the distance from anchor to attachment [m].
+    dT
+        And to the tension [N].
+    elastic, damping
+        E A / l times `added`, and C times its rate [N].
+    """
+
+    vibration: np.ndarray
+    added: np.ndarray
+    dT: np.ndarray  # noqa: N815
+    elastic: np.ndarray
+    damping: np.ndarray
+
+
+def chapter() -> Chapter:
+    """Shake, release and blow at the platform."""
+    robot = load("wang-flying")
+    seen = shake(robot)
+    displaced = {step: procedure(robot, seen.vibration, step) for step in STEPS}
+    stepped = {step: procedure(robot, _of_one_step(seen.vibration, step), step) for step in STEPS}
+    free, (strongest, ratios) = release(robot), blow(robot)
+    claims = [
+        _superposed(seen),
+        _elastic(seen, displaced[USED]),
+        _switch(robot, seen),
+        _damping(seen, displaced),
+        _stepped(seen, stepped),
+        _slow(free),
+        _noise(strongest),
+    ]
+    drawings = {
+        "shaken": _shaken(seen, displaced[USED]),
+        "released": _released(free),
+        "blown": Drawing(
+            "Cable 1 in the wind of figure 5, platform at rest 1 m below a hovering quadrotor: dT by the noise over T",
+            curves(FLIGHT[::10], "time [s]", [Panel("dT / T [%]", ratios, {"12.47 %": 100 * RATIO})]),
+        ),
+    }
+    return Chapter(claims, drawings)
+
+
+def shake(robot: Robot) -> Shaken:
+    """Run the plant still and shaken, and take the difference."""
+    force = FORCE * np.sin(2 * np.pi * np.outer(SHAKEN[:-1], HERTZ) + PHASES)
+    wrench = np.stack([np.zeros((len(force), 6)), np.hstack([force, np.zeros_like(force)])])
+    body, dynamics, cable = circle(FEASIBLE, SHAKEN), Dynamics(robot), robot.cables[0]
+    run = wind_up(robot, body, wrench=wrench, lengths=unstrained(robot, body))
+    still, shaken = run.states.pose
+    lengths = dynamics.cable_lengths(still)[:, 0]
+    added = dynamics.cable_lengths(shaken)[:, 0] - lengths
+    assert cable.stiffness is not None
+    assert cable.damping is not None
+    return Shaken(
+        shaken - still,
+        added,
+        (run.tensions[1] - run.tensions[0])[:, 0],
+        cable.stiffness / lengths * added,
+        cable.damping * np.gradient(added, PERIOD),
+    )
+
+
+def procedure(robot: Robot, vibration: np.ndarray, step: int) -> DrivingForce:
+    """Return the paper's driving forces for a vibration (n, 6), with a time step of `step` periods, taut cables."""
+    motion = circle(FEASIBLE, SHAKEN)
+    return driving_force(robot, *motion, vibration, step * PERIOD, ELEMENTS, pretension=np.inf)
+
+
+def release(robot: Robot) -> np.ndarray:
+    """Return what is left of each coordinate over its largest value after a push along it, (6, n)."""
+    plant = Plant(robot)
+    steady = np.linalg.solve(Dynamics(robot).wrench_matrix(robot.home), [0, 0, robot.weight, 0, 0, 0])
+    start = plant.start(robot.home, RELEASED, tensions=steady)
+    commands = np.tile(plant.command(plant.read(start).lengths[0]), (round(LASTS / PERIOD), 1))
+    poses = plant.read(plant.run(start, commands, PERIOD).states).pose - robot.home
+    own = np.stack([poses[row, :, row] for row in range(6)])
+    return own / np.abs(own).max(axis=1, keepdims=True)
+
+
+def blow(robot: Robot) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+    """Return the largest dT / T of cable 1 by the wind's noise, and dT / T over time in [%], by its sampling."""
+    body, names = circle(0.0, FLIGHT), [f"a sample each {hold * PERIOD * 1e3:g} ms" for hold in HOLDS]
+    winds = []
+    for hold in HOLDS:
+        times = hold * PERIOD * np.arange(-(-(len(FLIGHT) - 1) // hold))
+        winds += [np.repeat(trapezoid(times, PEAK, noise=noise), hold, axis=0) for noise in (0.0, NOISE)]
+    wind = np.stack(winds)[:, : len(FLIGHT) - 1]
+    T = wind_up(robot, body, wind=wind, lengths=unstrained(robot, body)).tensions[..., 0]
+    ratios = dict(zip(names, (T[1::2] - T[::2]) / T[::2], strict=True))
+    largest = {name: float(np.abs(ratio).max()) for name, ratio in ratios.items()}
+    return largest, {name: 100 * ratio[::10] for name, ratio in ratios.items()}
+
+
+def _of_one_step(vibration: np.ndarray, step: int) -> np.ndarray:
+    """Return what each time step of so many periods adds to the vibration."""
+    change = np.zeros_like(vibration)
+    change[step:] = vibration[step:] - vibration[:-step]
+    return change
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values[BEGUN] ** 2)))
+
+
+def _superposed(seen: Shaken) -> Claim:
+    off = np.abs(seen.dT - seen.elastic - seen.damping)[BEGUN].max() / np.abs(seen.dT)[BEGUN].max()
+    return compared(
+        "eq-7-plant",
+        "Eq. 7, conclusion 1",
+        "The tension is that of the steady winding and that of the small vibration, superposed (tension of cable 1 in "
+        "the elastic plant, less that without vibration, less E A / l dl + C d(dl)/dt, over the largest dT).",
+        0.0,
+        float(off),
+        within=SAME,
+        agrees="What a vibration adds to the tension is linear in the length that it adds, and in its rate.",
+        differs="The tension is no superposition.",
+        figure="shaken",
+    )
+
+
+def _elastic(seen: Shaken, given: DrivingForce) -> Claim:
+    return compared(
+        "eq-21-plant",
+        "Eqs. 12, 21, section V step 5",
+        "The chain of elements gives dT_K of the vibrating cable (its root mean square over that of dT in the elastic "
+        "plant less C d(dl)/dt, for the displacement from the steady motion).",
+        1.0,
+        _rms(given.dT_K[:, 0]) / _rms(seen.dT - seen.damping),
+        within=SAME,
+        agrees="It does if cables stay taut, as they are here.",
+        differs="The elastic increments are others.",
+        figure="shaken",
+    )
+
+
+def _switch(robot: Robot, seen: Shaken) -> Claim:
+    paper = driving_force(robot, *circle(FEASIBLE, SHAKEN), seen.vibration, USED * PERIOD, ELEMENTS)
+    return compared(
+        "eq-16-plant",
+        "Eqs. 15, 16",
+        "A cable whose attachment moves towards the anchor carries no increment (smallest dT_K of cable 1 by this "
+        "rule, and in the elastic plant).",
+        float(paper.dT_K[BEGUN, 0].min()),
+        float((seen.dT - seen.damping)[BEGUN].min()),
+        within=SAME * float(np.abs(seen.elastic[BEGUN]).max()),
+        agrees="The tension never decreases.",
+        differs="A cable that pulls with the steady tension T loses tension when it gets shorter. It is slack only "
+        "where that takes all of T.",
+        unit="N",
+        figure="shaken",
+    )
+
+
+def _damping(seen: Shaken, displaced: dict[int, DrivingForce]) -> Claim:
+    ratios = tuple(_rms(given.dT_C[:, 0]) / _rms(seen.damping) for given in displaced.values())
+    return compared(
+        "eq-11-plant",
+        "Eq. 11, section V step 4",
+        "dT_C = C (l(B_new) - l(B)) / dt, where B_new is displaced from the steady B (its root mean square over that "
+        f"of the damping in the elastic plant, for dt = {_milliseconds()} ms).",
+        (1.0,) * len(ratios),
+        ratios,
+        within=SAME,
+        agrees="They are the same.",
+        differs="A displacement over a time step is no rate. It grows without bound as the step gets smaller, and is "
+        "in phase with dl, where damping is in phase with d(dl)/dt.",
+        figure="shaken",
+    )
+
+
+def _stepped(seen: Shaken, stepped: dict[int, DrivingForce]) -> Claim:
+    elastic = tuple(_rms(given.dT_K[:, 0]) / _rms(seen.elastic) for given in stepped.values())
+    damping = ", ".join(f"{_rms(given.dT_C[:, 0]) / _rms(seen.damping):.2f}" for given in stepped.values())
+    return compared(
+        "eq-10-plant",
+        "Eqs. 8, 10 to 13",
+        "The displacement dB is the change of one sampling time dt (dT_K with it, its root mean square over that of "
+        f"the elastic plant, for dt = {_milliseconds()} ms).",
+        (1.0,) * len(elastic),
+        elastic,
+        within=SAME,
+        agrees="They are the same.",
+        differs=f"With it dT_C is right for short steps ({damping} of the damping in the plant), but dT_K is the "
+        "change of the elastic force in one step, not the force. No dB gives both.",
+        figure="shaken",
+    )
+
+
+def _slow(free: np.ndarray) -> Claim:
+    times = PERIOD * np.arange(free.shape[1])
+    left = np.array([times[np.flatnonzero(np.abs(row) > TENTH)[-1]] for row in free])
+    waves = [PERIOD * 2 * np.diff(np.flatnonzero(np.diff(np.sign(row)))[:3]) for row in free]
+    periods = np.array([float(wave[-1]) if len(wave) else np.inf for wave in waves])
+    slowest = int(left.argmax())
+    taken = float((left / periods)[slowest])
+    return stated(
+        "section-III-vibration",
+        "section III.A",
+        "The platform makes low-frequency and slow-decay vibration, because cables have low stiffness and small "
+        "damping (time until a tenth is left of the vibration after a push along x, y, z, roll, pitch and yaw).",
+        "slow decay",
+        f"{', '.join(f'{value:.2f}' for value in left)} s",
+        holds=taken > SLOW,
+        agrees=f"It takes more than {SLOW:g} periods.",
+        differs=f"The longest takes {taken:.1f} periods at {1 / periods[slowest]:.1f} Hz; more than {SLOW:g} would "
+        "count as slow here. Table 1's C = 0.2 N/(mm/s) damps all of them strongly.",
+        figure="released",
+    )
+
+
+def _noise(strongest: dict[str, float]) -> Claim:
+    given = ", ".join(f"{value:.1%} with {name}" for name, value in strongest.items())
+    return undetermined(
+        "fig-11-wind",
+        "III.A, VI.B, figure 11",
+        "Wind is a cause of the vibration, whose largest dT / T of cable 1 is 12.47 % (largest dT / T by the noise of "
+        "figure 5 in the elastic plant, platform at rest 1 m below a hovering quadrotor).",
+        f"{RATIO:.2%}",
+        given,
+        missing="Neither the cause of the vibration nor the time between samples of the noise is printed. The noise "
+        "alone gives values of this size.",
+        figure="blown",
+    )
+
+
+def _milliseconds() -> str:
+    return ", ".join(f"{step * PERIOD * 1e3:g}" for step in STEPS)
+
+
+def _shaken(seen: Shaken, given: DrivingForce) -> Drawing:
+    dots = np.where(np.arange(len(SHAKEN)) % 20 == 0, seen.elastic + seen.damping, np.nan)
+    panels = [
+        Panel("added length [um]", {"plant": 1e6 * seen.added[SHOWN]}),
+        Panel("elastic [N]", {"plant": (seen.dT - seen.damping)[SHOWN], "procedure": given.dT_K[SHOWN, 0]}),
+        Panel("damping [N]", {"plant": seen.damping[SHOWN], "procedure": given.dT_C[SHOWN, 0]}),
+        Panel("dT [N]", {"plant": seen.dT[SHOWN], "procedure": given.dT[SHOWN, 0]}, dots={"linear": dots[SHOWN]}),
+    ]
+    return Drawing(
+        "Cable 1 while the platform vibrates: elastic plant, E A dl / l + C d(dl)/dt (linear), and section V with "
+        f"dt = {USED * PERIOD * 1e3:g} ms",
+        curves(SHAKEN[SHOWN], "time [s]", panels),
+    )
+
+
+def _released(free: np.ndarray) -> Drawing:
+    rows = slice(0, round(0.8 / PERIOD))
+    lines: dict[str, np.ndarray] = dict(zip(COORDINATES, free[:, rows], strict=True))
+    times = PERIOD * np.arange(free.shape[1])
+    return Drawing(
+        "The elastic plant after a push along each coordinate, over the largest value",
+        curves(times[rows], "time [s]", [Panel("displacement [-]", lines)]),
+    )

@@ -1,0 +1,77 @@
+"""The elastic plant with the lengths of a motion commanded: the paper's steady winding, without any control."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import Dynamics, Robot
+from ...models.plant import Plant
+from ...models.plant.reading import Reading
+from ...ocp.tasks.paths import Motion
+
+PERIOD = 1e-3  # of the commanded lengths [s]
+FLIGHT = PERIOD * np.arange(10_001)  # [s]
+
+
+class Wound(NamedTuple):
+    """A run, or a batch of them: what the plant's states are, and the tensions (..., n, m) [N]."""
+
+    states: Reading
+    tensions: np.ndarray
+
+
+def wind_up(
+    robot: Robot,
+    body: Motion,
+    carriers: Motion | None = None,
+    wind: np.ndarray | None = None,
+    wrench: np.ndarray | None = None,
+    lengths: np.ndarray | None = None,
+) -> Wound:
+    """Command lengths every `PERIOD` and let the plant move from the first pose and velocity of a motion on.
+
+    Parameters
+    ----------
+    robot
+        With elastic cables.
+    body, carriers
+        Motion of the platform in {G}, (n, 6) each, and of its carriers, (n, c, 6) each; default: at home.
+    wind
+        Velocity of the air in {G} [m/s], (..., n - 1, 3); default: no air.
+    wrench
+        On the platform [N, N m], (..., n - 1, 6); default: none.
+    lengths
+        Unstrained [m], (n, m); default: the distances from anchor to attachment, the paper's Eq. 5.
+    """
+    plant, dynamics = Plant(robot), Dynamics(robot)
+    count = len(body.pose)
+    still = np.zeros((count, len(robot.carriers), 6))
+    bases = Motion(still + robot.carrier_home, still, still) if carriers is None else carriers
+    wound = dynamics.cable_lengths(body.pose, bases.pose) if lengths is None else lengths
+    start = plant.start(
+        body.pose[0],
+        body.velocity[0],
+        carrier_pose=bases.pose[0],
+        carrier_velocity=bases.velocity[0],
+        lengths=wound[0],
+    )
+    commands = plant.command(
+        wound[1:],
+        carrier_pose=bases.pose[:-1],
+        carrier_velocity=bases.velocity[:-1],
+        carrier_acceleration=bases.acceleration[:-1],
+        wind=wind,
+        wrench=wrench,
+    )
+    run = plant.run(start, commands, PERIOD)
+    return Wound(plant.read(run.states), run.tensions)
+
+
+def unstrained(robot: Robot, body: Motion) -> np.ndarray:
+    """Return the lengths that have the steady tensions of a motion under a resting carrier, (n, m) [m]."""
+    dynamics = Dynamics(robot)
+    T = np.linalg.solve(dynamics.wrench_matrix(body.pose), dynamics.required_wrench(*body)[..., None])[..., 0]
+    stiffness = np.array([cable.stiffness for cable in robot.cables], dtype=float)
+    return dynamics.cable_lengths(body.pose) / (1 + T / stiffness)

@@ -1,0 +1,95 @@
+"""Paper C's load, towed: the plans of all drives and of three to six robots, flown by computed torque.
+
+The plant moves the load forward in time, on cables that only pull and do not stretch. Where a drive fixes the lengths,
+the plant keeps them and the robot-ends alone move the load; otherwise the winches give the commanded tensions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...figures.curves import Panel, curves
+from ...figures.drawing import Drawing
+from ...simulation import Flight, simulate
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, stated
+from .equations import SIZES
+from .modes import CHANGES, SECTIONS
+from .plans import DRIVES, SECONDS, Drive, planned, robot
+
+ARRIVED = 0.005  # [m], allowed distance of the load from its plan
+EDGE = 1e-3  # [m], of the boxes of the robot-ends
+PAPERS = 3  # robots in section 5
+SHOWN = slice(None, None, 5)  # of the rows, in figures
+
+
+def chapter() -> Chapter:
+    """Fly every drive and every m."""
+    flights: dict[Drive, dict[int, Flight]] = {drive: {m: fly(drive, m) for m in SIZES} for drive in DRIVES}
+    claims = [_towed(drive, by_m) for drive, by_m in flights.items()]
+    claims.append(_positive(flights))
+    return Chapter(claims, {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()})
+
+
+def fly(drive: Drive, m: int) -> Flight:
+    """Fly the plan with least effort of `m` robots."""
+    return simulate(robot(SIZES[m], drive), planned(SIZES[m], drive), duration=SECONDS, tolerance=ARRIVED)
+
+
+def in_boxes(flight: Flight) -> bool:
+    """Return whether the robot-ends were in the boxes of their reach all the time."""
+    boxes = [carrier.motion_limits.reach for carrier in flight.robot.carriers]
+    low, high = (np.array([getattr(box, edge) for box in boxes]) for edge in ("min", "max"))
+    places = flight.record.motions[:, 1:, :3]
+    return bool(((places >= low - EDGE) & (places <= high + EDGE)).all())
+
+
+def _towed(drive: Drive, flights: dict[int, Flight]) -> Claim:
+    most, left = (max(float(flight.error[rows].max()) for flight in flights.values()) for rows in (slice(None), [-1]))
+    return stated(
+        f"towed-{drive}",
+        f"sections 2, {SECTIONS[drive]}",
+        f"The load is towed {CHANGES[drive]}, for m = 3, 4, 5, 6 (largest distance from its plan in a flight).",
+        0.0,
+        most,
+        holds=all(flight.passed and in_boxes(flight) for flight in flights.values()),
+        agrees=f"In each of {len(flights)} flights the load arrives, {1e3 * left:.1f} mm from its target at most, "
+        "and the robot-ends stay in their boxes.",
+        differs=f"Not every flight stays within {1e3 * ARRIVED:g} mm of its plan, with tensions inside their "
+        "limits and robot-ends in their boxes.",
+        unit="m",
+        figure=f"towed-{drive}",
+    )
+
+
+def _positive(flights: dict[Drive, dict[int, Flight]]) -> Claim:
+    ranges = {
+        drive: (by_m[PAPERS].record.tensions.min(), by_m[PAPERS].record.tensions.max())
+        for drive, by_m in flights.items()
+    }
+    low, high = min(low for low, _ in ranges.values()), max(high for _, high in ranges.values())
+    others = min(float(f.record.tensions.min()) for by_m in flights.values() for m, f in by_m.items() if m != PAPERS)
+    limit = float(flights["both"][PAPERS].robot.t_max.max())
+    return stated(
+        "towed-tensions",
+        "Eq. 11, section 5",
+        f"0 < T_i < T_fmax = {limit:g} N with three robots (range of the tensions in the flights with each drive).",
+        f"0 N to {limit:g} N",
+        "; ".join(f"{least:.1f} N to {most:.1f} N, {drive}" for drive, (least, most) in ranges.items()),
+        holds=bool(low > 0 and high < limit),
+        agrees="All cables pull all the time. With four to six robots "
+        + ("they do too." if others > 0 else "some cables pull nothing at times, for the others can carry the load."),
+        differs="Some tension is outside.",
+        figure="towed-both",
+    )
+
+
+def _drawing(drive: Drive, flight: Flight) -> Drawing:
+    tensions = flight.record.tensions[SHOWN]
+    lines = {f"cable {index + 1}": tensions[:, index] for index in range(flight.robot.m)}
+    panels = [Panel("error [mm]", {"": 1e3 * flight.error[SHOWN]}), Panel("tension [N]", lines)]
+    return Drawing(
+        f"Three robots tow 10 kg in a flight of {SECONDS:g} s, drive {drive}: distance of the load from its "
+        "plan, tensions",
+        curves(flight.times[SHOWN], "time [s]", panels),
+    )
