@@ -195,7 +195,7 @@ def _check_header(path: Path, kind: Kind, stream: FileIO, header: dict[str, Any]
         if header.get(name) != stored.get(name):
             ours, theirs = (_brief(values.get(name)) for values in (header, stored))
             raise InputError(
-                f"checkpoint must be {ACCEPTED}, got {path} of another run, whose {name} is {theirs}, not {ours}"
+                f"checkpoint must be {ACCEPTED}, got {path} of another run, with {name} {theirs}, not {ours}"
             )
 
 

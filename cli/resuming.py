@@ -55,13 +55,14 @@ def resumable(
     show: Callable[[int, int, int], None], checkpoint: Path | None, unit: str
 ) -> Callable[[int, int, int], None]:
     """Return a function that shows progress in `unit`, such as "plans", and keeps the line for Ctrl-C true."""
+    if checkpoint is not None:
+        more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
+        add_to_message(f"; {more}")  # before the first result
+    else:
+        more = "the table is lost: only --checkpoint and --resume store it"
 
     def progress(done: int, total: int, counted: int) -> None:
         show(done, total, counted)
-        if checkpoint is not None:
-            more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
-        else:
-            more = "the table is lost: only --checkpoint and --resume store it"
         add_to_message(f" after {done} of {total} {unit}; {more}")
 
     return progress

@@ -23,7 +23,7 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
         If it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown answer.
     """
     if not isinstance(command, Command):
-        raise InputError(f"controller must return a Command from step, got {shown(command)}")
+        raise InputError(f"controller must return a Command from step, got {shown(command)} at t = {time:g} s")
     count, lead = len(robot.carriers), () if flights == 1 else (flights,)
     shapes: dict[str, tuple[int, ...]] = {"tensions": (robot.m,), "answered": ()}
     shapes |= {f"carrier_{part}": (count, 6) for part in ("pose", "velocity", "acceleration")}
@@ -32,9 +32,13 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
     for name, core in shapes.items():
         values = np.asarray(getattr(command, name))
         if values.shape != (*lead, *core):
-            raise InputError(f"controller must return {name} of shape {(*lead, *core)}, got shape {values.shape}")
+            raise InputError(
+                f"controller must return {name} of shape {(*lead, *core)}, got shape {values.shape} at t = {time:g} s"
+            )
         if values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             raise InputError(f"controller must return finite {name}, got others at t = {time:g} s")
     answered = np.asarray(command.answered)
     if not ((answered >= 0) & (answered < len(ANSWERS))).all():
-        raise InputError(f"controller must return answered from 0 to {len(ANSWERS) - 1}, got {answered.max()}")
+        raise InputError(
+            f"controller must return answered from 0 to {len(ANSWERS) - 1}, got {answered.max()} at t = {time:g} s"
+        )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..control import Command, Controller, Reference, State
+from ..control.command import HOLD
 from ..models.plant import Plant
 from ..models.plant.periods import Periods
 from .checking import check_command
@@ -88,7 +89,10 @@ def _state(motions: np.ndarray, tensions: np.ndarray) -> State:
 
 
 def _stacked(commands: list[Command]) -> Command:
-    """Return the commands of all flights as one."""
+    """Return the commands of all flights as one, or the first that is no command."""
+    for command in commands:
+        if not isinstance(command, Command):
+            return command
     parts: list[Any] = [None if part[0] is None else np.stack(part) for part in zip(*commands, strict=True)]
     return Command(*parts)
 
@@ -136,9 +140,15 @@ def fly(
         reported = sensors.report(k, motions, tensions[:, 1])
         if command is None or time >= silent_until:
             command = pilot.step(time, *reported, reference)
-        if k == 0:
+        else:
+            command = command._replace(answered=np.full(np.shape(command.answered), HOLD, dtype=np.int8))
+        if k == 0 or not isinstance(command, Command):
             check_command(command, robot, flights, time)
-        row = orders.rows(k, command, lengths, states)
+        try:
+            row = orders.rows(k, command, lengths, states)
+        except (TypeError, ValueError):
+            check_command(command, robot, flights, time)
+            raise
         periods.run(states, row, history, tensions)
         if not isfinite(_square(history)):
             check_command(command, robot, flights, time)
@@ -147,7 +157,11 @@ def fly(
             going = bool(alive.any())
         if k == 0 or going:
             lived = alive if k else np.ones(flights, dtype=bool)
-            recorder.take(Period(k, lived, motions, lengths, tensions[:, 0], command))
+            try:
+                recorder.take(Period(k, lived, motions, lengths, tensions[:, 0], command))
+            except IndexError:
+                check_command(command, robot, flights, time)
+                raise
         if not going:
             break
         lasted += alive

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..control import ANSWERS
 from ..models.robot import Robot
 from .recorder import Period
 
@@ -28,6 +29,8 @@ class Record:
         self.motions[k], self.lengths[k], self.tensions[k] = period.motions[0], period.lengths[0, 0], period.tensions[0]
         self.commanded[k], self.answered[k], self.orders[k] = command.tensions, command.answered, command.carrier_pose
         if command.answered:
+            if not 0 < command.answered < len(ANSWERS):
+                raise IndexError(command.answered)
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
         if command.actuation is not None:
             self.actuation[k] = command.actuation

@@ -18,9 +18,10 @@ from ..control import Controller
 from ..errors import InputError
 from ..execution import start_workers
 from ..models.plant import Plant
-from .conditions import Conditions
+from .conditions import Conditions, Wind
 from .flights import FIGURES, fly_block, passed
 from .identity import identity
+from .winds import ConstantWind
 
 __all__ = ["Execution", "fly_many"]
 
@@ -133,7 +134,7 @@ def _header(plant: Plant, controller: Controller, conditions: Conditions, seeds:
     references = [part for reference in conditions.references for part in reference if part is not None]
     motion = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in references)).hexdigest()
     try:
-        by, wind = identity(controller), None if conditions.wind is None else identity(conditions.wind)
+        by, wind = identity(controller), None if conditions.wind is None else _named(conditions.wind)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise InputError(
             f"checkpoint must be None for a controller or a wind that cannot be stored: {str(error).splitlines()[0]}"
@@ -143,8 +144,14 @@ def _header(plant: Plant, controller: Controller, conditions: Conditions, seeds:
         "reference": f"{len(conditions.references)} periods {motion[:16]}",
         "controller": f"{type(controller).__name__} {by}",
         "wind": wind,
-        "seeds": [seeds.start, seeds.stop],
+        "seeds": f"{seeds.start} to {seeds.stop - 1}",
         **conditions.to_dict(),
         "towline": __version__,
         "numpy": np.__version__,
     }
+
+
+def _named(wind: Wind) -> str:
+    """Return what identifies a wind, readable if it is not a function of a user."""
+    known = f"{wind} " if isinstance(wind, ConstantWind) else ""
+    return known + identity(wind)

@@ -70,7 +70,7 @@ def simulate(
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     reference
-        A plan, the NetCDF file of one, a timing, a path, or a pose (6,) to stay at.
+        A plan, the NetCDF file of one, a timing, a path (also as a mapping, as in a task), or a pose (6,) to stay at.
     controller
         Default: `ComputedTorque(robot)`.
     wind
@@ -162,6 +162,8 @@ def _execution(
 ) -> Execution:
     check_workers(workers, scheduler)
     file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    if runs is None and workers != 1:
+        raise InputError(f"workers must be 1 without runs, got {workers}")
     if runs is None and (file is not None or scheduler is not None):
         name, value = ("checkpoint", file) if file is not None else ("scheduler", scheduler)
         raise InputError(f"{name} must be None without runs, got {shown(str(value))}")

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs import file_path, number, shown
+from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
 
@@ -55,6 +56,10 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
         return _of_dataset(robot, reference.trajectory)
     if hasattr(reference, "data_vars"):
         return _of_dataset(robot, reference)
+    if isinstance(reference, dict):
+        from ..ocp import Task
+
+        return _of_path(robot, validate({"path": reference}, Task, "reference").path, duration)
     if callable(getattr(reference, "motion", None)) and hasattr(reference, "bottlenecks"):
         return _of_timing(reference)
     if callable(getattr(reference, "at", None)):
@@ -72,6 +77,8 @@ def _loaded(file: str | os.PathLike[str]) -> xr.Dataset:
     import xarray as xr
 
     path = file_path("reference", file)
+    if not path.is_file():
+        raise InputError(f"reference must be {ACCEPTED}, got {shown(str(path))}: no such file")
     try:
         return xr.load_dataset(path, engine="h5netcdf")
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:

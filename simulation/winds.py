@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from ..errors import InputError
 from ..inputs import shown
@@ -21,6 +22,10 @@ class ConstantWind:
     def __init__(self, velocity: np.ndarray):
         self._velocity = velocity
 
+    @override
+    def __str__(self) -> str:
+        return f"{' '.join(f'{part:g}' for part in self._velocity)} m/s"
+
     def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
         """Return it, (K, 3) [m/s]."""
         return air.constant(times, self._velocity.tolist())
@@ -32,6 +37,10 @@ class Gusts(ConstantWind):
     def __init__(self, velocity: np.ndarray, intensity: float):
         super().__init__(velocity)
         self._intensity = intensity
+
+    @override
+    def __str__(self) -> str:
+        return f"{super().__str__()} with gusts of {self._intensity:g} m/s"
 
     def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
         """Return the wind of a seed, (K, 3) [m/s]."""

@@ -1,6 +1,7 @@
 """`towline simulate` through its entry point: what it prints and writes, exit codes, and wrong input as one line."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from towline import plan
+from towline.cli import stopping
 from towline.cli.main import app
+from towline.cli.resuming import resumable
 from towline.errors import InputError
 from towline.simulation.flights import report
 
@@ -146,6 +149,15 @@ def test_wrong_input_is_refused_in_one_line(folder, monkeypatch, robot, file, op
     assert message in str(done.exception)
     assert "\n" not in str(done.exception)
     assert {path.name for path in folder.iterdir()} == before
+
+
+def test_an_interrupt_before_the_first_result_explains_how_to_resume(monkeypatch):
+    monkeypatch.setattr(stopping, "_message", "towline: stopped")
+    show = resumable(lambda *counts: None, Path("my run"), "flights")
+    more = "to continue, repeat the command with --resume 'my run'"
+    assert stopping._message == f"towline: stopped; {more}"
+    show(2, 4, 2)
+    assert stopping._message == f"towline: stopped after 2 of 4 flights; {more}"
 
 
 def test_the_line_is_printed_and_the_exit_code_is_2(folder):

@@ -74,7 +74,7 @@ def test_a_checkpoint_of_other_flights_is_refused(tmp_path, changed, name):
     file = tmp_path / "flights"
     fly(file)
     content = file.read_bytes()
-    with pytest.raises(InputError, match=f"of another run, whose {name} is"):
+    with pytest.raises(InputError, match=f"of another run, with {name} "):
         fly(file, **changed)
     assert file.read_bytes() == content
 

@@ -151,11 +151,11 @@ def stored(tmp_path_factory):
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"robot": load("point-mass-3").name}, 'whose robot is "hoist'),
-        ({"task": {**LIFT, "steps": 50}}, 'whose task is "lift'),
-        ({"vary": {"margin": [0, 1, 2]}}, r"whose vary margin is \[0, 1\], not \[0, 1, 2\]"),
-        ({"vary": {"duration": [2]}}, r'whose order of vary is \["margin"\], not \["duration"\]'),
-        ({"keep": "plans"}, "whose keep is false, not true"),
+        ({"robot": load("point-mass-3").name}, 'with robot "hoist'),
+        ({"task": {**LIFT, "steps": 50}}, 'with task "lift'),
+        ({"vary": {"margin": [0, 1, 2]}}, r"with vary margin \[0, 1\], not \[0, 1, 2\]"),
+        ({"vary": {"duration": [2]}}, r'with order of vary \["margin"\], not \["duration"\]'),
+        ({"keep": "plans"}, "with keep false, not true"),
     ],
 )
 def test_a_checkpoint_of_another_sweep_is_refused(tmp_path, monkeypatch, stored, changed, message):

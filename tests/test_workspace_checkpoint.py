@@ -151,7 +151,7 @@ def test_a_checkpoint_of_another_robot_is_refused(tmp_path, whole):
     file.write_bytes(whole[0])
     robot = load("wang-flying")
     heavier = robot.model_copy(update={"platform": robot.platform.model_copy(update={"mass": 2.0})})
-    with pytest.raises(InputError, match="of another run, whose robot is"):
+    with pytest.raises(InputError, match="of another run, with robot "):
         sample(heavier, StaticEquilibrium(), samples=SAMPLES, seed=4, checkpoint=file, resume=True)
     assert file.read_bytes() == whole[0]
 
