@@ -142,7 +142,7 @@ def random_steps(robot: Robot, count: int, seed: int) -> Steps:
         parts = (t, command.carrier_pose, command.carrier_velocity, command.carrier_acceleration)
         finite = [np.isfinite(part).reshape(rows, -1).all(axis=1) for part in parts]
         broken["finite"] += int((~np.logical_and.reduce(finite)).sum())
-        inside = np.where(cut, t == 0, (t >= low) & (t <= high)).all(axis=1)
+        inside = ((t >= low) & (t <= high)).all(axis=1)
         broken["inside limits"] += int((~inside).sum())
         if last is not None:
             near = cut | (np.abs(t - last[0]) <= rate * (now - last[1]) + 1e-12 * high)

@@ -20,7 +20,7 @@ class Command(NamedTuple):
     Attributes
     ----------
     tensions
-        (..., m) [N], inside their limits and within the limit of their rates; 0 for a cable that counts as cut.
+        (..., m) [N], inside their limits and within the limit of their rates; little for a cable that counts as cut.
     carrier_pose, carrier_velocity, carrier_acceleration
         Where carriers are to be, (..., c, 6); those with thrusts of their own follow `actuation` instead.
     answered

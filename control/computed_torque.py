@@ -22,11 +22,13 @@ from .authority import uncontrolled
 from .command import HOLD, PLANNED, SOFT, Command
 from .controller import Controller
 from .machine import mechanics, thrusts
-from .mechanics import CARRIERS, DISTURBANCE, GAINS, KD, KI, KP, MEMORY, OBSERVER
+from .mechanics import CARRIERS, DISTURBANCE, GAINS, HEARD, IS_CUT, KD, KI, KP, MEMORY, OBSERVER, SOMETHING
 from .reference import Reference
 from .state import State
 
 __all__ = ["ComputedTorque"]
+
+NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 
 
 class ComputedTorque(Controller):
@@ -66,7 +68,8 @@ class ComputedTorque(Controller):
         Bandwidths of the loops of flying carriers [rad/s], see `thrusts`.
     patience
         How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
-        others do without it. Cables of a fixed length never do.
+        others do without it. It is commanded its least tension then, and counts again once it reports some. Cables of a
+        fixed length never count as cut.
 
     Raises
     ------
@@ -108,6 +111,8 @@ class ComputedTorque(Controller):
         self._reach = _reach(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         fastest = np.full(self.robot.m, np.inf) if rate is None else _positive("rate", rate, self.robot.m)
         self._limits = np.stack([self.robot.t_min, self.robot.t_max, fastest])
+        self._little = np.maximum(self.robot.t_min, SOMETHING * self.robot.t_max)
+        self._boxes = _boxes(self.robot) if len(self._reach) else None
         bodies = bodies_of(self.robot)
         bodies[:, layout.MOTION] = layout.FREE  # where they are is measured, whatever moves them
         none, platform = np.zeros(self.robot.m), self.robot.platform
@@ -139,7 +144,7 @@ class ComputedTorque(Controller):
     @property
     def cut(self) -> np.ndarray:
         """Return which cables count as cut, (n, m)."""
-        return self._silent >= self._patience
+        return self._heard[:, IS_CUT] > 0
 
     @property
     def problems(self) -> InPlace:
@@ -158,8 +163,8 @@ class ComputedTorque(Controller):
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
         self._problems = InPlace(rows, 6, m, self.robot.length)
-        self._silent = np.zeros((rows, m))
-        given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._silent)
+        self._heard = np.zeros((rows, HEARD, m))
+        given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._heard)
         results = (self._carriers, self._problems.A, self._problems.w, self._problems.bounds)
         self._arrays = (*given, self._integrates, self._memory, self._reactions, *results)
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
@@ -200,10 +205,14 @@ class ComputedTorque(Controller):
             self._integrates[:] = True
         self._paused = answered is not self._as_planned
         tensions = problems.tensions.copy()
+        if np.count_nonzero(self._heard[:, IS_CUT]):
+            tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
         self._time, self._pulls[:, 1] = time, tensions
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
         if len(self._carriers[0]):
             own = self._carriers.copy()
+            if self._boxes is not None:
+                stay_inside(own, *self._boxes)
             own = own[0] if alone else own
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
         actuation = None
@@ -249,7 +258,8 @@ class ComputedTorque(Controller):
     def _answer_others(self) -> np.ndarray:
         """Give rows without tensions a command, and return how each row was answered."""
         problems = self._problems
-        answered = np.where(problems.code == OPTIMAL, PLANNED, SOFT).astype(np.int8)
+        nearly = problems.shortfall <= NEGLIGIBLE * self.robot.force_scale  # false for nan
+        answered = np.where((problems.code == OPTIMAL) | nearly, PLANNED, SOFT).astype(np.int8)
         for row in np.flatnonzero(~np.isfinite(problems.tensions).all(axis=1)):
             answered[row] = HOLD
             last, reference = self._pulls[row, 1], problems.t_ref[row]
@@ -270,6 +280,24 @@ def _reach(robot: Robot, reach: Any) -> np.ndarray:
         if carrier.efforts:
             row[3:] = 0.0  # its attitude follows from its thrust
     return result if result.any() else np.zeros((0, 6))
+
+
+def _boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None: any."""
+    boxes = [carrier.motion_limits.reach for carrier in robot.carriers]
+    if not any(boxes):
+        return None
+    low = np.array([(-np.inf,) * 3 if box is None else box.min for box in boxes])
+    return low, np.array([(np.inf,) * 3 if box is None else box.max for box in boxes])
+
+
+def stay_inside(carriers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Let the carriers' motions, (N, c, 3, 6), end at the sides of their boxes, (c, 3) [m]."""
+    place = carriers[:, :, 0, :3]
+    outside = (place < low) | (place > high)
+    if outside.any():
+        np.clip(place, low, high, out=place)
+        carriers[:, :, 1, :3][outside] = carriers[:, :, 2, :3][outside] = 0.0
 
 
 def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray]:

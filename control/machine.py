@@ -17,7 +17,7 @@ _MECHANICS = (*_SHARED, _HERE / "reaction.py", _HERE / "mechanics.py")
 _ROBOT = "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1]))"
 _OF_ROWS = (
     f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64[:, :, ::1], "
-    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], boolean[::1], float64[:, :, ::1], "
+    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], boolean[::1], float64[:, :, ::1], "
     "float64[:, :, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
 _OF_THRUSTS = (

@@ -37,11 +37,16 @@ from .reaction import CORRECTS, add_offsets, react
 # reaction and its largest acceleration.
 KP, KD, KI, OBSERVER, CARRIERS, GAINS = 0, 1, 2, 3, 4, 5
 COM, TOTAL_MASS = SETTINGS, SETTINGS + 3
-# Rows of `limits`, and tensions that a cable reports after it is cut and may be commanded before, of its upper limit.
+# Rows of `limits`, and the share of its upper limit that a cable must be commanded to count as cut.
 LOWEST, HIGHEST, RATE_MAX = 0, 1, 2
-NOTHING, SOMETHING = 1e-4, 1e-3
+SOMETHING = 1e-3
 # No sensor reports more [m, rad, m/s, rad/s, N]; beyond, squares would fill the memory with infinities.
 LARGEST = 1e9
+# Rows of `heard`: tension reported and tension commanded, smoothed, and 1 for a cable that counts as cut. It does once
+# it reports less than `LITTLE` of what it is commanded, which takes the patience if it reports nothing. It counts again
+# once it reports `ENOUGH` of the little that it is commanded then.
+REPORTED, COMMANDED, IS_CUT, HEARD = 0, 1, 2, 3
+LITTLE, ENOUGH = 0.1, 0.5
 # Rows of `memory`: integral of the error, estimated disturbance, and momentum less what the estimate explains.
 INTEGRAL, DISTURBANCE, EXPLAINED, MEMORY = 0, 1, 2, 3
 
@@ -57,7 +62,7 @@ def write_rows(
     reference,
     t_ref,
     pulls,
-    silent,
+    heard,
     integrates,
     memory,
     reactions,
@@ -83,7 +88,7 @@ def write_rows(
     reach
         (c, 6), how far carriers may go off their reference to help the tensions [m, rad]; (0, 6): they do not.
     patience
-        For how long a cable may report no tension where one is commanded until it counts as cut [s].
+        For how long a cable may report no tension where one is commanded until it counts as cut [s]; inf: for ever.
     dt
         Time since the last step [s]; 0 in the first one, which starts the memory and has no bounds by rates.
     measured
@@ -94,8 +99,8 @@ def write_rows(
         (N, m), tensions to stay near [N].
     pulls
         (N, 2, m), tensions since the last step, by sensors or else as commanded, and the last command [N].
-    silent
-        (N, m), for how long each cable has reported no tension where one was commanded [s].
+    heard
+        (N, 3, m), rows REPORTED and COMMANDED [N], and IS_CUT.
     integrates
         (N,), whether the integral goes on.
     memory
@@ -113,8 +118,10 @@ def write_rows(
     command = np.zeros(COMMANDS + m + CARRIER * count)
     on_bodies, on_cables = np.zeros((count, BODY_WORK)), np.zeros((m, CABLE_WORK))
     columns, gram = np.zeros((6 * reach.shape[0], 6)), np.zeros((6, 7))
+    spare = np.zeros_like(on_bodies), np.zeros_like(on_cables), np.zeros((6, m)), np.zeros(12), np.zeros(6)
+    at_reference = np.zeros_like(state), command, *spare
     for row in range(measured.shape[0]):
-        write_bounds(limits, patience, dt, pulls[row], silent[row], bounds[:, row])
+        write_bounds(limits, patience, dt, pulls[row], heard[row], bounds[:, row])
         usable = is_usable(measured[row], reference[row], pulls[row])
         if usable:
             for b in range(count):
@@ -143,33 +150,78 @@ def write_rows(
         for k in range(6):
             w[row, k] = mask[k] * (w[row, k] - memory[row, DISTURBANCE, k])
         if reach.shape[0] > 0:
-            for k in range(6):
-                missing[k] = -mask[k] * memory[row, DISTURBANCE, k]
-                if gains[CARRIERS, CORRECTS] == 1.0:
+            if gains[CARRIERS, CORRECTS] == 1.0:
+                for k in range(6):
                     missing[k] = w[row, k]
                     for i in range(m):
                         missing[k] -= A[row, k, i] * t_ref[row, i]
+            else:
+                planned_disturbance(robot, reference[row], carriers[row], t_ref[row], at_reference, missing)
+                for k in range(6):
+                    missing[k] = mask[k] * (missing[k] - memory[row, DISTURBANCE, k])
             react(
                 settings, gains[CARRIERS], dt, reach, cables, on_cables, A[row], missing, t_ref[row], reactions[row],
                 columns, gram, carriers[row],
             )  # fmt: skip
 
 
-def write_bounds(limits, patience, dt, pulls, silent, bounds):
-    """Write the bounds of a row's tensions: limits and rates, and zero for a cable that is cut."""
+def planned_disturbance(robot, reference, carriers, t_ref, work, missing):
+    """Write the wrench that the planned motion needs less the one of its tensions, (6,), or zeros without tensions.
+
+    It is what the plan knows of wind, and what the tensions of a plan that has none in their limits miss.
+    """
+    bodies, cables, settings, _ = robot
+    state, command, on_bodies, on_cables, A, motion, momentum = work
+    m, planned = cables.shape[0], False
+    for i in range(m):
+        planned |= t_ref[i] != 0.0
+    for k in range(6):
+        missing[k] = 0.0
+    if not planned:
+        return
+    for b in range(bodies.shape[0]):
+        for k in range(6):
+            motion[k] = reference[k] if b == 0 else carriers[b - 1, 0, k]
+            motion[6 + k] = reference[6 + k] if b == 0 else carriers[b - 1, 1, k]
+        put_body(state, BODY * b, motion)
+    place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
+    move_to_com(settings, state, on_bodies)
+    run_cables(cables, state, on_bodies, on_cables, BODY * bodies.shape[0])
+    write_wrench_matrix(robot[3], on_cables, A)
+    write_wrench(bodies, settings, state, reference[12:], reference, on_bodies, missing, momentum)
+    for k in range(6):
+        for i in range(m):
+            missing[k] -= A[k, i] * t_ref[i]
+
+
+def write_bounds(limits, patience, dt, pulls, heard, bounds):
+    """Write the bounds of a row's tensions: limits and rates, and zero for a cable that counts as cut."""
     for i in range(limits.shape[1]):
         step, last, highest = limits[RATE_MAX, i] * dt, pulls[1, i], limits[HIGHEST, i]
-        if pulls[0, i] <= NOTHING * highest and last >= SOMETHING * highest:
-            silent[i] += min(dt, patience / 4.0)  # a step after a long pause is no more than one report
-        elif silent[i] < patience:
-            silent[i] = 0.0
-        if silent[i] >= patience:
+        if abs(pulls[0, i]) <= LARGEST:
+            hear(dt / patience, pulls[0, i], last, max(limits[LOWEST, i], SOMETHING * highest), highest, heard, i)
+        if heard[IS_CUT, i] == 1.0:
             bounds[0, i] = bounds[1, i] = 0.0
         elif dt > 0.0:
             bounds[0, i] = min(max(limits[LOWEST, i], last - step), highest)
             bounds[1, i] = max(min(highest, last + step), limits[LOWEST, i])
         else:
             bounds[0, i], bounds[1, i] = limits[LOWEST, i], highest
+
+
+def hear(elapsed, reported, commanded, little, highest, heard, i):
+    """Update what is heard of cable `i`, with the time since the last step in units of the patience."""
+    share = min(-math.log(LITTLE) * elapsed, 0.25)  # a step after a long pause is no more than one report
+    if elapsed > 0.0 and heard[COMMANDED, i] == 0.0:
+        heard[REPORTED, i] = heard[COMMANDED, i] = commanded  # it is taken to pull when it is commanded first
+    heard[REPORTED, i] += share * (reported - heard[REPORTED, i])
+    if heard[IS_CUT, i] == 1.0:
+        if heard[REPORTED, i] >= ENOUGH * little:
+            heard[IS_CUT, i], heard[COMMANDED, i] = 0.0, heard[REPORTED, i]
+    else:
+        heard[COMMANDED, i] += share * (commanded - heard[COMMANDED, i])
+        if heard[COMMANDED, i] >= SOMETHING * highest and heard[REPORTED, i] <= LITTLE * heard[COMMANDED, i]:
+            heard[IS_CUT, i], heard[REPORTED, i] = 1.0, 0.0
 
 
 def is_usable(measured, reference, pulls):

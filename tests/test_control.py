@@ -14,6 +14,7 @@ from towline.models.plant import layout
 from towline.models.plant.bodies import place_bodies
 from towline.models.plant.lines import run_cables
 from towline.simulation import simulate
+from towline.solvers import TensionProblem, solve
 
 ROBOTS = ["cogiro", "wang-flying", "caroca-pulleys", "planar-4", "wang-ctmrts-6", "multi-quadrotor-4", "flycrane"]
 
@@ -139,6 +140,61 @@ def test_the_observer_finds_a_force_and_a_moment_that_nobody_reports():
     expected = np.linalg.norm(push[:3]) / (robot.platform.mass * 10.0**2)
     assert without.error[-1] == pytest.approx(expected, rel=0.05)
     assert flight.error[-1] < 1e-3 * without.error[-1] + 1e-6
+
+
+def test_a_cable_that_was_slack_for_long_counts_again_once_it_pulls():
+    """Its sensor reports nothing for 0.2 s, and then what it is commanded."""
+    robot = load("caroca")
+    state, reference = at_home(robot)
+    controller, last = ComputedTorque(robot), distribute(robot, robot.home).tensions
+    cut = []
+    for k in range(600):
+        report = last.copy()
+        report[0] = 0.0 if 100 <= k < 300 else report[0]
+        last = controller.step(1e-3 * k, state._replace(tensions=report), reference).tensions
+        assert (last >= robot.t_min).all()
+        cut.append(controller.cut[0])
+    cut = np.array(cut)
+    assert not cut[:, 1:].any()
+    assert not cut[:140, 0].any()
+    assert cut[160:300, 0].all()
+    assert not cut[350:, 0].any()
+
+
+def test_carriers_react_to_what_the_plan_does_not_know_alone():
+    """A platform in the wind of its plan, whose tensions carry the drag, under a base that might move and need not."""
+    robot, wind = load("wang-flying"), np.array([4.0, -2.0, 0.0])
+    dynamics, still = Dynamics(robot), np.zeros((2, 1, 6))
+    rest = (robot.home, *np.zeros((2, 6)), robot.carrier_home, *still)
+    A, w = dynamics.wrench_matrix(robot.home, robot.carrier_home), dynamics.required_wrench(*rest, wind=wind)
+    planned = solve(TensionProblem(A, w, robot.t_min, robot.t_max)).tensions
+
+    class Planned(ComputedTorque):
+        """Fly with the tensions of the plan, which knows the wind."""
+
+        batches = False
+
+        def step(self, time, state, reference):
+            return super().step(time, state, reference._replace(tensions=planned))
+
+    moved = []
+    for controller in (Planned(robot, reach=(0.5, 0.0)), ComputedTorque(robot, reach=(0.5, 0.0))):
+        flight = simulate(robot, robot.home, controller, wind=wind, duration=3.0)
+        moved.append(np.linalg.norm(flight.record.motions[-1, 1, :3] - robot.carrier_home[0, :3]))
+    assert moved[0] < 0.01 * moved[1]
+    assert moved[1] > 0.05
+
+
+def test_robot_ends_stay_inside_their_boxes():
+    """A side force that the reaction answers with more than the boxes permit."""
+    robot = load("wang-ctmrts")
+    push = np.array([0.3 * robot.platform.mass * 9.81, 0, 0, 0, 0, 0])
+    flight = simulate(robot, robot.home, ComputedTorque(robot, reach=(2.0, 0.0)), duration=4.0, disturbance=push)
+    places = flight.trajectory["carrier_command"].values[..., :3]
+    boxes = [carrier.motion_limits.reach for carrier in robot.carriers]
+    for index, box in enumerate(boxes):
+        assert (places[:, index] >= box.min).all()
+        assert (places[:, index] <= box.max).all()
 
 
 def test_an_integral_brings_a_platform_back_that_a_force_has_moved():

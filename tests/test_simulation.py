@@ -122,23 +122,27 @@ def test_the_drag_of_a_steady_wind_is_what_the_observer_reports():
     assert flight.passed
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.5])
 @pytest.mark.parametrize(("name", "survives"), [("caroca", True), ("ipanema-1", False)])
-def test_a_cut_cable_is_survived_where_the_others_can_do_without_it(name, survives):
-    """A linear program decides beforehand."""
+def test_a_cut_cable_is_survived_where_the_others_can_do_without_it(name, survives, noise):
+    """A linear program decides beforehand. Sensors of tensions may have noise [N]."""
     robot = load(name)
     rest = np.zeros((2, 6))
     A, w = Dynamics(robot).wrench_matrix(robot.home), Dynamics(robot).required_wrench(robot.home, *rest)
     bounds = list(zip(robot.t_min, robot.t_max, strict=True))
     bounds[0] = (0, 0)
     possible = linprog(np.zeros(robot.m), A_eq=A, b_eq=w, bounds=bounds).success
-    flight = simulate(robot, robot.home, faults=["cut 1 at 0.3"], duration=1.3, tolerance=0.02)
+    flight = simulate(
+        robot, robot.home, faults=["cut 1 at 0.3"], duration=1.3, tolerance=0.02, noise={"tension": noise}
+    )
     after = flight.record.answered[900:]
     assert possible == survives
     if survives:
         assert flight.passed, flight.report()
-        assert flight.error[-1] < 1e-3
+        assert flight.error[-1] < 1e-3 + 1e-2 * noise
         assert (after == 0).all()
-        assert (flight.record.commanded[400:, 0] == 0).all()
+        little = np.maximum(robot.t_min, 1e-3 * robot.t_max)[0]
+        assert (flight.record.commanded[400:, 0] == little).all()
     else:
         assert not flight.passed
         assert (after > 0).any()
