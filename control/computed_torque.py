@@ -283,7 +283,7 @@ def _reach(robot: Robot, reach: Any) -> np.ndarray:
 
 
 def _boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None: any."""
+    """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None if any."""
     boxes = [carrier.motion_limits.reach for carrier in robot.carriers]
     if not any(boxes):
         return None

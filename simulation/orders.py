@@ -85,8 +85,10 @@ def _air(wind: Wind, times: np.ndarray, seed: int) -> np.ndarray:
     except (TypeError, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"wind must be a function of times and a seed that returns (n, 3) [m/s]: {reason}") from None
-    if velocity.shape != (len(times), 3) or not (np.abs(velocity) <= FASTEST).all():
-        raise InputError(
-            f"wind must return ({len(times)}, 3) numbers up to {FASTEST:g} m/s, got shape {velocity.shape}"
-        )
+    accepted = f"wind must return ({len(times)}, 3) finite numbers up to {FASTEST:g} m/s"
+    if velocity.shape != (len(times), 3):
+        raise InputError(f"{accepted}, got shape {velocity.shape}")
+    if not (np.abs(velocity) <= FASTEST).all():
+        worst = velocity.ravel()[int(np.argmin(np.abs(velocity) <= FASTEST))]
+        raise InputError(f"{accepted}, got {worst:g}")
     return velocity

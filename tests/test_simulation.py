@@ -8,9 +8,11 @@ from towline import load, plan
 from towline.control import Command, ComputedTorque, Controller, State
 from towline.errors import InputError
 from towline.models import Dynamics
+from towline.models.plant import Plant
+from towline.models.plant.periods import Periods
 from towline.ocp import Task
 from towline.simulation import simulate
-from towline.simulation.machine import write_lengths
+from towline.simulation.machine import sense_rows, write_lengths
 from towline.simulation.trajectory import read_trajectory
 
 
@@ -197,6 +199,25 @@ def test_winding_makes_the_tension_that_is_ordered_at_the_end_of_the_period():
     rate = lengths[:, 1] - (rows[:, 5:] - own) / period  # of the elongation
     reached = EA * (lengths[:, 0] - own + period * rate) / own + C * rate
     np.testing.assert_allclose(reached, order, rtol=1e-8)
+
+
+def test_perfect_sensors_report_the_motion_that_a_state_was_made_of():
+    """Through quaternions and rates in the bodies' axes, and a CoM away from the platform's frame; lengths by CasADi."""
+    robot, rng, rows = load("wang-flying-quadrotor"), np.random.default_rng(8), 20
+    robot = robot.model_copy(update={"platform": robot.platform.model_copy(update={"com": (0.1, -0.2, 0.05)})})
+    plant, dynamics = Plant(robot), Dynamics(robot)
+    pose, velocity = rng.normal(size=(2, rows, 6))
+    carriers, moving = rng.normal(size=(2, rows, 1, 6)) + [[[[0, 0, 3, 0, 0, 0]]], [[[0] * 6]]]
+    states = plant.start(pose, velocity, carriers, moving)
+    motions, lengths = np.zeros((rows, 2, 12)), np.zeros((rows, 2, robot.m))
+    sense_rows()(*Periods(plant, 1e-3, 1).geometry, states, motions, lengths)
+    turn = np.mod(motions[:, 0, 3:6] - pose[:, 3:] + np.pi, 2 * np.pi) - np.pi
+    near = np.abs(pose[:, 4]) < 1.5  # beyond a right angle of pitch other angles are the same attitude
+    np.testing.assert_allclose(motions[near, 0, :3], pose[near, :3], atol=1e-12)
+    np.testing.assert_allclose(turn[near], 0, atol=1e-9)
+    np.testing.assert_allclose(motions[near, 0, 6:], velocity[near], atol=1e-9)
+    np.testing.assert_allclose(motions[:, 1, :3], carriers[:, 0, :3], atol=1e-12)
+    np.testing.assert_allclose(lengths[:, 0], dynamics.cable_lengths(pose, carriers), atol=1e-12)
 
 
 def test_sensors_report_late_and_with_the_noise_that_is_stated():
