@@ -30,6 +30,7 @@ types: .venv/dev.stamp
 # The machine code of solvers, plant and controllers, once; otherwise each of the tests' processes compiles it or computes without.
 kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
+	$(BIN)/python -c "from towline.solvers.stages import machine; machine.solve_stages()"
 	$(BIN)/python -c "from towline.models.plant import machine; machine.run_rows()"
 	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts()"
 	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from ..models.kernel import Kernel, compile_function
+from ..kernel import Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined
 

@@ -19,7 +19,7 @@ import numpy as np
 from .. import processors
 from ..errors import InputError, SolverError
 from ..inputs import shown
-from .kernel import Kernel, compile_kernel
+from ..kernel import Kernel, compile_kernel
 from .tape import dense, translate
 
 ROWS_WORTH_A_KERNEL = 200_000

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from ..control.machine import mechanics
-from ..models.kernel import GIVEN, Kernel, compile_function
+from ..kernel import GIVEN, Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined, run_rows
 

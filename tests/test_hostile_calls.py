@@ -23,6 +23,7 @@ from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan,
 from towline.control import ComputedTorque, Reference, State
 from towline.inputs import printable
 from towline.models import RelativeDynamics
+from towline.solvers import Horizon, StageProblem, solve_horizon
 from towline.workspace import Places, Region, StaticEquilibrium, sample
 
 PACKAGES = (
@@ -51,6 +52,9 @@ NOT_CALLED = {
     "StandardForm",
     "BatchSolution",
     "Certificate",
+    "HorizonSolution",
+    "Multipliers",
+    "Residuals",
     "solvers.Margin",
     "Plan",
     "Flight",
@@ -115,6 +119,11 @@ def robot() -> towline.Robot:
 @cache
 def problem() -> TensionProblem:
     return TensionProblem(np.eye(6, 7), np.ones(6), 0.0, 10.0)
+
+
+@cache
+def stages() -> StageProblem:
+    return StageProblem(np.eye(6)[None], np.ones((1, 6, 2)), np.ones(6), np.tile(np.eye(6), (2, 1, 1)), np.eye(2)[None])
 
 
 @cache
@@ -259,6 +268,25 @@ VALID: dict[str, Callable[[], Any]] = {
     "vary": lambda: {"margin": [0, 1]},
     "sweep.keep": lambda: None,
     "Sweep.plan.index": lambda: 0,
+    "StageProblem.A": lambda: np.eye(6)[None],
+    "StageProblem.start": lambda: np.ones(6),
+    "StageProblem.n": lambda: 6,
+    "B": lambda: np.ones((1, 6, 2)),
+    "Q": lambda: np.tile(np.eye(6), (2, 1, 1)),
+    "R": lambda: np.eye(2)[None],
+    **{name: lambda: None for name in ("c", "S", "q", "r", "C", "D", "d")},
+    "u_min": lambda: -1.0,
+    "u_max": lambda: 1.0,
+    "penalty": lambda: 1.0,
+    "square": lambda: 0.0,
+    "states": lambda: np.ones((2, 6)),
+    "controls": lambda: np.ones((1, 2)),
+    "solve_horizon.problem": stages,
+    "iterations": lambda: 50,
+    "N": lambda: 1,
+    "Horizon.rows": lambda: 0,
+    "shifted": lambda: False,
+    "warm": lambda: False,
     "result": lambda: sample(robot(), StaticEquilibrium(), samples=20),
 }
 
@@ -304,6 +332,9 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "TensionProblem": problem,
     "TensionSolution": lambda: solve(problem()),
     "Certificate": lambda: infeasible().certificate,
+    "StageProblem": stages,
+    "HorizonSolution": lambda: solve_horizon(stages()),
+    "Horizon": lambda: Horizon(1, 6, 2),
     "BatchSolution": lambda: solve_batch(np.eye(6, 7)[None], np.ones((2, 6)), 0.0, 10.0),
     "Places": places,
     "Robot": robot,

@@ -19,7 +19,9 @@ FLOORS = [
     {"viewer"},
     {"cli"},
 ]
-COMMON = {"checkpoint", "errors", "execution", "inputs", "netcdf", "processors", "text", "tolerances", "writing"}
+COMMON = {
+    *("checkpoint", "errors", "execution", "inputs", "kernel", "netcdf", "processors", "text", "tolerances", "writing")
+}
 CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 

@@ -1,17 +1,17 @@
 """Compile the kernels of the plant: their modules, joined to one source, become one function of machine code.
 
 It is the same for all robots, which are data to it, so it is compiled once on a machine and then loaded from the user's
-cache, see `models.kernel`. Its parts can be joined with other modules, as a controller that runs beside the plant.
+cache, see `kernel`. Its parts can be joined with other modules, as a controller that runs beside the plant.
 """
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from ..kernel import GIVEN, RESULT, Kernel, compile_function
+from ... import kernel
+from ...kernel import GIVEN, RESULT, Kernel, compile_function
 
 __all__ = ["MODULES", "joined", "run_rows"]
 
@@ -44,20 +44,7 @@ def joined(modules: Iterable[Path], entry: str) -> str:
     entry
         The function that calls the others, which alone may allocate memory.
     """
-    lines: list[str] = []
-    for module in modules:
-        for node in ast.parse(module.read_text()).body:
-            if isinstance(node, ast.FunctionDef):
-                node.body = [part for part in node.body if not _is_text(part)]
-                mark = "@inlined" if node.name in INLINED else "@part"
-                lines += [ast.unparse(node)] if node.name == entry else [mark, ast.unparse(node)]
-            elif isinstance(node, ast.Assign):
-                lines.append(ast.unparse(node))
-    return "\n".join(lines) + "\n"
-
-
-def _is_text(node: ast.stmt) -> bool:
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    return kernel.joined(modules, entry, INLINED)
 
 
 @cache

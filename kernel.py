@@ -8,19 +8,20 @@ written whole or not at all, and a seal, the hash of them, reveals later damage:
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import math
 import os
 import platform
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import __version__
-from ..writing import whole_file
+from . import __version__
+from .writing import whole_file
 
 Kernel = Callable[..., None]  # (start, stop, *inputs (N, r, c), *outputs (N, r, c)); it releases the GIL
 
@@ -46,7 +47,7 @@ def compile_kernel(source: str, n_in: int, n_out: int) -> Kernel:
     return compile_function(source, "kernel", _signature(n_in, n_out))
 
 
-def compile_function(source: str, name: str, signature: str) -> Kernel:
+def compile_function(source: str, name: str, signature: str, known: Mapping[str, Any] | None = None) -> Kernel:
     """Compile the function `name` of a source, in which decorators mark those that it calls, or take it from the disk.
 
     Parameters
@@ -58,11 +59,42 @@ def compile_function(source: str, name: str, signature: str) -> Kernel:
         The function that is returned.
     signature
         Its types in Numba's notation.
+    known
+        More names that the source uses, as those of instructions; what they mean must follow from the source.
     """
     with _compiling:
         if source not in _compiled:
-            _compiled[source] = _from_disk(source, name, signature) or _compile(source, name, signature)
+            known = known or {}
+            _compiled[source] = _from_disk(source, name, signature, known) or _compile(source, name, signature, known)
         return _compiled[source]
+
+
+def joined(modules: Iterable[Path], entry: str, inlined: Collection[str] = ()) -> str:
+    """Return the functions and constants of modules that import only `math`, NumPy and each other.
+
+    Parameters
+    ----------
+    modules
+        Files, each after those that it imports.
+    entry
+        The function that calls the others, which alone may allocate memory.
+    inlined
+        Functions that are copied to where they are called.
+    """
+    lines: list[str] = []
+    for module in modules:
+        for node in ast.parse(module.read_text()).body:
+            if isinstance(node, ast.FunctionDef):
+                node.body = [part for part in node.body if not _is_text(part)]
+                mark = "@inlined" if node.name in inlined else "@part"
+                lines += [ast.unparse(node)] if node.name == entry else [mark, ast.unparse(node)]
+            elif isinstance(node, ast.Assign):
+                lines.append(ast.unparse(node))
+    return "\n".join(lines) + "\n"
+
+
+def _is_text(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def cache_folder() -> Path:
@@ -77,7 +109,7 @@ def _signature(n_in: int, n_out: int) -> str:
     return f"void(intp, intp, {', '.join(arrays)})"
 
 
-def _compile(source: str, name: str, signature: str, file: Path | None = None) -> Kernel:
+def _compile(source: str, name: str, signature: str, known: Mapping[str, Any], file: Path | None = None) -> Kernel:
     """Compile the function, by Numba's cache beside `file` if one is given."""
     import numba
 
@@ -85,13 +117,13 @@ def _compile(source: str, name: str, signature: str, file: Path | None = None) -
     # Parts are called by compiled code alone, and allocate nothing, so that they count no references to arrays.
     part = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False, **options}
     # When Numba loads a function it imports the module named in it.
-    space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np}
+    space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np, **known}
     space |= {"part": numba.njit(**part), "inlined": numba.njit(forceinline=True, **part)}
     exec(compile(source, str(file or "<kernel>"), "exec"), space)
     return numba.njit(signature, cache=file is not None, **options)(space[name])
 
 
-def _from_disk(source: str, name: str, signature: str) -> Kernel | None:
+def _from_disk(source: str, name: str, signature: str, known: Mapping[str, Any]) -> Kernel | None:
     """Compile with the cache on the disk; None where there is none or it is broken beyond repair."""
     try:
         folder = cache_folder() / _key(source)
@@ -102,7 +134,7 @@ def _from_disk(source: str, name: str, signature: str) -> Kernel | None:
             with whole_file(file) as place:
                 place.write_text(source)
                 os.utime(place, (_LONG_AGO, _LONG_AGO))
-        kernel = _compile(source, name, signature, file)
+        kernel = _compile(source, name, signature, known, file)
         if not seal.exists():
             with whole_file(seal) as place:
                 place.write_text(_hash_of(folder))
