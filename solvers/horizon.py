@@ -189,7 +189,8 @@ class Horizon:
         for name, value, least in (("N", N, 1), ("n", n, 1), ("m", m, 1), ("rows", rows, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or not least <= value <= 1000:
                 raise InputError(f"{name} must be a whole number from {least} to 1000, got {shown(value)}")
-        self._places, size = places(int(N), int(n), int(m), int(rows))
+        self._sizes = int(N), int(n), int(m), int(rows)
+        self._places, size = places(*self._sizes)
         self._work = np.zeros(size)
         w, wp, mp, pp = n + m, padded(n + m), padded(m), padded(rows)
 
@@ -222,6 +223,11 @@ class Horizon:
         self._settings = np.zeros(layout.SETTINGS)
         self.tolerance, self.iterations_max = 1e-8, 50
         self._kernel = machine.solve_stages()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the one array, whose parts the others are."""
+        state = self._work.copy(), self._settings.copy(), self.tolerance, self.iterations_max
+        return _restored, (self._sizes, *state)
 
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
         """Solve the problem in the arrays, and return whether the solution converged.
@@ -261,3 +267,10 @@ class Horizon:
     def residuals(self) -> Residuals:
         """Return the residuals of the last solution."""
         return Residuals(*self._settings[layout.STATIONARITY : layout.SOFT + 1].tolist())
+
+
+def _restored(sizes: tuple[int, ...], work: Array, settings: Array, tolerance: float, iterations: int) -> Horizon:
+    horizon = Horizon(*sizes)
+    horizon._work[:], horizon._settings[:] = work, settings
+    horizon.tolerance, horizon.iterations_max = tolerance, iterations
+    return horizon
