@@ -26,7 +26,7 @@ from .mechanics import CARRIERS, DISTURBANCE, GAINS, HEARD, IS_CUT, KD, KI, KP, 
 from .reference import Reference
 from .state import State
 
-__all__ = ["ComputedTorque"]
+__all__ = ["ComputedTorque", "positive", "reach_of"]
 
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 
@@ -96,10 +96,10 @@ class ComputedTorque(Controller):
     ):
         self.robot = as_robot(robot)
         few = self.robot.m < len(self.robot.platform.dof)
-        w = _positive("bandwidth", (1.5 if few else 10.0) if bandwidth is None else bandwidth, 6)
-        z = _positive("damping", damping, 6)
+        w = positive("bandwidth", (1.5 if few else 10.0) if bandwidth is None else bandwidth, 6)
+        z = positive("damping", damping, 6)
         self._gains = np.zeros((GAINS, 6))
-        self._gains[KP], self._gains[KD], self._gains[KI] = w**2, 2 * z * w, _positive("integral", integral, 6)
+        self._gains[KP], self._gains[KD], self._gains[KI] = w**2, 2 * z * w, positive("integral", integral, 6)
         self._gains[OBSERVER] = number("observer", observer, 0.0, 1e4)
         self._gains[CARRIERS, :3] = (
             number("carrier_bandwidth", carrier_bandwidth, 0.0, 1e3),
@@ -108,8 +108,9 @@ class ComputedTorque(Controller):
         )
         patience = number("patience", patience, 1e-6, 1e6)
         self._patience = patience if self.robot.fixed_lengths is None else np.inf
-        self._reach = _reach(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
-        fastest = np.full(self.robot.m, np.inf) if rate is None else _positive("rate", rate, self.robot.m)
+        far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
+        self._reach = far if far.any() else np.zeros((0, 6))
+        fastest = np.full(self.robot.m, np.inf) if rate is None else positive("rate", rate, self.robot.m)
         self._limits = np.stack([self.robot.t_min, self.robot.t_max, fastest])
         self._little = np.maximum(self.robot.t_min, SOMETHING * self.robot.t_max)
         self._boxes = _boxes(self.robot) if len(self._reach) else None
@@ -122,6 +123,7 @@ class ComputedTorque(Controller):
         self._inverses, self._actuators = _inverses(self.robot)
         self._loops = np.array([number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3)])
         self._flies = bool(self._inverses.any())
+        self._moves_carriers = self._flies or len(self._reach) > 0
         if self._flies:
             thrusts()
         self.reset()
@@ -159,7 +161,7 @@ class ComputedTorque(Controller):
         self._pulls, self._integrates = np.zeros((rows, 2, m)), np.ones(rows, dtype=bool)
         self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
         # Carriers have a command of their own where they react or fly.
-        self._carriers = np.zeros((rows, count if self._flies or len(self._reach) else 0, 3, 6))
+        self._carriers = np.zeros((rows, count if self._moves_carriers else 0, 3, 6))
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
         self._problems = InPlace(rows, 6, m, self.robot.length)
@@ -180,14 +182,26 @@ class ComputedTorque(Controller):
         InputError
             If the time is not later than that of the step before, or an array does not have the shape of the robot's.
         """
+        self._measure(time, state, reference)
+        problems, answered, proof = self._problems, self._as_planned, self._nowhere
+        if not problems.solve():
+            answered, proof = self._answer_others(), (problems.direction.copy(), problems.shortfall.copy())
+            self._integrates[:] = answered == PLANNED
+        elif self._paused:
+            self._integrates[:] = True
+        self._paused = answered is not self._as_planned
+        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
+        return self._command(carriers, problems.tensions.copy(), answered, proof, np.ndim(state.pose) == 1)
+
+    def _measure(self, time: float, state: State, reference: Reference) -> float:
+        """Update the memory, and write the problem of this step; return the time since the last one [s], or 0."""
         if not isinstance(state, State):
             raise InputError(f"state must be a State, got {shown(state)}")
         if not isinstance(reference, Reference):
             raise InputError(f"reference must be a Reference, got {shown(reference)}")
         if not isinstance(time, float | int) or not isfinite(time):
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
-        alone = np.ndim(state.pose) == 1
-        rows = 1 if alone else len(state.pose)
+        rows = 1 if np.ndim(state.pose) == 1 else len(state.pose)
         if rows != len(self._wanted):
             self._begin(rows)
         dt = 0.0 if self._time is None else time - self._time
@@ -197,18 +211,21 @@ class ComputedTorque(Controller):
             )
         self._take(state, reference)
         mechanics()(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
-        problems, answered, proof = self._problems, self._as_planned, self._nowhere
-        if not problems.solve():
-            answered, proof = self._answer_others(), (problems.direction.copy(), problems.shortfall.copy())
-            self._integrates[:] = answered == PLANNED
-        elif self._paused:
-            self._integrates[:] = True
-        self._paused = answered is not self._as_planned
-        tensions = problems.tensions.copy()
+        self._time = float(time)
+        return dt
+
+    def _command(
+        self,
+        carriers: tuple[np.ndarray, np.ndarray, np.ndarray],
+        tensions: np.ndarray,
+        answered: np.ndarray,
+        proof: tuple[np.ndarray, np.ndarray],
+        alone: bool,
+    ) -> Command:
+        """Return the command of tensions (N, m) and the carriers' reference, which those that react or fly leave."""
         if np.count_nonzero(self._heard[:, IS_CUT]):
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
-        self._time, self._pulls[:, 1] = time, tensions
-        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
+        rows, self._pulls[:, 1] = len(tensions), tensions
         if len(self._carriers[0]):
             own = self._carriers.copy()
             if self._boxes is not None:
@@ -268,8 +285,8 @@ class ComputedTorque(Controller):
         return answered
 
 
-def _reach(robot: Robot, reach: Any) -> np.ndarray:
-    """Return how far each coordinate of each carrier may go, (c, 6); (0, 6) if none may."""
+def reach_of(robot: Robot, reach: Any) -> np.ndarray:
+    """Return how far each coordinate of each carrier may go, (c, 6) [m, rad]."""
     far = as_array("reach", reach, (2,))
     if far.shape != (2,) or not ((far >= 0) & (far <= [1e3, 1.0])).all():
         raise InputError(f"reach must be a distance [m] and an angle up to 1 rad, got {shown(reach)}")
@@ -279,7 +296,7 @@ def _reach(robot: Robot, reach: Any) -> np.ndarray:
         row[free] = np.repeat(far, 3)[free]
         if carrier.efforts:
             row[3:] = 0.0  # its attitude follows from its thrust
-    return result if result.any() else np.zeros((0, 6))
+    return result
 
 
 def _boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
@@ -311,7 +328,8 @@ def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     return inverses, limits
 
 
-def _positive(name: str, value: Any, size: int) -> np.ndarray:
+def positive(name: str, value: Any, size: int) -> np.ndarray:
+    """Return numbers from 0 on, one or `size` of them, as (size,)."""
     result = as_array(name, value, () if np.ndim(value) == 0 else (size,))
     if result.ndim > 1 or not ((result >= 0) & (result <= 1e9)).all():
         raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")

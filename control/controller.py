@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 from .command import Command
 from .reference import Reference
@@ -28,6 +29,18 @@ class Controller(ABC):
     @abstractmethod
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the command for the time [s] from now until the next step."""
+
+    def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
+        """Receive the references of the times to come; default: they are not needed.
+
+        Parameters
+        ----------
+        references
+            One for each period, from `start` [s] on; the last one holds afterwards.
+        period
+            [s].
+        """
+        return
 
     def reset(self) -> None:
         """Forget all earlier steps; default: nothing is remembered."""

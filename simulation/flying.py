@@ -61,11 +61,12 @@ class Sensors:
 class Pilot:
     """A controller for all flights, or a copy for each if it does not accept batches."""
 
-    def __init__(self, controller: Controller, flights: int):
+    def __init__(self, controller: Controller, flights: int, conditions: Conditions):
         self._controllers = [controller] if controller.batches else [copy.deepcopy(controller) for _ in range(flights)]
         self._alone, self._together = flights == 1, controller.batches
         for each in self._controllers:
             each.reset()
+            each.follow(conditions.references, conditions.period)
         self.seconds: list[float] = []
 
     def step(self, time: float, motions: np.ndarray, tensions: np.ndarray, reference: Reference) -> Command:
@@ -121,7 +122,7 @@ def fly(
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
     history, tensions = np.zeros((flights, 2, states.shape[1])), np.zeros((flights, 2, m))
     tensions[:, 1] = start
-    sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controller, flights)
+    sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controller, flights, conditions)
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
     sense, periods = sense_rows(), Periods(plant, period, conditions.substeps)
