@@ -32,7 +32,7 @@ kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
 	$(BIN)/python -c "from towline.solvers.stages import machine; machine.solve_stages()"
 	$(BIN)/python -c "from towline.models.plant import machine; machine.run_rows()"
-	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts()"
+	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"
 	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once.

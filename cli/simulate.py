@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..models import Robot
 
 _MANY = "With --runs: "
-CONTROLLERS = ("computed-torque", "open-loop")
+CONTROLLERS = ("computed-torque", "predictive", "open-loop")
 
 
 def simulate(
@@ -107,7 +107,7 @@ def simulate(
         raise InputError(f"--animate must be left out with --runs, got {animate}")
     # Before libraries load: the processes of --workers share the processors.
     with one_thread_each():
-        from ..control import OpenLoop
+        from ..control import ComputedTorque, OpenLoop, Predictive
         from ..models import load
         from ..models.parsing import read_yaml
         from ..simulation import Noise
@@ -128,7 +128,7 @@ def simulate(
                 raise InputError(f"--out must be another file than the checkpoint, got {file}")
         conditions = {
             "wind": None if wind is None else numbers("--wind", wind, 3),
-            "controller": OpenLoop(loaded) if controller == "open-loop" else None,
+            "controller": {"predictive": Predictive, "open-loop": OpenLoop}.get(controller, ComputedTorque)(loaded),
             "gusts": gusts,
             "noise": None if noise is None else read_yaml(noise, Noise),
             "faults": fault or (),

@@ -7,7 +7,8 @@ from .command import ANSWERS, Command
 from .computed_torque import ComputedTorque
 from .controller import Controller
 from .open_loop import OpenLoop
+from .predictive import Predictive
 from .reference import Reference
 from .state import State
 
-__all__ = ["ANSWERS", "Command", "ComputedTorque", "Controller", "OpenLoop", "Reference", "State"]
+__all__ = ["ANSWERS", "Command", "ComputedTorque", "Controller", "OpenLoop", "Predictive", "Reference", "State"]

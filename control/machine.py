@@ -9,7 +9,7 @@ from ..kernel import Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined
 
-__all__ = ["mechanics", "thrusts"]
+__all__ = ["mechanics", "stages", "thrusts"]
 
 _PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
 _SHARED = tuple(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines"))
@@ -24,6 +24,10 @@ _OF_THRUSTS = (
     f"void({_ROBOT}, float64[::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, ::1], "
     "float64[:, :, ::1])"
 )
+_OF_STAGES = (
+    f"void({_ROBOT}, int64[:, ::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64[:, :, :], float64[:, :, :], float64[:, :])"
+)
 
 
 @cache
@@ -36,6 +40,12 @@ def mechanics() -> Kernel:
 def thrusts() -> Kernel:
     """Return `thrusts.write_thrusts` as machine code; compiling takes some seconds once on a machine."""
     return _compiled((*_MECHANICS, _HERE / "thrusts.py"), "write_thrusts", _OF_THRUSTS)
+
+
+@cache
+def stages() -> Kernel:
+    """Return `prediction.write_stages` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled((*_MECHANICS, _HERE / "prediction.py"), "write_stages", _OF_STAGES)
 
 
 def _compiled(modules: tuple[Path, ...], name: str, signature: str) -> Kernel:

@@ -20,7 +20,7 @@ from pydantic import BaseModel
 
 import towline
 from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along
-from towline.control import ComputedTorque, Reference, State
+from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.inputs import printable
 from towline.models import RelativeDynamics
 from towline.solvers import Horizon, StageProblem, solve_horizon
@@ -259,6 +259,10 @@ VALID: dict[str, Callable[[], Any]] = {
     "reach": lambda: (0.1, 0.1),
     "carrier_bandwidth": lambda: 5.0,
     "ComputedTorque.carrier_acceleration": lambda: 5.0,
+    "Predictive.carrier_acceleration": lambda: 5.0,
+    "Predictive.attitude": lambda: 40.0,
+    "stages": lambda: 3,
+    "stage": lambda: 0.02,
     "place": lambda: 5.0,
     "ComputedTorque.attitude": lambda: 40.0,
     "patience": lambda: 0.05,
@@ -324,6 +328,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Dynamics": dynamics,
     "RelativeDynamics": lambda: RelativeDynamics(robot()),
     "ComputedTorque": lambda: ComputedTorque(ROBOT),
+    "Predictive": lambda: Predictive(ROBOT),
     "Flight": lambda: towline.simulate(ROBOT, robot().home, duration=0.02),
     "Planner": lambda: Planner(ROBOT, TASK),
     "Plan": a_plan,

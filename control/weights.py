@@ -1,0 +1,86 @@
+"""Costs of a predictive controller: `Weights`, from bandwidths, and `terminal`, of what follows the last stage."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..models.dynamics import dynamics_of
+from ..models.robot import Robot
+
+__all__ = ["Weights", "terminal", "weights"]
+
+SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach
+SINGULAR = 1e-3  # of the largest singular value: directions with less are not controlled by tensions
+ROUNDS = 2000  # of the Riccati recursion
+SETTLED = 1e-9  # relative change at which it ends
+
+
+class Weights(NamedTuple):
+    """Weights of squares, of each stage.
+
+    Attributes
+    ----------
+    states
+        Of errors of the pose and its rate and of carriers' places and rates, (n,).
+    controls
+        Of tensions less those planned and of carriers' accelerations, (u,).
+    """
+
+    states: np.ndarray
+    controls: np.ndarray
+
+
+def weights(
+    robot: Robot, bandwidth: np.ndarray, reach: np.ndarray, carrier_bandwidth: float, duration: float
+) -> Weights:
+    """Return the weights with which errors decay with the bandwidth, as far as tensions keep from their limits.
+
+    A double integrator ddx = a with the cost w^4 x^2 + 2 w^2 dx^2 + a^2 decays with the double pole -w. The least
+    tensions for an acceleration a cost a' M (A A')^-1 M a, whose diagonal at home takes the place of a^2.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    bandwidth
+        w of each coordinate of the pose, (6,) [rad/s].
+    reach
+        How far each freed coordinate of a carrier may go, (f,) [m, rad].
+    carrier_bandwidth
+        With which those return [rad/s].
+    duration
+        Of a stage [s].
+    """
+    dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
+    still = dynamics.required_wrench(robot.home, rest, rest)
+    M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
+    scale = np.repeat([1.0, 1 / robot.length], 3) * mask
+    A = scale[:, None] * dynamics.wrench_matrix(robot.home, robot.carrier_home)
+    U, sizes, _ = np.linalg.svd(A)
+    sizes = np.concatenate([sizes, np.zeros(6)])[:6]
+    held = sizes > SINGULAR * sizes[0]
+    effort = (U[:, held] / sizes[held]).T @ (scale[:, None] * M * mask)  # least tensions for unit accelerations
+    of_acceleration = np.einsum("ij,ij->j", effort, effort)
+    pose, rate = bandwidth**4 * of_acceleration, 2 * bandwidth**2 * of_acceleration
+    far = (SHARE * robot.force_scale / reach) ** 2
+    states = np.concatenate([pose, rate, far, 2 * far / carrier_bandwidth**2])
+    return Weights(duration * states, duration * np.concatenate([np.ones(robot.m), far / carrier_bandwidth**4]))
+
+
+def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:
+    """Return the cost that follows the last stage if the dynamics x' = A x + B u stay, without limits, (n, n).
+
+    By the Riccati recursion; for a state that controls do not reach it never settles, and ends after `ROUNDS`.
+    """
+    Q, R = np.diag(by.states), np.diag(by.controls)
+    P = Q
+    for _ in range(ROUNDS):
+        PB = P @ B
+        gain = np.linalg.solve(R + B.T @ PB, PB.T @ A)
+        last, P = P, Q + A.T @ (P @ A - PB @ gain)
+        P = (P + P.T) / 2
+        if np.abs(P - last).max() <= SETTLED * np.abs(P).max():
+            break
+    return P

@@ -1,0 +1,154 @@
+"""Predictive control: its model beside the symbolic dynamics, what it gains, and that it always answers."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
+from towline.control.machine import stages
+from towline.errors import InputError
+from towline.models import Dynamics, load
+from towline.simulation import simulate
+
+
+def rest(robot):
+    state = State(robot.home, np.zeros(6), robot.carrier_home, 0 * robot.carrier_home)
+    return state, Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, *(0 * robot.carrier_home,) * 2)
+
+
+@pytest.mark.parametrize("name", ["wang-flying", "caroca-pulleys", "planar-4", "wang-ctmrts-4"])
+def test_stages_are_the_symbolic_dynamics_to_first_order(name):
+    """Accelerations by CasADi, from the wrench of the tensions; derivatives by central differences of these."""
+    robot, rng, count, dt = load(name), np.random.default_rng(1), 4, 0.02
+    dynamics, m, c = Dynamics(robot), robot.m, len(robot.carriers)
+    free = robot.dof_mask.astype(bool)
+    freed, n = np.array([(0, 0), (0, 1), (0, 2)]), 18
+    A, B, offset = np.zeros((count, n, n)), np.zeros((count, n, m + 3)), np.zeros((count, n))
+    carriers = np.zeros((count + 1, c, 12))
+    carriers[:, :, :6] = robot.carrier_home
+    states, controls = np.zeros((count + 1, n)), rng.uniform(1, 50, size=(count, m + 3))
+    states[:, :6] = robot.home + 0.05 * rng.normal(size=(count + 1, 6)) * robot.dof_mask
+    states[:, 6:12] = 0.3 * rng.normal(size=(count + 1, 6)) * robot.dof_mask
+    states[:, 12:15] = robot.carrier_home[0, :3] + 0.02 * rng.normal(size=(count + 1, 3))
+    disturbance = rng.normal(size=6)
+    given = (freed, np.full(count, dt), disturbance, carriers, states, controls)
+    stages()(ComputedTorque(robot)._robot, *given, A, B, offset)
+
+    def move(x, u):
+        places = robot.carrier_home.copy()
+        places[0, :3] = x[12:15]
+        still = dynamics.required_wrench(x[:6], x[6:12], np.zeros(6))
+        H = np.stack([dynamics.required_wrench(x[:6], x[6:12], unit) - still for unit in np.eye(6)], axis=1)
+        right, a = dynamics.wrench_matrix(x[:6], places) @ u[:m] + disturbance - still, np.zeros(6)
+        a[free] = np.linalg.solve(H[np.ix_(free, free)], right[free])
+        y = x.copy()
+        y[:6] += dt * x[6:12] + dt**2 / 2 * a
+        y[6:12] += dt * a
+        y[12:15] += dt * x[15:] + dt**2 / 2 * u[m:]
+        y[15:] += dt * u[m:]
+        return y
+
+    change = np.concatenate([free, free, np.ones(6, dtype=bool)])
+    for k in range(count):
+        x, u = states[k], controls[k]
+        np.testing.assert_allclose(A[k] @ x + B[k] @ u + offset[k], move(x, u), atol=1e-12)
+        by_x = [(move(x + 1e-5 * unit, u) - move(x - 1e-5 * unit, u)) / 2e-5 for unit in np.eye(n)]
+        by_u = [(move(x, u + 1e-3 * unit) - move(x, u - 1e-3 * unit)) / 2e-3 for unit in np.eye(m + 3)]
+        np.testing.assert_allclose(A[k][:, change], np.stack(by_x, axis=1)[:, change], rtol=1e-5, atol=2e-6)
+        np.testing.assert_allclose(B[k], np.stack(by_u, axis=1), atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "reach"), [("cogiro", (0.0, 0.0)), ("wang-flying", (0.5, 0.0))])
+def test_gusts_move_the_platform_a_fifth_as_far_as_with_computed_torque(name, reach):
+    robot = load(name)
+    if robot.platform.aero is None:
+        task = {"disturbance": 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])}
+    else:
+        task = {"wind": (3, 2, 0.5), "gusts": 1.0}
+    flights = [
+        simulate(robot, robot.home, law(robot, reach=reach), duration=1.0, seed=3, **task)
+        for law in (Predictive, ComputedTorque)
+    ]
+    assert flights[0].passed
+    assert flights[0].answered["as planned"] == 1000
+    assert flights[0].error.max() < 0.2 * flights[1].error.max()
+
+
+@pytest.mark.parametrize(("name", "reach"), [("cogiro", (0.0, 0.0)), ("wang-flying", (0.3, 0.2)), ("planar-4", (0, 0))])
+def test_every_state_is_answered_inside_limits_and_rates(name, reach):
+    """Kicked, far off, at an anchor, with numbers that are none, and after pauses."""
+    robot, rng = load(name), np.random.default_rng(4)
+    low, high = robot.t_min, robot.t_max
+    rate = 20 * (high - low)
+    controller, (state, reference) = Predictive(robot, rate=rate, reach=reach, stages=8), rest(robot)
+    last, time, answers = None, 0.0, set()
+    for k in range(400):
+        dt = float(rng.choice([1e-3, 1e-3, 1e-3, 0.05, 2.0]))
+        time += dt
+        size = 10.0 ** rng.uniform(-4, 1 if k % 5 == 0 else -2)
+        pose = robot.home + size * rng.normal(size=6) * robot.dof_mask
+        velocity = size * rng.normal(size=6) * robot.dof_mask
+        if k % 11 == 0:
+            pose[rng.integers(6)] = rng.choice([np.nan, np.inf, 1e300])
+        if k % 17 == 0:
+            pose[:3] = robot.home_anchors[0]
+        command = controller.step(time, state._replace(pose=pose, velocity=velocity), reference)
+        t = command.tensions
+        assert ((t >= low) & (t <= high)).all()
+        if last is not None:
+            assert (np.abs(t - last) <= rate * dt * (1 + 1e-9)).all()
+        last = t
+        for part in (command.carrier_pose, command.carrier_velocity, command.carrier_acceleration):
+            assert np.isfinite(part).all()
+        answers.add(ANSWERS[command.answered])
+    assert {"as planned", "hold"} <= answers
+
+
+def test_a_reference_that_is_not_announced_is_followed_too():
+    """Stepped by hand, without `follow`: a first step at rest commands the tensions of statics."""
+    robot = load("cogiro")
+    state, reference = rest(robot)
+    w = Dynamics(robot).required_wrench(robot.home, *np.zeros((2, 6)))
+    planned = ComputedTorque(robot).step(0.0, state, reference).tensions
+    command = Predictive(robot).step(0.0, state, reference._replace(tensions=planned))
+    np.testing.assert_allclose(Dynamics(robot).wrench_matrix(robot.home) @ command.tensions, w, atol=1e-3 * w[2])
+
+
+def test_copies_answer_as_the_original_does():
+    robot = load("wang-flying")
+    state, reference = rest(robot)
+    controller = Predictive(robot, reach=(0.3, 0.0))
+    pushed = state._replace(pose=robot.home + 0.01 * np.eye(6)[0])
+    for k in range(3):
+        controller.step(1e-3 * k, pushed, reference)
+    others = copy.deepcopy(controller), pickle.loads(pickle.dumps(controller))
+    expected = controller.step(3e-3, pushed, reference).tensions
+    for other in others:
+        np.testing.assert_array_equal(other.step(3e-3, pushed, reference).tensions, expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"robot": "multi-quadrotor-3"}, "robot must have winches, got 'multi-quadrotor-3'"),
+        ({"bandwidth": np.nan}, "bandwidth"),
+        ({"stages": 0}, "stages"),
+        ({"stage": 0}, "stage"),
+        ({"reach": 3}, "reach"),
+        ({"rate": -1}, "rate"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(change, message):
+    with pytest.raises(InputError, match=message) as error:
+        Predictive(**{"robot": "cogiro"} | change)
+    assert "\n" not in str(error.value)
+
+
+def test_a_batch_is_refused():
+    robot = load("cogiro")
+    state, reference = rest(robot)
+    many = State(*(None if part is None else np.stack([part, part]) for part in state))
+    with pytest.raises(InputError, match="state must be of one robot, got 2"):
+        Predictive(robot).step(0.0, many, reference)
