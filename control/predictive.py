@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from ..distribution import tensions as tensions_at
 from ..errors import InputError
-from ..inputs import number, whole_number
+from ..inputs import number, shown, whole_number
 from ..models.files import as_robot
 from ..models.robot import Robot
 from ..solvers.horizon import Horizon
@@ -54,7 +54,8 @@ class Predictive(ComputedTorque):
     stages, stage
         How many there are, and how long each lasts [s].
     reach
-        How far carriers may leave their reference: position [m] and attitude [rad]; default: they follow it.
+        How far carriers should leave their reference at most: position [m] and attitude [rad]. A weight, and no limit:
+        there a carrier costs as much as 5 % of the robot's weight in a tension. Default: they follow their reference.
     carrier_bandwidth, carrier_acceleration
         With which those return [rad/s], and their largest acceleration [m/s^2 and rad/s^2].
     rate
@@ -134,9 +135,16 @@ class Predictive(ComputedTorque):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
+        if (
+            not isinstance(references, Sequence)
+            or not references
+            or not all(isinstance(r, Reference) for r in references)
+        ):
+            raise InputError(f"references must be a list of References, got {shown(references)}")
+        period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
         rows = [_row(reference, self.robot.m) for reference in references]
         platform, carriers, tensions = (np.stack(part) for part in zip(*rows, strict=True))
-        self._announced = float(start), float(period), platform, carriers, tensions
+        self._announced = start, period, platform, carriers, tensions
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:

@@ -132,10 +132,10 @@ def test_refinement_goes_on_too(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "name"),
     [
-        ({"seed": 5}, "seed is 4, not 5"),
-        ({"samples": SAMPLES + 1}, "samples is"),
-        ({"method": "sobol"}, 'method is "random", not "sobol"'),
-        ({"region": {"attitude": [0, 0, 0.1]}}, "region is"),
+        ({"seed": 5}, "seed 4, not 5"),
+        ({"samples": SAMPLES + 1}, "with samples 5"),
+        ({"method": "sobol"}, 'method "random", not "sobol"'),
+        ({"region": {"attitude": [0, 0, 0.1]}}, "with region "),
     ],
 )
 def test_a_checkpoint_of_another_run_is_refused(tmp_path, whole, changed, name):
