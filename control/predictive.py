@@ -135,6 +135,20 @@ class Predictive(ComputedTorque):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
+        """Receive the references of the times to come, which the stages look ahead to.
+
+        Parameters
+        ----------
+        references
+            One for each period, from `start` [s] on; beyond the last one its accelerations stay.
+        period
+            [s].
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong type or value.
+        """
         if (
             not isinstance(references, Sequence)
             or not references
