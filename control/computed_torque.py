@@ -183,15 +183,21 @@ class ComputedTorque(Controller):
             If the time is not later than that of the step before, or an array does not have the shape of the robot's.
         """
         self._measure(time, state, reference)
-        problems, answered, proof = self._problems, self._as_planned, self._nowhere
-        if not problems.solve():
-            answered, proof = self._answer_others(), (problems.direction.copy(), problems.shortfall.copy())
+        tensions, answered, proof = self._distribute()
+        if answered is not self._as_planned:
             self._integrates[:] = answered == PLANNED
         elif self._paused:
             self._integrates[:] = True
         self._paused = answered is not self._as_planned
-        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
-        return self._command(carriers, problems.tensions.copy(), answered, proof, np.ndim(state.pose) == 1)
+        return self._command(reference, tensions, answered, proof, np.ndim(state.pose) == 1)
+
+    def _distribute(self) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Return the tensions of this step's problem, (N, m) [N], how each row was answered, and what was missing."""
+        problems = self._problems
+        if problems.solve():
+            return problems.tensions.copy(), self._as_planned, self._nowhere
+        answered = self._answer_others()
+        return problems.tensions.copy(), answered, (problems.direction.copy(), problems.shortfall.copy())
 
     def _measure(self, time: float, state: State, reference: Reference) -> float:
         """Update the memory, and write the problem of this step; return the time since the last one [s], or 0."""
@@ -216,13 +222,14 @@ class ComputedTorque(Controller):
 
     def _command(
         self,
-        carriers: tuple[np.ndarray, np.ndarray, np.ndarray],
+        reference: Reference,
         tensions: np.ndarray,
         answered: np.ndarray,
         proof: tuple[np.ndarray, np.ndarray],
         alone: bool,
     ) -> Command:
         """Return the command of tensions (N, m) and the carriers' reference, which those that react or fly leave."""
+        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
         if np.count_nonzero(self._heard[:, IS_CUT]):
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
         rows, self._pulls[:, 1] = len(tensions), tensions

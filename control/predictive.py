@@ -172,19 +172,14 @@ class Predictive(ComputedTorque):
         dt = self._measure(time, state, reference)
         if len(self._wanted) != 1 or np.ndim(state.pose) != 1:
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
-        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
-        answered, proof = self._as_planned, self._nowhere
         self._move(dt, reference)
-        tensions = self._predict(time, reference)
+        tensions, proof = self._predict(time, reference), self._nowhere
         if tensions is None:
             self._order(-self._placed[1] / self._steps[0])  # come to rest
-            problems = self._problems
-            if not problems.solve():
-                answered, proof = self._answer_others(), (problems.direction.copy(), problems.shortfall.copy())
-            tensions = problems.tensions.copy()
-        elif self._solved != time:
-            answered = np.full(1, SHIFTED, dtype=np.int8)
-        return self._command(carriers, tensions, answered, proof, alone=True)
+            tensions, answered, proof = self._distribute()
+        else:
+            answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
+        return self._command(reference, tensions, answered, proof, alone=True)
 
     def _predict(self, time: float, reference: Reference) -> np.ndarray | None:
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
@@ -200,10 +195,10 @@ class Predictive(ComputedTorque):
         write_stages()(self._robot, self._freed, self._steps, *about, h.A, h.B, h.c)
         h.start[:], h.r[:] = start, -self._weights.controls * planned[:-1]
         h.q[:-1], h.q[-1] = -self._weights.states * wanted[:-1], -self._end @ wanted[-1]
-        self._write_bounds(bounds)
+        self._write_bounds()
         h.states[:], h.controls[:] = states, controls
         h.solve(warm=isfinite(self._solved))
-        if h.converged or max(h.residuals) <= GOOD:
+        if h.converged or all(residual <= GOOD for residual in h.residuals):  # false for nan
             self._guess[0][:], self._guess[1][:] = h.states, h.controls
             controls, self._solved = h.controls, time
         elif not time - self._solved <= self._times[-1]:
@@ -271,13 +266,13 @@ class Predictive(ComputedTorque):
         states[0] = start
         return states, controls
 
-    def _write_bounds(self, now: np.ndarray) -> None:
+    def _write_bounds(self) -> None:
         """Write limits of tensions, as far as their rates let them go, and of the carriers' accelerations."""
         h, m = self._horizon, self.robot.m
         low, high, rate = self._limits[LOWEST], self._limits[HIGHEST], self._limits[RATE_MAX]
         cut = self.cut[0]
         last, room = self._pulls[0, 1], rate * self._times[1:, None]
-        if np.isfinite(rate).all() and np.isfinite(self._solved):
+        if isfinite(self._solved):
             h.u_min[:, :m] = np.minimum(np.maximum(low, last - room), high)
             h.u_max[:, :m] = np.maximum(np.minimum(high, last + room), low)
         else:

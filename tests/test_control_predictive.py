@@ -11,6 +11,7 @@ from towline.control.machine import stages
 from towline.errors import InputError
 from towline.models import Dynamics, load
 from towline.simulation import simulate
+from towline.solvers.horizon import Horizon, Residuals
 
 
 def rest(robot):
@@ -127,6 +128,32 @@ def test_copies_answer_as_the_original_does():
     expected = controller.step(3e-3, pushed, reference).tensions
     for other in others:
         np.testing.assert_array_equal(other.step(3e-3, pushed, reference).tensions, expected)
+
+
+def test_a_solution_that_is_no_number_is_not_used_and_leaves_nothing_behind():
+    """Far-off states overflow the stages; back at home, the controller answers as a new one does."""
+    robot = load("cogiro")
+    state, reference = rest(robot)
+    controller = Predictive(robot, observer=0)
+    for k, far in enumerate((1e6, 1e7, 9e8)):
+        command = controller.step(0.1 * k, state._replace(pose=robot.home + far * np.eye(6)[2]), reference)
+        assert np.isfinite(command.tensions).all()
+    for k in range(3):
+        back = controller.step(10.0 + k, state, reference).tensions
+    new = Predictive(robot, observer=0)
+    for k in range(3):
+        expected = new.step(10.0 + k, state, reference).tensions
+    np.testing.assert_allclose(back, expected, atol=1e-3)
+
+
+def test_nothing_is_planned_where_residuals_are_no_numbers(monkeypatch):
+    monkeypatch.setattr(Horizon, "residuals", Residuals(0.0, 0.0, np.nan, 0.0))
+    monkeypatch.setattr(Horizon, "converged", False)
+    robot = load("cogiro")
+    state, reference = rest(robot)
+    controller = Predictive(robot)
+    controller.step(0.0, state, reference)
+    assert np.isnan(controller._solved)
 
 
 @pytest.mark.parametrize(
