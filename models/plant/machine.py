@@ -35,15 +35,7 @@ _SIGNATURE = (
 
 
 def joined(modules: Iterable[Path], entry: str) -> str:
-    """Return the functions and constants of modules that import only `math`, NumPy and each other.
-
-    Parameters
-    ----------
-    modules
-        Files, each after those that it imports.
-    entry
-        The function that calls the others, which alone may allocate memory.
-    """
+    """Return modules as one source, see `kernel.joined`, with the small functions of the plant inlined."""
     return kernel.joined(modules, entry, INLINED)
 
 
