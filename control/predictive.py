@@ -187,12 +187,13 @@ class Predictive(ComputedTorque):
         if not np.isfinite(self._problems.w).all():
             self._solved = np.nan
             return None
-        wanted, carriers, planned = self._look_ahead(time, reference)
+        wanted, carriers, planned, ramps = self._look_ahead(time, reference)
         start = np.concatenate([self._measured[0, 0], self._placed[0], self._placed[1]])
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
         about = self._memory[0, DISTURBANCE], carriers, states, controls
         write_stages()(self._robot, self._freed, self._steps, *about, h.A, h.B, h.c)
+        h.c += ramps
         h.start[:], h.r[:] = start, -self._weights.controls * planned[:-1]
         h.q[:-1], h.q[-1] = -self._weights.states * wanted[:-1], -self._end @ wanted[-1]
         self._write_bounds()
@@ -206,10 +207,13 @@ class Predictive(ComputedTorque):
         self._order(controls[0, m:])
         return np.clip(controls[:1, :m], *bounds)
 
-    def _look_ahead(self, time: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _look_ahead(self, time: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
 
-        It is the one that was announced, if that has this reference now. Beyond it accelerations stay.
+        It is the one that was announced, if that has this reference now. Beyond it accelerations stay. The last result
+        is what the ramps of its accelerations add to states within each stage, (N, n): a control is held for a stage in
+        the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
+        early.
         """
         now, beyond = _row(reference, self.robot.m), self._times
         parts = [np.repeat(part[None], len(beyond), axis=0) for part in now]
@@ -228,7 +232,11 @@ class Predictive(ComputedTorque):
         free = [carriers[:, chosen, 6 * order + coordinate] for order in range(3)]
         states = np.concatenate([platform[:, :12], *free[:2]], axis=1)
         states[:, 3:6] += self._turns(states[0, 3:6])
-        return states, np.ascontiguousarray(carriers[:, :, :12]), np.concatenate([tensions, free[2]], axis=1)
+        ramp, dt = np.diff(np.concatenate([platform[:, 12:], free[2]], axis=1), axis=0), self._steps[:, None]
+        moved, faster = dt * dt / 6 * ramp, dt / 2 * ramp
+        ramps = np.concatenate([moved[:, :6], faster[:, :6], moved[:, 6:], faster[:, 6:]], axis=1)
+        controls = np.concatenate([tensions, free[2]], axis=1)
+        return states, np.ascontiguousarray(carriers[:, :, :12]), controls, ramps
 
     def _turns(self, angles: np.ndarray) -> np.ndarray:
         """Return the whole turns that bring angles near to those measured [rad]."""
