@@ -206,7 +206,7 @@ class Flight:
         stands = np.stack([reference.carrier_pose for reference in references])
         variables["carrier_reference"] = over(base, stands, "m, rad", "pose that each carrier has in the reference")
         variables["carrier_command"] = over(base, record.orders[rows], "m, rad", "pose that each carrier should have")
-        variables["tensions"] = over(cable, record.tensions[rows], "N", "cable tensions")
+        variables["tensions"] = over(cable, record.tensions[rows], "N", "cable tensions, means over the periods")
         variables["tensions_commanded"] = over(
             cable, record.commanded[rows], "N", "tensions that the controller orders"
         )

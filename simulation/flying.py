@@ -121,7 +121,7 @@ def fly(
     states = np.tile(plant.start(*motion, tensions=start), (flights, 1))
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
     history, tensions = np.zeros((flights, 2, states.shape[1])), np.zeros((flights, 2, m))
-    tensions[:, 1] = start
+    pulls = np.tile(start, (flights, 1))  # means of the last period
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controller, flights, conditions)
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
@@ -138,7 +138,7 @@ def fly(
             else:
                 states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.part)
         sense(*periods.geometry, states, motions, lengths)
-        reported = sensors.report(k, motions, tensions[:, 1])
+        reported = sensors.report(k, motions, pulls)
         if command is None or time >= silent_until:
             command = pilot.step(time, *reported, reference)
         else:
@@ -151,6 +151,7 @@ def fly(
             check_command(command, robot, flights, time)
             raise
         periods.run(states, row, history, tensions)
+        pulls = 0.5 * (tensions[:, 0] + tensions[:, 1])
         if not isfinite(_square(history)):
             check_command(command, robot, flights, time)
             alive &= (np.abs(history[:, 1]) < BEYOND).all(axis=1)
@@ -159,7 +160,7 @@ def fly(
         if k == 0 or going:
             lived = alive if k else np.ones(flights, dtype=bool)
             try:
-                recorder.take(Period(k, lived, motions, lengths, tensions[:, 0], command))
+                recorder.take(Period(k, lived, motions, lengths, pulls, command))
             except IndexError:
                 check_command(command, robot, flights, time)
                 raise

@@ -29,8 +29,8 @@ def sense_rows() -> Kernel:
 def write_lengths() -> Kernel:
     """Return `winding.write_lengths` as machine code; compiling takes a second once on a machine."""
     signature = (
-        f"void(float64[:, ::1], intp, float64[:, :, ::1], {GIVEN.format(2)}, float64[::1], float64[::1], float64, "
-        "float64, float64[:, ::1], intp)"
+        f"void(float64[:, ::1], intp, float64[:, :, ::1], float64[:, ::1], {GIVEN.format(2)}, float64[::1], "
+        "float64[::1], float64, float64, float64[:, ::1], intp)"
     )
     return compile_function(joined([_HERE / "winding.py"], "write_lengths"), "write_lengths", signature)
 

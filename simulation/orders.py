@@ -40,7 +40,7 @@ class Orders:
         columns = plant.arrays[1]
         self._elastic = columns[:, layout.STIFFNESS].copy(), columns[:, layout.DAMPING].copy()
         self._first = layout.BODY * (1 + len(robot.carriers))  # of the unstrained lengths in a state
-        self._shape, self._write = (len(seeds), robot.m), write_lengths()
+        self._last_rates, self._write = np.full((len(seeds), robot.m), np.nan), write_lengths()
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
@@ -67,9 +67,9 @@ class Orders:
         elif self._fixed is not None:
             self._cables[:] = self._fixed
         else:
-            tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._shape)
+            tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._last_rates.shape)
             at = self._period, layout.SHORTEST, rows, layout.COMMANDS
-            self._write(states, self._first, lengths, tensions, *self._elastic, *at)
+            self._write(states, self._first, lengths, self._last_rates, tensions, *self._elastic, *at)
         if self._moves:
             self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
             self._accelerations[:] = command.carrier_acceleration

@@ -23,7 +23,7 @@ class Period(NamedTuple):
     motions, lengths
         As `sensors.sense_rows` writes them.
     tensions
-        Under the command that begins, (N, m) [N].
+        Their means over the period, (N, m) [N].
     command
         Of all flights; of a single one its arrays have no leading dimension.
     """
