@@ -56,7 +56,7 @@ class ComputedTorque(Controller):
     integral
         Ki [1/s^3], a number or one for each coordinate; it pauses while a step is not answered as planned.
     observer
-        Bandwidth of the estimate of the disturbance [rad/s]; 0: none is made.
+        Bandwidth of the estimates of the disturbance, and of forces on flying carriers [rad/s]; 0: none are made.
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     reach
@@ -120,13 +120,14 @@ class ComputedTorque(Controller):
         settings = np.array([*settings_of(self.robot), *platform.com, platform.mass])
         self._robot = (bodies, cables_of(self.robot, none, none), settings, self.robot.dof_mask.astype(float))
         mechanics()  # loaded now, not in the first step
-        self._inverses, self._actuators = _inverses(self.robot)
-        self._loops = np.array([number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3)])
+        self._inverses, self._actuators, self._forces = _inverses(self.robot)
+        loops = number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3), self._gains[OBSERVER, 0]
+        self._loops = np.array(loops)
         self._flies = bool(self._inverses.any())
         self._moves_carriers = self._flies or len(self._reach) > 0
         if self._flies:
             thrusts()
-        self.reset()
+        self._begin(1)
 
     @override
     def reset(self) -> None:
@@ -136,6 +137,11 @@ class ComputedTorque(Controller):
     def disturbance(self) -> np.ndarray:
         """Return the estimated force [N] and moment about the CoM [N m] beside cables and weight, (n, 6)."""
         return self._memory[:, DISTURBANCE].copy()
+
+    @property
+    def disturbance_of_carriers(self) -> np.ndarray:
+        """Return the estimated force on each flying carrier beside thrust, cables and weight, (n, c, 3) [N]."""
+        return self._others[:, :, 0].copy()
 
     @property
     def uncontrolled(self) -> np.ndarray:
@@ -164,6 +170,7 @@ class ComputedTorque(Controller):
         self._carriers = np.zeros((rows, count if self._moves_carriers else 0, 3, 6))
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
+        self._others = np.zeros((rows, count, 2, 3))  # forces on carriers that nothing explains
         self._problems = InPlace(rows, 6, m, self.robot.length)
         self._heard = np.zeros((rows, HEARD, m))
         given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._heard)
@@ -217,7 +224,7 @@ class ComputedTorque(Controller):
             )
         self._take(state, reference)
         mechanics()(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
-        self._time = float(time)
+        self._time, self._elapsed = float(time), dt
         return dt
 
     def _command(
@@ -241,9 +248,8 @@ class ComputedTorque(Controller):
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
         actuation = None
         if self._flies:
-            thrusts()(
-                self._robot, self._loops, self._inverses, self._measured, self._carriers, tensions, self._actuation
-            )
+            given = self._measured, self._carriers, tensions, self._pulls, self._held, self._others
+            thrusts()(self._robot, self._loops, self._inverses, self._forces, self._elapsed, *given, self._actuation)
             # A state that is no state leaves its actuators as they were.
             inside = np.clip(self._actuation, *self._actuators)
             actuation = self._held = np.where(np.isfinite(inside), inside, self._held)
@@ -324,15 +330,20 @@ def stay_inside(carriers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None
         carriers[:, :, 1, :3][outside] = carriers[:, :, 2, :3][outside] = 0.0
 
 
-def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Return the commands for units of force and moment on each carrier, (c, a, 6), and their limits, (2, c, a)."""
+def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what actuators do: commands for units of force and moment on each carrier, (c, a, 6), limits, and forces.
+
+    The limits of commands are (2, c, a), the forces in the carriers' axes for units of commands (c, a, 3).
+    """
     most = max(len(carrier.actuators) for carrier in robot.carriers)
     inverses, limits = np.zeros((len(robot.carriers), most, 6)), np.zeros((2, len(robot.carriers), most))
+    forces = np.zeros((len(robot.carriers), most, 3))
     for index, carrier in enumerate(robot.carriers):
         if actuators := carrier.actuators:
             inverses[index, : len(actuators)] = np.linalg.pinv(np.array([each.wrench for each in actuators]).T)
             limits[:, index, : len(actuators)] = np.array([(each.low, each.high) for each in actuators]).T
-    return inverses, limits
+            forces[index, : len(actuators)] = np.array([each.wrench[:3] for each in actuators])
+    return inverses, limits, forces
 
 
 def positive(name: str, value: Any, size: int) -> np.ndarray:

@@ -226,12 +226,18 @@ def hear(elapsed, reported, commanded, little, highest, heard, i):
 
 def is_usable(measured, reference, pulls):
     """Return whether all numbers of a row are finite and at most LARGEST."""
+    usable = is_measured(measured, pulls)
+    for k in range(18):
+        usable &= abs(reference[k]) <= LARGEST
+    return usable
+
+
+def is_measured(measured, pulls):
+    """Return whether all numbers that sensors report are finite and at most LARGEST."""
     usable = True
     for b in range(measured.shape[0]):
         for k in range(12):
             usable &= abs(measured[b, k]) <= LARGEST
-    for k in range(18):
-        usable &= abs(reference[k]) <= LARGEST
     for i in range(pulls.shape[1]):
         usable &= abs(pulls[0, i]) <= LARGEST
     return usable

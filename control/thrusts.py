@@ -1,9 +1,12 @@
 """Kernel: what the actuators of flying carriers do, so that these go where they are ordered with their cables' pull.
 
-    F   = m (a + 2 k (v - v_q) + k^2 (p - p_q) - g) + sum of t u
+    F   = m (a + 2 k (v - v_q) + k^2 (p - p_q) - g) + sum of t u - d
     tau = J (alpha + 2 h (Omega - Omega_q) + h^2 e) + Omega_q x J Omega_q - M
 
-F is the wanted thrust in {G}, e the rotation from the thrust's axis to F and to the ordered yaw, M the moment of the
+    d   = K (m v_q - m v_0 - integral of (T + m g - sum of t u + d))
+
+F is the wanted thrust in {G}, T the one given, d the estimate of all other forces (air, a mass that is not as in the
+robot file), e the rotation from the thrust's axis to F and to the ordered yaw, M the moment of the
 cables about the CoM, k and h the bandwidths of place and attitude; q marks what is measured. Only the part of F along
 the thrust's axis is there at once; the rest comes when the carrier has turned. Source: T. Lee, M. Leok and N. H.
 McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
@@ -30,10 +33,13 @@ from ..models.plant.layout import (
     U,
 )
 from ..models.plant.lines import run_cables
-from .mechanics import move_to_com, put_body
+from .mechanics import is_measured, move_to_com, put_body
+
+# Rows of `memory`: the estimated force, and momentum less what the estimate explains.
+OTHER, ACCOUNTED = 0, 1
 
 
-def write_thrusts(robot, gains, inverses, measured, carriers, tensions, actuation):
+def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensions, pulls, given, memory, actuation):
     """Write the commands of all actuators.
 
     Parameters
@@ -41,15 +47,25 @@ def write_thrusts(robot, gains, inverses, measured, carriers, tensions, actuatio
     robot
         As for `mechanics.write_rows`.
     gains
-        (2,), bandwidths of place and attitude [rad/s].
+        (3,), bandwidths of place, attitude and the estimate of d [rad/s].
     inverses
         (c, a, 6), commands of the actuators for a force and a moment in the carrier's axes; zeros for carriers without.
+    forces
+        (c, a, 3), of the actuators in the carrier's axes, for units of their commands [N].
+    dt
+        Time since the last step [s], 0 in the first one.
     measured
         (N, 1 + c, 12), pose and velocity of the platform and of each carrier.
     carriers
         (N, c, 3, 6), pose, velocity and acceleration that they should have.
     tensions
         (N, m) [N], as commanded.
+    pulls
+        (N, 2, m), in its first row the tensions since the last step [N].
+    given
+        (N, c, a), the actuators' commands since then.
+    memory
+        (N, c, 2, 3), the estimate and what it explains.
     actuation
         Result, (N, c, a).
     """
@@ -67,9 +83,14 @@ def write_thrusts(robot, gains, inverses, measured, carriers, tensions, actuatio
         run_cables(cables, state, on_bodies, on_cables, places)
         for c in range(count - 1):
             if np.any(inverses[c] != 0.0):
+                if is_measured(measured[row], pulls[row]):
+                    observe_carrier(
+                        bodies[1 + c, MASS], settings, gains[2], dt, on_bodies[1 + c], on_cables, cables, c,
+                        measured[row, 1 + c], pulls[row, 0], forces[c], given[row, c], memory[row, c],
+                    )  # fmt: skip
                 wrench_of_carrier(
                     bodies[1 + c], settings, gains, state, BODY * (1 + c), on_bodies[1 + c], cables, on_cables, c,
-                    measured[row, 1 + c], carriers[row, c], tensions[row], wrench,
+                    measured[row, 1 + c], carriers[row, c], tensions[row], memory[row, c, OTHER], wrench,
                 )  # fmt: skip
                 for a in range(inverses.shape[1]):
                     actuation[row, c, a] = 0.0
@@ -77,17 +98,35 @@ def write_thrusts(robot, gains, inverses, measured, carriers, tensions, actuatio
                         actuation[row, c, a] += inverses[c, a, k] * wrench[k]
 
 
+def observe_carrier(mass, settings, gain, dt, R, on_cables, cables, carrier, motion, pull, forces, given, memory):
+    """Update the estimate of the force on a carrier that thrust, weight and cables do not explain."""
+    gain = gain if dt * gain < 1.0 else 1.0 / dt
+    for k in range(3):
+        if dt > 0.0:
+            known = mass * settings[GRAVITY + k] + memory[OTHER, k]
+            for a in range(forces.shape[0]):
+                force = R[3 * k] * forces[a, 0] + R[3 * k + 1] * forces[a, 1] + R[3 * k + 2] * forces[a, 2]
+                known += given[a] * force
+            for i in range(cables.shape[0]):
+                if int(cables[i, OWNER]) == carrier + 1:
+                    known -= pull[i] * on_cables[i, U + k]
+            memory[ACCOUNTED, k] += dt * known
+        else:
+            memory[ACCOUNTED, k] = mass * motion[6 + k]
+        memory[OTHER, k] = gain * (mass * motion[6 + k] - memory[ACCOUNTED, k])
+
+
 def wrench_of_carrier(
-    body, settings, gains, state, at, R, cables, on_cables, carrier, motion, wanted, tensions, wrench
+    body, settings, gains, state, at, R, cables, on_cables, carrier, motion, wanted, tensions, other, wrench
 ):
     """Write the force and the moment that a carrier needs of its actuators, in its own axes."""
     place, turn, mass = gains[0], gains[1], body[MASS]
     fx = mass * (wanted[2, 0] + place * (2.0 * (wanted[1, 0] - motion[6]) + place * (wanted[0, 0] - motion[0])))
     fy = mass * (wanted[2, 1] + place * (2.0 * (wanted[1, 1] - motion[7]) + place * (wanted[0, 1] - motion[1])))
     fz = mass * (wanted[2, 2] + place * (2.0 * (wanted[1, 2] - motion[8]) + place * (wanted[0, 2] - motion[2])))
-    fx -= mass * settings[GRAVITY]
-    fy -= mass * settings[GRAVITY + 1]
-    fz -= mass * settings[GRAVITY + 2]
+    fx -= mass * settings[GRAVITY] + other[0]
+    fy -= mass * settings[GRAVITY + 1] + other[1]
+    fz -= mass * settings[GRAVITY + 2] + other[2]
     mx = my = mz = 0.0
     for i in range(cables.shape[0]):
         if int(cables[i, OWNER]) == carrier + 1:

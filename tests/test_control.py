@@ -278,6 +278,25 @@ def test_a_team_hovers_with_the_thrust_that_statics_requires():
         assert command.actuation[index, 0] == pytest.approx(force @ axis, rel=1e-9)
 
 
+def test_a_quadrotor_that_is_heavier_than_in_its_file_stays_at_its_place():
+    """Its estimate of the force that nothing explains is the weight that is missing; without it, it hangs lower."""
+    robot = load("multi-quadrotor-3")
+    first, *others = robot.carriers
+    lighter = robot.model_copy(update={"carriers": (first.model_copy(update={"mass": first.mass / 1.3}), *others)})
+    controller, blind = ComputedTorque(lighter), ComputedTorque(lighter, observer=0)
+    flight, low = (simulate(robot, robot.home, duration=3.0, controller=each) for each in (controller, blind))
+    assert flight.error[-1] < 1e-2
+    assert low.error[-1] > 3 * flight.error[-1]
+    controller.reset()
+    weight = (first.mass - first.mass / 1.3) * robot.gravity[2]
+    motions = flight.record.motions
+    for k in range(1500):
+        tensions = flight.record.tensions[max(k - 1, 0)]
+        state = State(motions[k, 0, :6], motions[k, 0, 6:], motions[k, 1:, :6], motions[k, 1:, 6:], tensions)
+        controller.step(1e-3 * k, state, flight.conditions.references[k])
+    np.testing.assert_allclose(controller.disturbance_of_carriers[0, 0], [0, 0, weight], atol=0.5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
