@@ -9,11 +9,12 @@ from ..kernel import Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined
 
-__all__ = ["mechanics", "stages", "thrusts"]
+__all__ = ["carriers_of", "directions", "mechanics", "stages", "thrusts"]
 
 _PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
 _SHARED = tuple(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines"))
 _MECHANICS = (*_SHARED, _HERE / "reaction.py", _HERE / "mechanics.py")
+_TETHERS = (*_MECHANICS, _HERE / "tethers.py")
 _ROBOT = "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1]))"
 _OF_ROWS = (
     f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64[:, :, ::1], "
@@ -21,13 +22,16 @@ _OF_ROWS = (
     "float64[:, :, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
 _OF_THRUSTS = (
-    f"void({_ROBOT}, float64[::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, ::1], "
+    f"void({_ROBOT}, float64[::1], float64[:, :, ::1], float64[:, :, ::1], float64, float64[:, :, ::1], "
+    "float64[:, :, :, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, :, ::1], "
     "float64[:, :, ::1])"
 )
 _OF_STAGES = (
-    f"void({_ROBOT}, int64[:, ::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1], "
-    "float64[:, :, :], float64[:, :, :], float64[:, :])"
+    f"void({_ROBOT}, int64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, ::1], "
+    "float64[:, ::1], float64[:, :, :], float64[:, :, :], float64[:, :])"
 )
+_OF_DIRECTIONS = f"void({_ROBOT}, float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
+_OF_CARRIERS = f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
 
 
 @cache
@@ -45,7 +49,19 @@ def thrusts() -> Kernel:
 @cache
 def stages() -> Kernel:
     """Return `prediction.write_stages` as machine code; compiling takes some seconds once on a machine."""
-    return _compiled((*_MECHANICS, _HERE / "prediction.py"), "write_stages", _OF_STAGES)
+    return _compiled((*_TETHERS, _HERE / "prediction.py"), "write_stages", _OF_STAGES)
+
+
+@cache
+def directions() -> Kernel:
+    """Return `tethers.write_directions` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled(_TETHERS, "write_directions", _OF_DIRECTIONS)
+
+
+@cache
+def carriers_of() -> Kernel:
+    """Return `tethers.write_carriers` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled(_TETHERS, "write_carriers", _OF_CARRIERS)
 
 
 def _compiled(modules: tuple[Path, ...], name: str, signature: str) -> Kernel:

@@ -1,7 +1,8 @@
 """Kernel: the robot's motion over the stages of a predictive controller, to first order about a guess.
 
-A state is (pose, its rate, and place and rate of each coordinate in which a carrier may leave its reference), a control
-(tensions, accelerations of those coordinates). With the tensions t, the disturbance d and H ddx + h = w(x, dx, ddx),
+A state is (pose, its rate, and place and rate of each coordinate in which a carrier may leave its reference, or of the
+direction of a cable with fixed length), a control (tensions, accelerations of those coordinates). With the tensions t,
+the disturbance d and H ddx + h = w(x, dx, ddx),
 
     ddx = H^-1 (A(x) t + d - h(x, dx))
 
@@ -14,13 +15,14 @@ from ..models.plant.bodies import place_bodies
 from ..models.plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
 from ..models.plant.lines import run_cables
 from .mechanics import move_to_com, put_body, write_wrench, write_wrench_matrix
+from .tethers import put_tethered
 
 STEP = 1e-6  # [m, rad, rad/s], of a difference quotient
 # Rows of `vectors`: unit acceleration, wrench and momentum, and the wrench without acceleration.
 UNIT, TRIED, MOMENTUM, BIAS, VECTORS = 0, 1, 2, 3, 4
 
 
-def write_stages(robot, freed, dt, disturbance, carriers, states, controls, A, B, c):
+def write_stages(robot, freed, tethers, dt, disturbance, carriers, states, controls, A, B, c):
     """Write the dynamics x_(k+1) = A x_k + B u_k + c of all stages.
 
     Parameters
@@ -29,6 +31,8 @@ def write_stages(robot, freed, dt, disturbance, carriers, states, controls, A, B
         As for `mechanics.write_rows`.
     freed
         (f, 2), carrier and coordinate of each that may leave the reference.
+    tethers
+        (k, TETHER_COLUMNS), cables of fixed length, each with two coordinates of its direction after those; or none.
     dt
         Duration of each stage, (N,) [s].
     disturbance
@@ -41,7 +45,7 @@ def write_stages(robot, freed, dt, disturbance, carriers, states, controls, A, B
         Results, (N, n, n), (N, n, u) and (N, n).
     """
     bodies, cables, _, mask = robot
-    count, m, free = bodies.shape[0], cables.shape[0], freed.shape[0]
+    count, m, free = bodies.shape[0], cables.shape[0], freed.shape[0] + 2 * tethers.shape[0]
     state = np.zeros(BODY * count + CABLE_BLOCKS * m)
     command = np.zeros(COMMANDS + m + CARRIER * count)
     on_bodies, on_cables = np.zeros((count, BODY_WORK)), np.zeros((m, CABLE_WORK))
@@ -52,7 +56,7 @@ def write_stages(robot, freed, dt, disturbance, carriers, states, controls, A, B
     for k in range(controls.shape[0]):
         for j in range(12 + 2 * free):
             x[j] = states[k, j]
-        write_equations(robot, freed, disturbance, carriers[k], x, controls[k], at, here)
+        write_equations(robot, freed, tethers, disturbance, carriers[k], x, controls[k], at, here)
         for i in range(6):
             for j in range(m):
                 here[i, 7 + j] = matrix[i, j]
@@ -64,7 +68,7 @@ def write_stages(robot, freed, dt, disturbance, carriers, states, controls, A, B
                     gains[i, j] = 0.0
                 continue
             x[j] += STEP
-            write_equations(robot, freed, disturbance, carriers[k], x, controls[k], at, there)
+            write_equations(robot, freed, tethers, disturbance, carriers[k], x, controls[k], at, there)
             x[j] = states[k, j]
             solve_columns(there)
             for i in range(6):
@@ -72,23 +76,24 @@ def write_stages(robot, freed, dt, disturbance, carriers, states, controls, A, B
         write_stage(here, gains, m, free, dt[k], states[k], controls[k], A[k], B[k], c[k])
 
 
-def write_equations(robot, freed, disturbance, carriers, x, control, at, equations):
+def write_equations(robot, freed, tethers, disturbance, carriers, x, control, at, equations):
     """Write H and, in column 6, A t + d - h, with ones in H where the platform has no freedom, for a state (n,)."""
     bodies, cables, settings, mask = robot
     state, command, on_bodies, on_cables, motion, matrix, vectors = at
-    m, free = cables.shape[0], freed.shape[0]
+    m, free = cables.shape[0], freed.shape[0] + 2 * tethers.shape[0]
     for j in range(12):
         motion[0, j] = x[j]
     for b in range(1, bodies.shape[0]):
         for j in range(12):
             motion[b, j] = carriers[b - 1, j]
-    for f in range(free):
+    for f in range(freed.shape[0]):
         motion[1 + freed[f, 0], freed[f, 1]] = x[12 + f]
         motion[1 + freed[f, 0], 6 + freed[f, 1]] = x[12 + free + f]
     for b in range(bodies.shape[0]):
         put_body(state, BODY * b, motion[b])
     place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
     move_to_com(settings, state, on_bodies)
+    put_tethered(tethers, cables, state, on_bodies, x[12 + freed.shape[0] :])
     run_cables(cables, state, on_bodies, on_cables, BODY * bodies.shape[0])
     write_wrench_matrix(mask, on_cables, matrix)
     unit, tried, bias = vectors[UNIT], vectors[TRIED], vectors[BIAS]
@@ -146,3 +151,4 @@ def write_stage(solved, gains, m, free, dt, x, u, A, B, c):
         place, rate = 12 + f, 12 + free + f
         A[place, place], A[place, rate], A[rate, rate] = 1.0, dt, 1.0
         B[place, m + f], B[rate, m + f] = half, dt
+        c[place] = c[rate] = 0.0

@@ -20,6 +20,7 @@ from .command import SHIFTED, Command
 from .computed_torque import ComputedTorque, positive, reach_of
 from .machine import stages as write_stages
 from .mechanics import DISTURBANCE, HIGHEST, LOWEST, RATE_MAX
+from .moved import Flown, Freed, Moved, Tethered
 from .reference import Reference
 from .state import State
 from .weights import terminal, weights
@@ -29,6 +30,9 @@ __all__ = ["Predictive"]
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS = 20
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
+ALMOST = 1e-9  # of the largest entry of the gram matrix of efforts, whose rank may be less than six
+USUAL_REACH = 0.2  # of the cables' mean length
+NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
 CLOSE = 1e-9  # [m, rad] by which a reference may differ from the one that was announced
 
 
@@ -48,16 +52,21 @@ class Predictive(ComputedTorque):
     Parameters
     ----------
     robot
-        A `Robot`, the name of one in the library, or the path of a robot file. Its winches change the cables' lengths.
+        A `Robot`, the name of one in the library, or the path of a robot file. A carrier with a cable of fixed length
+        has no other cable.
     bandwidth
         With which errors decay where no limit is near [rad/s], a number or one for each coordinate of the pose.
+        Default: 40, but 6 where carriers have to correct errors: those of towing robots and of teams of quadrotors.
     stages, stage
-        How many there are, and how long each lasts [s].
+        How many there are, and how long each lasts [s]; default: 20 of 0.015 s, but of 0.025 s where carriers correct.
     reach
         How far carriers should leave their reference at most: position [m] and attitude [rad]. A weight, and no limit:
-        there a carrier costs as much as 5 % of the robot's weight in a tension. Default: they follow their reference.
+        there a carrier costs as much as 5 % of the robot's weight in a tension. Default: they follow their reference,
+        but where they correct errors they may leave it by a fifth of the cables' length. One that flies and does not
+        have to correct is moved by the reaction of `ComputedTorque`, not by the solution.
     carrier_bandwidth, carrier_acceleration
-        With which those return [rad/s], and their largest acceleration [m/s^2 and rad/s^2].
+        With which those return [rad/s], default: 2, but 12 where they correct, and their largest acceleration beside
+        the reference's [m/s^2 and rad/s^2].
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     observer, place, attitude, patience
@@ -66,7 +75,7 @@ class Predictive(ComputedTorque):
     Raises
     ------
     InputError
-        If an argument has a wrong value, or the robot's cables have fixed lengths.
+        If an argument has a wrong value, or a cable of fixed length is not the only one of its carrier.
     """
 
     batches = False
@@ -74,11 +83,11 @@ class Predictive(ComputedTorque):
     def __init__(
         self,
         robot: Robot | str | os.PathLike[str],
-        bandwidth: Any = 40.0,
+        bandwidth: Any = None,
         stages: int = 20,
-        stage: float = 0.015,
-        reach: tuple[float, float] = (0.0, 0.0),
-        carrier_bandwidth: float = 2.0,
+        stage: float | None = None,
+        reach: tuple[float, float] | None = None,
+        carrier_bandwidth: float | None = None,
         carrier_acceleration: float = 5.0,
         rate: Any = None,
         observer: float = 60.0,
@@ -87,42 +96,65 @@ class Predictive(ComputedTorque):
         patience: float = 0.05,
     ):
         the_robot = as_robot(robot)
-        if the_robot.fixed_lengths is not None:
-            raise InputError(f"robot must have winches, got {the_robot.name!r}, whose cables have fixed lengths")
+        correct = the_robot.fixed_lengths is not None or the_robot.m < len(the_robot.platform.dof)
+        if reach is None:
+            lengths = np.linalg.norm(the_robot.home_anchors - the_robot.home_attachments, axis=1)
+            reach = (USUAL_REACH * float(lengths.mean()) if correct else 0.0, 0.0)
         far = reach_of(the_robot, reach)
-        self._freed = np.ascontiguousarray(np.argwhere(far))  # (f, 2)
-        self._far = far[tuple(self._freed.T)]
-        self._bandwidth = positive("bandwidth", bandwidth, 6)
+        self._bandwidth = positive("bandwidth", (6.0 if correct else 40.0) if bandwidth is None else bandwidth, 6)
+        returning = (12.0 if correct else 2.0) if carrier_bandwidth is None else carrier_bandwidth
+        returning = number("carrier_bandwidth", returning, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
-        count, m, f = whole_number("stages", stages, 1, 200), the_robot.m, len(self._freed)
-        self._sizes = count, 12 + 2 * f, m + f
-        self._steps = np.full(count, number("stage", stage, 1e-4, 10.0))
+        count, duration = whole_number("stages", stages, 1, 200), stage
+        if duration is None:
+            duration = 0.025 if correct else 0.015
+        self._steps = np.full(count, number("stage", duration, 1e-4, 10.0))
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
         super().__init__(
             the_robot, observer=observer, rate=rate, reach=reach, place=place, attitude=attitude, patience=patience
         )
-        self._reach = np.zeros((0, 6))  # the solution moves carriers, not a reaction
-        returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
-        self._weights = weights(self.robot, self._bandwidth, self._far, returning, self._steps[0])
-        self._end = self._cost_at_the_end()
+        # Carriers that fly are slow, and react as with `ComputedTorque`, unless they have to correct.
+        flies = np.array([bool(carrier.efforts) for carrier in the_robot.carriers])
+        reacts = far * flies[:, None] * (not correct)
+        self._reach = reacts if reacts.any() else np.zeros((0, 6))
+        far = far - reacts
+        self._followed = flies & ~far.any(axis=1)
+        delay = 2.0 / self._loops[1], self._steps[0]
+        if the_robot.fixed_lengths is None:
+            late = Flown(far, self._strongest, *delay) if (far.any(axis=1) & flies).any() else None
+            self._moved: Moved = late or Freed(far, self._strongest)
+            reaches = far[far > 0]
+        else:
+            self._moved = Tethered(self.robot, self._robot, *delay)
+            reaches = np.full(self._moved.count, far.max() or 1e-3)  # [m]: next to none
+        m, f = self.robot.m, self._moved.count
+        self._sizes = count, 12 + 2 * f, m + f
+        self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
+        A, B = self._at_home()
+        moves = A[6:12, 12 : 12 + f] / self._steps[0]
+        self._weights = weights(self.robot, self._bandwidth, reaches, returning, self._steps[0], moves)
+        self._efforts = np.concatenate([np.ones(m), (self._weights.states[12 : 12 + f]) / self._steps[0]])
+        self._end = terminal(A, B, self._weights)
         # What all problems share.
         h = self._horizon = Horizon(*self._sizes)
         h.tolerance, h.iterations_max = TOLERANCE, ITERATIONS
         h.Q[:count], h.Q[count], h.R[:] = np.diag(self._weights.states), self._end, np.diag(self._weights.controls)
-        h.u_min[:, m:], h.u_max[:, m:] = -self._strongest, self._strongest
+        self.reset()
 
-    def _cost_at_the_end(self) -> np.ndarray:
-        """Return the cost that follows the last stage, (n, n), at rest at home."""
+    def _at_home(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return A and B of a stage at rest at home, (n, n) and (n, u)."""
         robot, (_, n, u) = self.robot, self._sizes
         carriers = np.concatenate([robot.carrier_home, np.zeros_like(robot.carrier_home)], axis=1)
         states, controls = np.zeros((1, n)), np.zeros((1, u))
-        states[0, :6], states[0, 12 : 12 + len(self._freed)] = robot.home, carriers[tuple(self._freed.T)]
-        controls[0, : robot.m] = tensions_at(robot, robot.home, method="soft-wrench").tensions
+        states[0, :6] = robot.home
+        still = np.zeros((1, 1 + len(carriers), 3, 6))
+        still[0, :, 0] = np.vstack([robot.home, robot.carrier_home])
+        states[0, 12 : 12 + self._moved.count] = self._moved.along(still[:, 0], still[:, 1:])[0, 0]
+        controls[0, : robot.m] = self._statics
         A, B, c = np.zeros((1, n, n)), np.zeros((1, n, u)), np.zeros((1, n))
-        write_stages()(
-            self._robot, self._freed, self._steps[:1], np.zeros(6), carriers[None], states, controls, A, B, c
-        )
-        return terminal(A[0], B[0], self._weights)
+        about = self._steps[:1], np.zeros(6), carriers[None], states, controls
+        write_stages()(self._robot, self._moved.freed, self._moved.tethers, *about, A, B, c)
+        return A[0], B[0]
 
     @override
     def reset(self) -> None:
@@ -130,8 +162,8 @@ class Predictive(ComputedTorque):
         count, n, u = self._sizes
         self._guess = np.zeros((count + 1, n)), np.zeros((count, u))
         self._solved = np.nan  # when it was [s]
-        self._placed = np.zeros((3, len(self._freed)))  # commanded place, rate and acceleration of freed coordinates
-        self._announced: tuple[float, float, np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._moved.reset()
+        self._announced: tuple[float, float, tuple[np.ndarray, ...]] | None = None
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
@@ -156,9 +188,15 @@ class Predictive(ComputedTorque):
         ):
             raise InputError(f"references must be a list of References, got {shown(references)}")
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
-        rows = [_row(reference, self.robot.m) for reference in references]
-        platform, carriers, tensions = (np.stack(part) for part in zip(*rows, strict=True))
-        self._announced = start, period, platform, carriers, tensions
+        self._announced = start, period, self._rows(references)
+
+    def _rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, ...]:
+        """Return platforms (K, 3, 6), carriers (K, c, 3, 6), moved coordinates (K, 3, f) and tensions (K, m)."""
+        platform = np.array([reference[:3] for reference in references])
+        carriers = np.stack([np.stack(reference[3:6], axis=1) for reference in references])
+        unknown = self._statics if self.robot.fixed_lengths is not None else np.zeros(self.robot.m)
+        tensions = [unknown if each.tensions is None else np.asarray(each.tensions, dtype=float) for each in references]
+        return platform, carriers, self._moved.along(platform, carriers), np.stack(tensions)
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
@@ -172,42 +210,54 @@ class Predictive(ComputedTorque):
         dt = self._measure(time, state, reference)
         if len(self._wanted) != 1 or np.ndim(state.pose) != 1:
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
-        self._move(dt, reference)
-        tensions, proof = self._predict(time, reference), self._nowhere
+        tensions, proof = self._predict(time, dt, reference), self._nowhere
         if tensions is None:
-            self._order(-self._placed[1] / self._steps[0])  # come to rest
+            self._moved.rest(self._steps[0], self._carriers[0])
             tensions, answered, proof = self._distribute()
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         return self._command(reference, tensions, answered, proof, alone=True)
 
-    def _predict(self, time: float, reference: Reference) -> np.ndarray | None:
+    def _predict(self, time: float, dt: float, reference: Reference) -> np.ndarray | None:
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
-        bounds = self._problems.bounds[:, 0]
+        bounds, now = self._problems.bounds[:, 0], self._rows([reference])
+        placed = self._moved.now(dt, self._measured[0], now[2][0])
         if not np.isfinite(self._problems.w).all():
             self._solved = np.nan
             return None
-        wanted, carriers, planned, ramps = self._look_ahead(time, reference)
-        start = np.concatenate([self._measured[0, 0], self._placed[0], self._placed[1]])
+        wanted, carriers, planned, ramps = self._look_ahead(time, now)
+        start = np.concatenate([self._measured[0, 0], *placed])
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
+        # Carriers that fly are where they are, not where they should be.
+        off = self._measured[0, 1:, :3] - carriers[0, :, :3]
+        carriers[:, self._followed, :3] += off[self._followed]
         about = self._memory[0, DISTURBANCE], carriers, states, controls
-        write_stages()(self._robot, self._freed, self._steps, *about, h.A, h.B, h.c)
+        write_stages()(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
         h.c += ramps
+        self._aim(wanted, planned)
+        for k, more in enumerate(self._moved.under_way()[: len(h.B)]):
+            h.c[k] += h.B[k, :, m:] @ (planned[k, m:] + more)
+            h.B[k, :, m:] = 0.0
         h.start[:], h.r[:] = start, -self._weights.controls * planned[:-1]
         h.q[:-1], h.q[-1] = -self._weights.states * wanted[:-1], -self._end @ wanted[-1]
-        self._write_bounds()
+        self._write_bounds(controls, planned)
         h.states[:], h.controls[:] = states, controls
-        h.solve(warm=isfinite(self._solved))
+        h.solve(warm=h.converged)
         if h.converged or all(residual <= GOOD for residual in h.residuals):  # false for nan
             self._guess[0][:], self._guess[1][:] = h.states, h.controls
-            controls, self._solved = h.controls, time
+            states, controls, self._solved = h.states, h.controls, time
         elif not time - self._solved <= self._times[-1]:
             return None
-        self._order(controls[0, m:])
+        acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
+        late = min(self._moved.late, len(controls) - 1)
+        more = np.clip(controls[late, m:] - planned[late, m:], -self._strongest, self._strongest)
+        self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
         return np.clip(controls[:1, :m], *bounds)
 
-    def _look_ahead(self, time: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _look_ahead(
+        self, time: float, now: tuple[np.ndarray, ...]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
 
         It is the one that was announced, if that has this reference now. Beyond it accelerations stay. The last result
@@ -215,44 +265,49 @@ class Predictive(ComputedTorque):
         the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
         early.
         """
-        now, beyond = _row(reference, self.robot.m), self._times
-        parts = [np.repeat(part[None], len(beyond), axis=0) for part in now]
+        beyond = self._times
+        parts = [np.repeat(part, len(beyond), axis=0) for part in now]
         if self._announced is not None:
-            start, period, platform, *others = self._announced
-            steps = (time + self._times - start) / period
-            at = np.clip(np.rint(steps), 0, len(platform) - 1).astype(int)
-            if np.abs(platform[at[0]] - now[0]).max() <= CLOSE:
-                parts = [platform[at], *(part[at] for part in others)]
-                beyond = period * np.maximum(steps - (len(platform) - 1), 0.0)
-        platform, carriers, tensions = parts
+            start, period, rows = self._announced
+            steps, last = (time + self._times - start) / period, len(rows[0]) - 1
+            at = np.clip(np.rint(steps), 0, last).astype(int)
+            if np.abs(rows[0][at[0]] - now[0][0]).max() <= CLOSE:
+                parts, beyond = [part[at] for part in rows], period * np.maximum(steps - last, 0.0)
+        platform, carriers, moved, tensions = parts
         if beyond.any():
-            _extrapolate(platform, beyond[:, None])
-            _extrapolate(carriers, beyond[:, None, None])
-        chosen, coordinate = self._freed.T
-        free = [carriers[:, chosen, 6 * order + coordinate] for order in range(3)]
-        states = np.concatenate([platform[:, :12], *free[:2]], axis=1)
+            platform, moved = (_extrapolated(part, beyond[:, None]) for part in (platform, moved))
+            carriers = _extrapolated(carriers, beyond[:, None, None])
+        states = np.concatenate([platform[:, 0], platform[:, 1], moved[:, 0], moved[:, 1]], axis=1)
         states[:, 3:6] += self._turns(states[0, 3:6])
-        ramp, dt = np.diff(np.concatenate([platform[:, 12:], free[2]], axis=1), axis=0), self._steps[:, None]
-        moved, faster = dt * dt / 6 * ramp, dt / 2 * ramp
-        ramps = np.concatenate([moved[:, :6], faster[:, :6], moved[:, 6:], faster[:, 6:]], axis=1)
-        controls = np.concatenate([tensions, free[2]], axis=1)
-        return states, np.ascontiguousarray(carriers[:, :, :12]), controls, ramps
+        ramp, dt = np.diff(np.concatenate([platform[:, 2], moved[:, 2]], axis=1), axis=0), self._steps[:, None]
+        further, faster = dt * dt / 6 * ramp, dt / 2 * ramp
+        ramps = np.concatenate([further[:, :6], faster[:, :6], further[:, 6:], faster[:, 6:]], axis=1)
+        controls = np.concatenate([tensions, moved[:, 2]], axis=1)
+        still = np.ascontiguousarray(carriers[:, :, :2]).reshape(len(states), -1, 12)  # poses and velocities
+        return states, still, controls, ramps
+
+    def _aim(self, wanted: np.ndarray, planned: np.ndarray) -> None:
+        """Change tensions and moved places of the reference, the least, so that its motion obeys the model.
+
+        The model knows what the reference does not: the estimated disturbance. A solution would be off by a balance of
+        errors and tensions, for as long as the disturbance stays.
+        """
+        h, m, f, dt = self._horizon, self.robot.m, self._moved.count, self._steps
+        missed = wanted[1:] - np.einsum("kij,kj->ki", h.A, wanted[:-1]) - np.einsum("kij,kj->ki", h.B, planned[:-1])
+        missing = (missed - h.c)[:, 6:12] / dt[:, None]
+        gains = np.concatenate([h.B[:, 6:12, :m], h.A[:, 6:12, 12 : 12 + f]], axis=2) / dt[:, None, None]
+        weighted = gains / self._efforts
+        gram = np.einsum("kij,klj->kil", weighted, gains)  # of what may be no numbers, far off
+        size = np.einsum("kii->ki", gram)
+        gram[:, range(6), range(6)] += np.maximum(ALMOST * size.max(axis=1, keepdims=True), 1e-200)
+        change = np.einsum("kij,ki->kj", weighted, np.linalg.solve(gram, missing[..., None])[..., 0])
+        planned[:-1, :m] += change[:, :m]
+        wanted[:-1, 12 : 12 + f] += change[:, m:]
+        wanted[-1, 12 : 12 + f] += change[-1, m:]
 
     def _turns(self, angles: np.ndarray) -> np.ndarray:
         """Return the whole turns that bring angles near to those measured [rad]."""
         return 2 * np.pi * np.rint((self._measured[0, 0, 3:6] - angles) / (2 * np.pi))
-
-    def _move(self, dt: float, reference: Reference) -> None:
-        """Move freed coordinates on as they were ordered; they begin where the reference is."""
-        place, rate, acceleration = self._placed
-        if dt > 0:
-            place += dt * rate + dt * dt / 2 * acceleration
-            rate += dt * acceleration
-        else:
-            chosen, coordinate = self._freed.T
-            place[:] = reference.carrier_pose[chosen, coordinate]
-            rate[:] = reference.carrier_velocity[chosen, coordinate]
-            acceleration[:] = 0.0
 
     def _shifted(
         self, time: float, start: np.ndarray, wanted: np.ndarray, planned: np.ndarray
@@ -274,7 +329,7 @@ class Predictive(ComputedTorque):
         states[0] = start
         return states, controls
 
-    def _write_bounds(self) -> None:
+    def _write_bounds(self, controls: np.ndarray, planned: np.ndarray) -> None:
         """Write limits of tensions, as far as their rates let them go, and of the carriers' accelerations."""
         h, m = self._horizon, self.robot.m
         low, high, rate = self._limits[LOWEST], self._limits[HIGHEST], self._limits[RATE_MAX]
@@ -285,22 +340,14 @@ class Predictive(ComputedTorque):
             h.u_max[:, :m] = np.maximum(np.minimum(high, last + room), low)
         else:
             h.u_min[:, :m], h.u_max[:, :m] = low, high
+        # A bound that is far away costs iterations, since accelerations cost so much less than tensions.
+        usual = planned[:-1, m:]
+        most = np.where(np.abs(controls[:, m:] - usual) > NEAR * self._strongest, self._strongest, np.inf)
+        h.u_min[:, m:], h.u_max[:, m:] = usual - most, usual + most
         h.u_min[:, :m][:, cut] = h.u_max[:, :m][:, cut] = 0.0
 
-    def _order(self, accelerations: np.ndarray) -> None:
-        """Write how freed coordinates are to move, with accelerations (f,)."""
-        self._placed[2] = np.clip(accelerations, -self._strongest, self._strongest)
-        chosen, coordinate = self._freed.T
-        self._carriers[0, chosen, :, coordinate] = self._placed.T
 
-
-def _row(reference: Reference, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return pose, velocity and acceleration of platform, (18,), and carriers, (c, 18), and the tensions, (m,)."""
-    tensions = np.zeros(m) if reference.tensions is None else np.asarray(reference.tensions, dtype=float)
-    return np.concatenate(reference[:3]), np.concatenate(reference[3:6], axis=1), tensions
-
-
-def _extrapolate(motion: np.ndarray, times: np.ndarray) -> None:
-    """Move pose and velocity on with their accelerations, (..., 18), by times [s]."""
-    motion[..., :6] += times * (motion[..., 6:12] + times / 2 * motion[..., 12:])
-    motion[..., 6:12] += times * motion[..., 12:]
+def _extrapolated(motion: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return places and rates moved on with their accelerations, (..., 3, k), by times [s]."""
+    place, rate, acceleration = motion[..., 0, :], motion[..., 1, :], motion[..., 2, :]
+    return np.stack([place + times * (rate + times / 2 * acceleration), rate + times * acceleration, acceleration], -2)

@@ -33,7 +33,12 @@ class Weights(NamedTuple):
 
 
 def weights(
-    robot: Robot, bandwidth: np.ndarray, reach: np.ndarray, carrier_bandwidth: float, duration: float
+    robot: Robot,
+    bandwidth: np.ndarray,
+    reach: np.ndarray,
+    carrier_bandwidth: float,
+    duration: float,
+    moved: np.ndarray,
 ) -> Weights:
     """Return the weights with which errors decay with the bandwidth, as far as tensions keep from their limits.
 
@@ -52,19 +57,24 @@ def weights(
         With which those return [rad/s].
     duration
         Of a stage [s].
+    moved
+        Accelerations of the pose at home for units of the freed coordinates, (6, f). They take part in the least effort
+        where tensions do not control all degrees of freedom.
     """
     dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
     still = dynamics.required_wrench(robot.home, rest, rest)
     M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
     scale = np.repeat([1.0, 1 / robot.length], 3) * mask
     A = scale[:, None] * dynamics.wrench_matrix(robot.home, robot.carrier_home)
+    far = (SHARE * robot.force_scale / reach) ** 2
+    if robot.m < len(robot.platform.dof):
+        A = np.concatenate([A, scale[:, None] * (M @ moved) / np.sqrt(far)], axis=1)
     U, sizes, _ = np.linalg.svd(A)
     sizes = np.concatenate([sizes, np.zeros(6)])[:6]
     held = sizes > SINGULAR * sizes[0]
     effort = (U[:, held] / sizes[held]).T @ (scale[:, None] * M * mask)  # least tensions for unit accelerations
     of_acceleration = np.einsum("ij,ij->j", effort, effort)
     pose, rate = bandwidth**4 * of_acceleration, 2 * bandwidth**2 * of_acceleration
-    far = (SHARE * robot.force_scale / reach) ** 2
     states = np.concatenate([pose, rate, far, 2 * far / carrier_bandwidth**2])
     return Weights(duration * states, duration * np.concatenate([np.ones(robot.m), far / carrier_bandwidth**4]))
 

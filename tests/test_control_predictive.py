@@ -8,7 +8,8 @@ import pytest
 
 from towline import plan
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
-from towline.control.machine import stages
+from towline.control.machine import carriers_of, directions, stages
+from towline.control.tethers import TETHER_COLUMNS
 from towline.errors import InputError
 from towline.models import Dynamics, load
 from towline.simulation import simulate
@@ -35,7 +36,7 @@ def test_stages_are_the_symbolic_dynamics_to_first_order(name):
     states[:, 6:12] = 0.3 * rng.normal(size=(count + 1, 6)) * robot.dof_mask
     states[:, 12:15] = robot.carrier_home[0, :3] + 0.02 * rng.normal(size=(count + 1, 3))
     disturbance = rng.normal(size=6)
-    given = (freed, np.full(count, dt), disturbance, carriers, states, controls)
+    given = (freed, np.zeros((0, TETHER_COLUMNS)), np.full(count, dt), disturbance, carriers, states, controls)
     stages()(ComputedTorque(robot)._robot, *given, A, B, offset)
 
     def move(x, u):
@@ -62,6 +63,93 @@ def test_stages_are_the_symbolic_dynamics_to_first_order(name):
         np.testing.assert_allclose(B[k], np.stack(by_u, axis=1), atol=1e-9)
 
 
+def team_motion(robot, rng):
+    """Return places of carriers with cables of fixed length, and the coordinates of these that the controller has."""
+    tethers, lengths = Predictive(robot)._moved.tethers, robot.fixed_lengths
+
+    def carriers(pose, coordinates):
+        _, attachments = Dynamics(robot).points(pose, robot.carrier_home)
+        cy, sy = np.cos(pose[5]), np.sin(pose[5])
+        places = robot.carrier_home.copy()
+        for i, (a, b) in enumerate(coordinates.reshape(-1, 2)):
+            e1, e2, n = tethers[i, 2:].reshape(3, 3)
+            along = a * e1 + b * e2 + np.sqrt(lengths[i] ** 2 - a**2 - b**2) * n
+            places[i, :3] = attachments[i] + [cy * along[0] - sy * along[1], sy * along[0] + cy * along[1], along[2]]
+        return places
+
+    coordinates = 0.3 * rng.normal(size=2 * len(tethers))
+    return tethers, carriers, coordinates
+
+
+def test_stages_of_a_team_are_the_symbolic_dynamics_to_first_order():
+    """Accelerations by CasADi with the quadrotors where a formula in NumPy puts them, and central differences."""
+    robot, rng, dt = load("multi-quadrotor-3"), np.random.default_rng(5), 0.02
+    tethers, carriers, coordinates = team_motion(robot, rng)
+    dynamics, m, n = Dynamics(robot), 3, 24
+    A, B, offset = np.zeros((1, n, n)), np.zeros((1, n, 9)), np.zeros((1, n))
+    x, u = np.concatenate([0.2 * rng.normal(size=12), coordinates, rng.normal(size=6)]), rng.uniform(1, 20, 9)
+    x[5] = 1.0  # a team turns with its load
+    still = np.concatenate([robot.carrier_home, 0 * robot.carrier_home], axis=1)[None]
+    disturbance = rng.normal(size=6)
+    given = (np.zeros((0, 2), dtype=np.int64), tethers, np.full(1, dt), disturbance, still, x[None], u[None])
+    stages()(ComputedTorque(robot)._robot, *given, A, B, offset)
+
+    def move(x, u):
+        rest = dynamics.required_wrench(x[:6], x[6:12], np.zeros(6))
+        H = np.stack([dynamics.required_wrench(x[:6], x[6:12], unit) - rest for unit in np.eye(6)], axis=1)
+        pulls = dynamics.wrench_matrix(x[:6], carriers(x[:6], x[12:18])) @ u[:m]
+        a = np.concatenate([np.linalg.solve(H, pulls + disturbance - rest), u[m:]])
+        rates = np.concatenate([x[6:12], x[18:]])
+        place = np.concatenate([x[:6], x[12:18]]) + dt * rates + dt**2 / 2 * a
+        rates = rates + dt * a
+        return np.concatenate([place[:6], rates[:6], place[6:], rates[6:]])
+
+    np.testing.assert_allclose(A[0] @ x + B[0] @ u + offset[0], move(x, u), atol=1e-11)
+    by_x = [(move(x + 1e-5 * unit, u) - move(x - 1e-5 * unit, u)) / 2e-5 for unit in np.eye(n)]
+    change = np.r_[0:6, 12:24]
+    np.testing.assert_allclose(A[0][:, change], np.stack(by_x, axis=1)[:, change], rtol=1e-4, atol=5e-6)
+    by_u = [(move(x, u + 1e-3 * unit) - move(x, u - 1e-3 * unit)) / 2e-3 for unit in np.eye(9)]
+    np.testing.assert_allclose(B[0], np.stack(by_u, axis=1), atol=1e-9)
+
+
+def test_directions_are_measured_as_carriers_are_commanded():
+    """Carriers that move as directions say have cables of constant length, and give the directions back."""
+    robot, rng = load("multi-quadrotor-4"), np.random.default_rng(6)
+    tethers, carriers, coordinates = team_motion(robot, rng)
+    arrays = ComputedTorque(robot)._robot
+    motion = np.concatenate([0.3 * rng.normal(size=(3, 6)), 0.1 * rng.normal(size=(3, 8))], axis=1)
+    motion[0, 6:] = coordinates
+    commanded = np.zeros((4, 3, 6))
+    carriers_of()(arrays, tethers, motion, commanded)
+    np.testing.assert_allclose(commanded[:, 0, :3], carriers(motion[0, :6], coordinates)[:, :3], atol=1e-12)
+    both = np.concatenate([motion[None, :, :6], commanded])
+    found = np.zeros((1, 3, 8))
+    directions()(arrays, tethers, both.reshape(1, 5, 18), found)
+    np.testing.assert_allclose(found[0], motion[:, 6:], atol=1e-5)
+    for s in (-0.01, 0.0, 0.01):  # its second derivative over time is zero, so that the length changes by s^3
+        place = both[:, 0] + s * both[:, 1] + s**2 / 2 * both[:, 2]
+        lengths = Dynamics(robot).cable_lengths(place[0], place[1:])
+        np.testing.assert_allclose(lengths, robot.fixed_lengths, atol=20 * abs(s) ** 3 + 1e-9)
+
+
+def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_than_in_its_file():
+    """At 1 m/s and 1 m/s^2: what is measured as thrust is what the quadrotor with 30 % more mass needs more."""
+    robot = load("multi-quadrotor-3")
+    line = {"kind": "line", "start": [0, 0, 0], "end": [2, 0, 0.2]}
+    made = plan(robot, {"path": line, "duration": 3.6, "base": {"kind": "free"}, "steps": 25})
+    first, *others = robot.carriers
+    lighter = robot.model_copy(update={"carriers": (first.model_copy(update={"mass": first.mass / 1.3}), *others)})
+    push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
+    heavy = simulate(robot, made, controller=Predictive(lighter))
+    assert heavy.error.max() < 3e-3
+    pushed = [simulate(robot, made, controller=law(lighter), disturbance=push) for law in (Predictive, ComputedTorque)]
+    rms = [np.sqrt((flight.error**2).mean()) for flight in pushed]
+    assert rms[0] < 0.03
+    assert rms[0] < 0.25 * rms[1]
+    assert pushed[0].error[-1] < 2e-3
+    assert pushed[0].answered["as planned"] > 0.99 * len(pushed[0].error)
+
+
 @pytest.mark.parametrize(("name", "reach"), [("cogiro", (0.0, 0.0)), ("wang-flying", (0.5, 0.0))])
 def test_gusts_move_the_platform_a_fifth_as_far_as_with_computed_torque(name, reach):
     robot = load(name)
@@ -86,7 +174,10 @@ def test_a_motion_whose_acceleration_changes_within_stages_is_followed():
     assert simulate(robot, made, controller=Predictive(robot)).error.max() < 1e-4
 
 
-@pytest.mark.parametrize(("name", "reach"), [("cogiro", (0.0, 0.0)), ("wang-flying", (0.3, 0.2)), ("planar-4", (0, 0))])
+@pytest.mark.parametrize(
+    ("name", "reach"),
+    [("cogiro", (0.0, 0.0)), ("wang-flying", (0.3, 0.2)), ("planar-4", (0, 0)), ("multi-quadrotor-3", (0.3, 0))],
+)
 def test_every_state_is_answered_inside_limits_and_rates(name, reach):
     """Kicked, far off, at an anchor, with numbers that are none, and after pauses."""
     robot, rng = load(name), np.random.default_rng(4)
@@ -168,7 +259,10 @@ def test_nothing_is_planned_where_residuals_are_no_numbers(monkeypatch):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"robot": "multi-quadrotor-3"}, "robot must have winches, got 'multi-quadrotor-3'"),
+        (
+            {"robot": "flycrane"},
+            "robot must have one cable of fixed length on each carrier, got 'flycrane' with 2 on 'quad1'",
+        ),
         ({"bandwidth": np.nan}, "bandwidth"),
         ({"stages": 0}, "stages"),
         ({"stage": 0}, "stage"),
