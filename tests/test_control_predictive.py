@@ -150,6 +150,34 @@ def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_tha
     assert pushed[0].answered["as planned"] > 0.99 * len(pushed[0].error)
 
 
+def test_a_motion_is_flown_that_runs_out_of_tensions_step_by_step():
+    """1 m of each coordinate in 0.95 s is too fast for caroca: there are wrenches that no tensions inside limits give.
+
+    A controller of the same bandwidth that knows only now comes to such a wrench, proven by a direction in which all
+    tensions together give less, and is off by more than 20 cm.
+    """
+    robot, proofs = load("caroca"), []
+
+    class Witness(ComputedTorque):
+        def step(self, time, state, reference):
+            command = super().step(time, state, reference)
+            if ANSWERS[command.answered] == "soft wrench":
+                proofs.append((self.problems.A[0].copy(), self.problems.w[0].copy(), command))
+            return command
+
+    line = {"kind": "line", "start": robot.home[:3].tolist(), "end": (robot.home[:3] + 1).tolist()}
+    ahead = simulate(robot, line, duration=0.95, controller=Predictive(robot))
+    blind = simulate(robot, line, duration=0.95, controller=Witness(robot, bandwidth=40, observer=60))
+    assert ahead.passed
+    assert ahead.answered["as planned"] == 950
+    assert ((ahead.record.commanded >= robot.t_min) & (ahead.record.commanded <= robot.t_max)).all()
+    assert not blind.passed
+    assert ahead.error.max() < 0.05 < 0.2 < blind.error.max()
+    A, w, command = proofs[0]
+    most = np.maximum(command.direction @ A * robot.t_min, command.direction @ A * robot.t_max).sum()
+    assert command.direction @ w - most > 0.9 * command.shortfall > 0
+
+
 @pytest.mark.parametrize(("name", "reach"), [("cogiro", (0.0, 0.0)), ("wang-flying", (0.5, 0.0))])
 def test_gusts_move_the_platform_a_fifth_as_far_as_with_computed_torque(name, reach):
     robot = load(name)
