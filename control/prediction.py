@@ -6,7 +6,8 @@ the disturbance d and H ddx + h = w(x, dx, ddx),
 
     ddx = H^-1 (A(x) t + d - h(x, dx))
 
-which is constant during a stage, so that x moves by dt dx + dt^2 ddx / 2. Derivatives are quotients of differences.
+which is constant during a stage, so that x moves by dt dx + dt^2 ddx / 2. Its derivatives are H^-1 times those of
+A(x) t - w(x, dx, ddx) with ddx as it is, which are quotients of differences.
 """
 
 import numpy as np
@@ -44,7 +45,7 @@ def write_stages(robot, freed, tethers, dt, disturbance, carriers, states, contr
     A, B, c
         Results, (N, n, n), (N, n, u) and (N, n).
     """
-    bodies, cables, _, mask = robot
+    bodies, cables, settings, mask = robot
     count, m, free = bodies.shape[0], cables.shape[0], freed.shape[0] + 2 * tethers.shape[0]
     state = np.zeros(BODY * count + CABLE_BLOCKS * m)
     command = np.zeros(COMMANDS + m + CARRIER * count)
@@ -52,34 +53,43 @@ def write_stages(robot, freed, tethers, dt, disturbance, carriers, states, contr
     motion, matrix, vectors = np.zeros((count, 12)), np.zeros((6, m)), np.zeros((VECTORS, 6))
     at = (state, command, on_bodies, on_cables, motion, matrix, vectors)
     x, gains = np.zeros(12 + 2 * free), np.zeros((6, 12 + free))
-    here, there = np.zeros((6, 7 + m)), np.zeros((6, 7))
+    solved, acceleration = np.zeros((6, 13 + m)), np.zeros(6)
+    needed, missed, changed = np.zeros(6), np.zeros(6), np.zeros(6)
     for k in range(controls.shape[0]):
         for j in range(12 + 2 * free):
             x[j] = states[k, j]
-        write_equations(robot, freed, tethers, disturbance, carriers[k], x, controls[k], at, here)
+        put_robot(robot, freed, tethers, carriers[k], x, at)
+        write_equations(robot, disturbance, controls[k], at, solved)
+        solve_columns(solved)
         for i in range(6):
-            for j in range(m):
-                here[i, 7 + j] = matrix[i, j]
-        solve_columns(here)
+            acceleration[i] = solved[i, 6]
+        write_wrench(bodies, settings, state, acceleration, motion[0], on_bodies, needed, vectors[MOMENTUM])
+        write_missed(mask, matrix, controls[k], needed, missed)
         for j in range(12 + free):
-            # Neither velocities nor the coordinates that the platform does not have change accelerations.
-            if (j < 12 and mask[j % 6] == 0.0) or (6 <= j < 9):
-                for i in range(6):
-                    gains[i, j] = 0.0
+            for i in range(6):
+                gains[i, j] = 0.0
+            # Neither velocities nor the coordinates that the platform does not have change accelerations, nor do
+            # places where all carriers move along.
+            if (j < 12 and mask[j % 6] == 0.0) or 6 <= j < 9 or (j < 3 and tethers.shape[0] > 0):
                 continue
             x[j] += STEP
-            write_equations(robot, freed, tethers, disturbance, carriers[k], x, controls[k], at, there)
+            put_robot(robot, freed, tethers, carriers[k], x, at)
             x[j] = states[k, j]
-            solve_columns(there)
+            tried = needed  # which places alone do not change
+            if 3 <= j < 12:
+                tried = vectors[TRIED]
+                write_wrench(bodies, settings, state, acceleration, motion[0], on_bodies, tried, vectors[MOMENTUM])
+            write_missed(mask, matrix, controls[k], tried, changed)
             for i in range(6):
-                gains[i, j] = (there[i, 6] - here[i, 6]) / STEP
-        write_stage(here, gains, m, free, dt[k], states[k], controls[k], A[k], B[k], c[k])
+                for other in range(6):
+                    gains[i, j] += solved[i, 7 + m + other] * (changed[other] - missed[other]) / STEP
+        write_stage(solved, gains, m, free, dt[k], states[k], controls[k], A[k], B[k], c[k])
 
 
-def write_equations(robot, freed, tethers, disturbance, carriers, x, control, at, equations):
-    """Write H and, in column 6, A t + d - h, with ones in H where the platform has no freedom, for a state (n,)."""
+def put_robot(robot, freed, tethers, carriers, x, at):
+    """Put bodies and cables where a state (n,) has them, and write the wrench matrix."""
     bodies, cables, settings, mask = robot
-    state, command, on_bodies, on_cables, motion, matrix, vectors = at
+    state, command, on_bodies, on_cables, motion, matrix, _ = at
     m, free = cables.shape[0], freed.shape[0] + 2 * tethers.shape[0]
     for j in range(12):
         motion[0, j] = x[j]
@@ -96,7 +106,14 @@ def write_equations(robot, freed, tethers, disturbance, carriers, x, control, at
     put_tethered(tethers, cables, state, on_bodies, x[12 + freed.shape[0] :])
     run_cables(cables, state, on_bodies, on_cables, BODY * bodies.shape[0])
     write_wrench_matrix(mask, on_cables, matrix)
+
+
+def write_equations(robot, disturbance, control, at, equations):
+    """Write H, with ones where the platform has no freedom, and right of it A t + d - h, A and the unit matrix."""
+    bodies, _, settings, mask = robot
+    state, _, on_bodies, _, motion, matrix, vectors = at
     unit, tried, bias = vectors[UNIT], vectors[TRIED], vectors[BIAS]
+    m = matrix.shape[1]
     write_wrench(bodies, settings, state, unit, motion[0], on_bodies, bias, vectors[MOMENTUM])
     for j in range(6):
         unit[j] = 1.0
@@ -104,11 +121,22 @@ def write_equations(robot, freed, tethers, disturbance, carriers, x, control, at
         unit[j] = 0.0
         for i in range(6):
             equations[i, j] = mask[i] * mask[j] * (tried[i] - bias[i])
+            equations[i, 7 + m + j] = 0.0
         equations[j, j] += 1.0 - mask[j]
+        equations[j, 7 + m + j] = 1.0
     for i in range(6):
         equations[i, 6] = mask[i] * (disturbance[i] - bias[i])
         for j in range(m):
             equations[i, 6] += matrix[i, j] * control[j]
+            equations[i, 7 + j] = matrix[i, j]
+
+
+def write_missed(mask, matrix, control, needed, missed):
+    """Write what tensions give of a wrench that is needed, less that wrench."""
+    for i in range(6):
+        missed[i] = -mask[i] * needed[i]
+        for j in range(matrix.shape[1]):
+            missed[i] += matrix[i, j] * control[j]
 
 
 def solve_columns(equations):
