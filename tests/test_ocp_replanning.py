@@ -41,11 +41,13 @@ def circle():
 def test_the_rest_starts_as_measured_and_ends_where_and_when_the_whole_does():
     planner = Planner(ROBOT, CIRCLE)
     whole = planner.plan()
+    planner.replan(state_of(whole, 0.0), 0.0)  # builds the program, with a robot that is not off its path
     times, centre, rate = [1.0, 1.4, 6.0], np.array([50, 50, 99]), 0.2 * np.pi
     for time in times:
         state = state_of(whole, time, OFF, CARRIER_OFF)
         rest = planner.replan(state, time, settle=1.5)
         assert rest.feasible
+        assert [stage.name for stage in rest.stages] == ["nonlinear program, 100 steps", "audit"]
         poses, velocities = start_of(rest)
         np.testing.assert_allclose(poses, [state.pose, *state.carrier_pose], atol=1e-9)
         np.testing.assert_allclose(velocities, [state.velocity, *state.carrier_velocity], atol=1e-5)
