@@ -348,7 +348,8 @@ def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def positive(name: str, value: Any, size: int) -> np.ndarray:
     """Return numbers from 0 on, one or `size` of them, as (size,)."""
-    result = as_array(name, value, () if np.ndim(value) == 0 else (size,))
+    alone = np.isscalar(value) or getattr(value, "ndim", 1) == 0  # not np.ndim, which raises for unequal rows
+    result = as_array(name, value, () if alone else (size,))
     if result.ndim > 1 or not ((result >= 0) & (result <= 1e9)).all():
         raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")
     return np.broadcast_to(result, size)

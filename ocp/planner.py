@@ -24,10 +24,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs import shown
 from ..models import Robot
 from ..models.files import as_robot
-from ..models.parsing import validate
 from ..text import quantity
 from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .blocked import blocked
@@ -39,9 +37,10 @@ from .global_path.space import Space
 from .homotopy import from_easier
 from .nlp.guess import formation_guess, usual_guess
 from .nlp.rows import Mesh
-from .nlp.solver import Progress, Solver
+from .nlp.solver import Progress, Solver, check_progress
 from .refinement import refine
 from .relaxations import near_fixed_motion, near_motion
+from .replanning import Replanner
 from .result import Plan
 from .search import Search
 from .start import deviation_from
@@ -50,6 +49,7 @@ from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
 from .tasks.initial import Initial
 from .tasks.lay_out import lay_out
+from .tasks.measured import Measured, initial_of
 from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
 from .tasks.task import Task, read_task
@@ -66,7 +66,7 @@ def plan(
     task: Task | dict[str, Any] | str | os.PathLike[str],
     progress: Progress | None = None,
     start: Plan | Timing | AnyPath | dict[str, Any] | None = None,
-    initial: Initial | dict[str, Any] | None = None,
+    initial: Initial | Measured | dict[str, Any] | None = None,
 ) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
@@ -89,7 +89,8 @@ def plan(
         Where to start: a plan of the same robot for a similar task, a timing, or a path for the platform (or a mapping
         with its keys) in the frame of the task's path. Default: a guess of the planner's own.
     initial
-        The measured state from which the motion starts, or a mapping with its keys, instead of the task's `initial`.
+        The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a mapping with
+        its keys, or a `control.State`.
 
     Returns
     -------
@@ -106,8 +107,8 @@ def plan(
     """
     read = read_task(task)
     if initial is not None:
-        state = initial if isinstance(initial, Initial) else validate(initial, Initial, "initial")
-        read = read.model_copy(update={"initial": state})
+        scenario = lay_out(as_robot(robot), read.model_copy(update={"initial": None}))
+        read = read.model_copy(update={"initial": initial_of(scenario, initial)})
     return Planner(robot, read).plan(progress, start)
 
 
@@ -132,6 +133,7 @@ class Planner:
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
+        self._flown: Plan | Replanner | None = None  # what `replan` goes on from
 
     @property
     def interrupted(self) -> Plan | None:
@@ -154,15 +156,61 @@ class Planner:
         InputError
             If `progress` is not a function, or `start` does not fit.
         """
-        if progress is not None and not callable(progress):
-            accepted = "a function of (iteration, objective, infeasibility)"
-            raise InputError(f"progress must be {accepted}, got {shown(progress)}")
+        check_progress(progress)
         self._search = search = Search(self.scenario, self._solvers, progress)
         guess = None if start is None else deviation_from(self.scenario, start)
         plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))
         self._search = None
         if plan.feasible and plan.deviation is not None and search.mesh is not None:
             self._last = search.mesh, plan.deviation
+        self._flown = plan if plan.feasible else None
+        return plan
+
+    def replan(
+        self,
+        state: Initial | Measured | dict[str, Any],
+        time: float,
+        settle: float = 1.0,
+        progress: Progress | None = None,
+    ) -> Plan:
+        """Plan the rest of the motion from where the robot is; it ends where and when the motion of `plan` does.
+
+        The new plan starts with the measured pose and velocity of the platform, and of carriers that the planner moves.
+        Its path is the rest of the task's, plus what the robot is off its last plan: that decays, so the platform is
+        back on its path or in its tube after `settle`. If the state has tensions, the plan starts with them, and with
+        the acceleration that they give; else with the acceleration of the last plan. Times of the new plan start at 0,
+        at `time` of the whole motion.
+
+        Parameters
+        ----------
+        state
+            A `control.State`, or an `Initial` or a mapping with its keys.
+        time
+            Since the start of the motion of `plan` [s]: not earlier than that of the last call that led to a plan.
+        settle
+            How long the offset decays [s]; at most, what is left.
+        progress
+            As for `plan`.
+
+        Returns
+        -------
+        Plan
+            As of `plan`. One that is not feasible does not count: the next call goes on from the plan before.
+
+        Raises
+        ------
+        InputError
+            If there is no feasible plan yet, if the task has phases, exact waypoints or a path in the frame of a
+            carrier, or if an argument does not fit.
+        """
+        check_progress(progress)
+        if self._flown is None:
+            raise InputError("replan must be called after a plan that is feasible, got none")
+        if isinstance(self._flown, Plan):
+            self._flown = Replanner(self._flown, partial(_climb, last=None))
+        self._search, guess = self._flown.search(state, time, settle, progress)
+        plan = self._flown.plan(self._search, guess, time)
+        self._search = None
         return plan
 
 

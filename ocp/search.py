@@ -31,6 +31,7 @@ __all__ = ["Search"]
 
 NEAR = 0.3  # of a motion's extent: where a place is, of which a program has rows the first time
 PASSES = 3
+MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
 APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
 USABLE = 1e-2  # of it: what the true program makes up for
 FOR_AUDIT, MOST_FOR_AUDIT = 0.1, 2.0  # of the time limit, and [s]: what is kept for the audit of the best motion
@@ -133,6 +134,25 @@ class Search:
             stage.message = f"{how} {'in' if how == 'solved' else 'after'} {outcome.iterations} iterations"
             if mesh.elastic:
                 stage.message += f", short by {quantity(outcome.slack, 'N')}"
+        return outcome
+
+    def solve_again(self, mesh: Mesh, guess: Deviation) -> Outcome:
+        """Solve the program with parameters of `mesh` from a guess near its last solution, of another scenario."""
+        with self.stage(f"nonlinear program, {mesh.steps} steps") as stage:
+            start, self.mesh = time.perf_counter(), mesh
+            if mesh in self._solvers:
+                solver = self._solvers[mesh]
+                solver.take(self.scenario)
+            else:
+                solver = self._solvers[mesh] = wait_for(
+                    lambda: Solver(build(self.scenario, mesh, movable=True), MOST_AGAIN)
+                )
+            built = time.perf_counter()
+            outcome = solver.solve(guess, self._iteration, False, self.seconds_left, near=True)
+            self.solve_s += time.perf_counter() - built
+            solver.prepare(None, near=True)  # for the next one
+            self.build_s += built - start
+            stage.message = f"{ended(outcome.message)} in {outcome.iterations} iterations"
         return outcome
 
     def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:

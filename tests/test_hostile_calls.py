@@ -146,6 +146,12 @@ def a_plan() -> towline.Plan:
     return plan(ROBOT, TASK)
 
 
+def a_planner() -> Planner:
+    planner = Planner(ROBOT, TASK)
+    planner.plan()
+    return planner
+
+
 def a_state() -> State:
     return State(robot().home, np.zeros(6), np.zeros((1, 6)), np.zeros((1, 6)))
 
@@ -270,6 +276,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "ComputedTorque.attitude": lambda: 40.0,
     "patience": lambda: 0.05,
     "time": lambda: 0.0,
+    "settle": lambda: 1.0,
     "state": a_state,
     "reference": a_reference,
     "vary": lambda: {"margin": [0, 1]},
@@ -333,7 +340,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "ComputedTorque": lambda: ComputedTorque(ROBOT),
     "Predictive": lambda: Predictive(ROBOT),
     "Flight": lambda: towline.simulate(ROBOT, robot().home, duration=0.02),
-    "Planner": lambda: Planner(ROBOT, TASK),
+    "Planner": a_planner,
     "Plan": a_plan,
     "Timing": time_law,
     "Sweep": a_sweep,

@@ -17,7 +17,7 @@ from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
 from .by_phase import distribution, taken_up
-from .checks import AuditedMotion, excesses
+from .checks import START_TENSIONS, AuditedMotion, excesses
 from .drift import Drift, drift
 from .excess import Excess
 from .jumps import jumped_over
@@ -168,7 +168,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
 def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:
     """Return whether the same motion with other tensions may pass, if this audit did not."""
     exceeded = {excess.limit for excess in audit.excess}
-    if audit.violation.max() > audit.tolerance or not exceeded <= scenario.limits.of_tensions:
+    if audit.violation.max() > audit.tolerance or not exceeded <= scenario.limits.of_tensions | {START_TENSIONS}:
         return False
     return other_tensions_exist(scenario, audit)
 

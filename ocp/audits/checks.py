@@ -16,11 +16,13 @@ from ...models.part import COORDINATES
 from ..tasks.deviation import Deviation
 from ..tasks.ends import at_rest_without_acceleration, carrier_ends, platform_ends
 from ..tasks.paths import Motion, WaypointPath
-from ..tasks.scenario import ATTITUDE, POSITION, Scenario
+from ..tasks.scenario import ATTITUDE, POSITION, START_BAND, Scenario
 from ..tasks.task import FreeBase
 from .excess import Excess
 
-__all__ = ["END_TOLERANCE", "UNDERACTUATED_TOLERANCE", "AuditedMotion", "excesses"]
+__all__ = ["END_TOLERANCE", "START_TENSIONS", "UNDERACTUATED_TOLERANCE", "AuditedMotion", "excesses"]
+
+START_TENSIONS = "initial.tensions"
 
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 PATH_TOLERANCE = 1e-7  # [m, rad], of ends and waypoints
@@ -128,23 +130,37 @@ def _lengths(audited: AuditedMotion) -> list[Excess]:
 
 
 def _initial(audited: AuditedMotion) -> list[Excess]:
-    """Check that the motion starts as measured."""
-    initial, exceeded = audited.scenario.task.initial, list[Excess]()
-    if initial is None:
-        return exceeded
+    """Check that the motion starts as measured, and ends in the state that the task gives."""
+    task, exceeded = audited.scenario.task, list[Excess]()
     bodies: list[tuple[int | None, str, Motion]] = [(None, "platform", audited.motion)]
     for i, carrier in enumerate(audited.scenario.robot.carriers):
         bodies.append((i, carrier.name, Motion(*(part[:, i] for part in audited.carriers))))
-    for owner, about, motion in bodies:
-        for order, value in initial.of(owner):
-            off = motion[order][0] - np.array(value)
-            if order == 0:
-                off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
-            if not (worst := float(np.abs(off).max())) <= END_TOLERANCE:
-                unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
-                why = "away from the measured start"
-                exceeded.append(Excess("initial", about, 0.0, worst, 0.0, unit, "exactly", why))
-    return exceeded
+    for end, name, state in ((0, "initial", task.initial), (-1, "final", task.final)):
+        for owner, about, motion in bodies if state is not None else []:
+            for order, value in state.of(owner) if state is not None else ():
+                off = motion[order][end] - np.array(value)
+                if order == 0:
+                    off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
+                if not (worst := float(np.abs(off).max())) <= END_TOLERANCE:
+                    unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
+                    why = f"away from the {'given end' if end else 'measured start'}"
+                    time = float(audited.times[end])
+                    exceeded.append(Excess(name, about, time, worst, 0.0, unit, "exactly", why))
+    return exceeded + _start_tensions(audited)
+
+
+def _start_tensions(audited: AuditedMotion) -> list[Excess]:
+    """Check that the tensions start as measured."""
+    scenario, first = audited.scenario, audited.tensions[0]
+    measured = scenario.start_tensions
+    if measured is None or not np.isfinite(first).all():
+        return []
+    off = np.abs(first - measured)
+    worst = int(off.argmax())
+    if off[worst] <= 2 * START_BAND * scenario.robot.force_scale:
+        return []
+    facts = (float(first[worst]), float(measured[worst]), "N", "exactly", "measured at the start")
+    return [Excess(START_TENSIONS, f"cable {worst + 1}", 0.0, *facts)]
 
 
 def _tube_ends(audited: AuditedMotion) -> list[Excess]:
@@ -153,8 +169,9 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
     word = platform_ends(scenario.task)
     if word not in ("rest", "exact"):
         return []
-    starts = [(0.0, 1.0)] if scenario.task.initial is None else []
-    for end, inwards in (*starts, (scenario.duration, -1.0)):
+    ends = [(0.0, 1.0)] if scenario.task.initial is None else []
+    ends += [(scenario.duration, -1.0)] if scenario.task.final is None or scenario.task.final.pose is None else []
+    for end, inwards in ends:
         steps = inwards * np.array([0.0, STEP, 2 * STEP, *(CURVED_STEP * np.arange(1, 4))])
         at, near, far, *further = _off_path(audited, end + steps)
         speed = (-3 * at + 4 * near - far) / (2 * inwards * STEP)
@@ -209,8 +226,10 @@ def _base_ends(audited: AuditedMotion) -> list[Excess]:
         return []
     exceeded = []
     moving = sorted({index for index, _ in scenario.carrier_free})
-    initial = scenario.task.initial
-    ends = [0, -1] if initial is None or initial.carrier_pose is None else [-1]
+    states = (0, scenario.task.initial), (-1, scenario.task.final)
+    ends = [end for end, state in states if state is None or state.carrier_pose is None]
+    if not ends:
+        return []
     if word == "rest":
         _, speeds, accelerations = audited.carriers
         off = [np.abs(speeds[end, moving]).max() for end in ends]

@@ -24,17 +24,22 @@ class Columns:
     scheme
         Which selects points and groups them into intervals.
     references
-        The reference motions at all points, (18 (1 + c), points).
+        The reference motions at all points, (18 (1 + c), points), as numbers or parameters.
     carried
         Loads and columns of the ground, (., nodes).
     intervals
-        `Grid.intervals`, (2, steps).
+        `Grid.intervals`, (2, steps), as numbers or parameters.
     """
 
     def __init__(
-        self, unknowns: Unknowns, scheme: Scheme, references: np.ndarray, carried: np.ndarray, intervals: np.ndarray
+        self,
+        unknowns: Unknowns,
+        scheme: Scheme,
+        references: ca.DM | ca.MX,
+        carried: np.ndarray,
+        intervals: ca.DM | ca.MX,
     ):
-        X, given, size = unknowns.columns, ca.DM(references), scheme.size
+        X, given, size = unknowns.columns, references, scheme.size
         self.nodes = scheme.balance_points(intervals.shape[1])
         nodes = self.nodes.tolist()
         self._of_nodes = {"x": X[:, nodes], "p": given[:, nodes], "carried": ca.DM(carried)}
@@ -43,7 +48,7 @@ class Columns:
             "x_end": unknowns.ends,
             "p": _groups(given, size),
             "p_end": given[:, size::size],
-            "grid": ca.DM(intervals),
+            "grid": intervals,
         }
         self._at_nodes: np.ndarray | None = None
         self._between: np.ndarray | None = None

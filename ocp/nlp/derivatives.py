@@ -23,7 +23,7 @@ class Mapped(NamedTuple):
     Attributes
     ----------
     function
-        Its first inputs are unknowns, the others numbers; its one output is a column.
+        Its first inputs are unknowns, the others numbers or parameters; its one output is a column.
     inputs
         (., k) each.
     places
@@ -50,7 +50,7 @@ class Mapped(NamedTuple):
         """Return symbols for one set of inputs, those that are unknown as one column, and the values."""
         function = self.function
         inputs = [ca.SX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
-        unknown = ca.vertcat(*(part for k, part in enumerate(inputs) if isinstance(self.inputs[k], ca.MX)))
+        unknown = ca.vertcat(*inputs)[: len(self._places)]
         return inputs, unknown, function(*inputs)
 
     def slopes(self, width: int) -> ca.MX:

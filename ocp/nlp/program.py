@@ -19,7 +19,7 @@ rows are put in order (`stages`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -28,9 +28,9 @@ import numpy as np
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values
-from ..tasks.paths import WaypointPath
+from ..tasks.paths import RestPath, WaypointPath
 from ..tasks.resting import known_tensions
-from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
 from ..tasks.scheme import Scheme
 from .columns import Columns
 from .derivatives import Block, Mapped, derivatives
@@ -67,6 +67,8 @@ class Program:
         The rows of g, in their order if the program is not ordered by stages.
     local
         How many of the first blocks are of local limits.
+    parameters
+        Values of the parameters of `problem`; None if it has none.
     """
 
     scenario: Scenario
@@ -84,6 +86,18 @@ class Program:
     costs: list[tuple[Mapped, np.ndarray]]
     blocks: list[Block]
     local: int
+    parameters: np.ndarray | None = None
+
+    def of(self, scenario: Scenario) -> Program:
+        """Return the program, which has parameters, of another scenario that differs in its references and ends only.
+
+        The duration may be another one too.
+        """
+        times = self.shares * scenario.duration
+        lower, upper = _simple_bounds(scenario, self.mesh, self.layout, times)
+        parameters = _values(_parameters(scenario, times), scenario.duration / self.mesh.steps)
+        bounds = {"lower": lower[self.order], "upper": upper[self.order]}
+        return replace(self, scenario=scenario, parameters=parameters, **bounds)
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Return the unknowns of each point, one row per point, zero where a point does not have one."""
@@ -154,19 +168,27 @@ class Program:
         return columns.ravel()[self.order]
 
 
-def build(scenario: Scenario, mesh: Mesh, near: Near | None = None) -> Program:
-    """Build the nonlinear program of `scenario` on `mesh`, with local limits where they are `near`; default: all."""
+def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: bool = False) -> Program:
+    """Build the nonlinear program of `scenario` on `mesh`, with local limits where they are `near`; default: all.
+
+    A `movable` one has the references and the length of the intervals as parameters (`Program.of`).
+    """
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
     grid, at_nodes = Grid.of(scenario, steps), scheme.balance_points(steps)
     near = near or Near.everywhere(scenario, grid.shares)
     times = grid.shares * scenario.duration
     references, carried = _parameters(scenario, times), _carried(scenario, times[at_nodes])
-    node = node_of(scenario, mesh, layout, references, carried)
-    interval = interval_of(scenario, mesh, layout, references, grid.intervals)
+    p, given, intervals = None, ca.DM(references), ca.DM(grid.intervals)
+    shown, lengths = references, grid.intervals
+    if movable:
+        p, given, intervals = _as_parameters(references.shape, steps)
+        shown, lengths = _made_to_vary(scenario, references), np.hstack([lengths, lengths * [[2.0], [1.0]]])
+    node = node_of(scenario, mesh, layout, shown, carried)
+    interval = interval_of(scenario, mesh, layout, shown, lengths)
     arrange = stage_by_stage if scenario.task.solver == "fatrop" else all_at_once
     unknowns = arrange(scenario, layout, grid, interval.flow)
     X, X_end = unknowns.columns, unknowns.ends
-    columns = Columns(unknowns, scheme, references, carried, grid.intervals)
+    columns = Columns(unknowns, scheme, given, carried, intervals)
     costs = [
         (columns.at_nodes(node.cost), grid.weights[at_nodes]),
         (columns.between(interval.cost), grid.steps / scenario.duration),
@@ -191,7 +213,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None) -> Program:
         mesh=mesh,
         layout=layout,
         shares=grid.shares,
-        problem={"x": unknowns.x, "f": objective, "g": g},
+        problem={"x": unknowns.x, "f": objective, "g": g} | ({} if p is None else {"p": p}),
         lower=np.where(unknowns.copies, -np.inf, lower[unknowns.order]),
         upper=np.where(unknowns.copies, np.inf, upper[unknowns.order]),
         lower_g=np.array([row[1] for row in rows]),
@@ -202,7 +224,29 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None) -> Program:
         costs=costs,
         blocks=blocks,
         local=len(local),
+        parameters=None if p is None else _values(references, grid.steps[0]),
     )
+
+
+def _as_parameters(shape: tuple[int, int], steps: int) -> tuple[ca.MX, ca.MX, ca.MX]:
+    """Return the parameters of a movable program, and what they are: references, and `Grid.intervals`."""
+    count = shape[0] * shape[1]
+    p = ca.MX.sym("p", count + 1)
+    return p, ca.reshape(p[:count], *shape), ca.vertcat(ca.repmat(p[count], 1, steps), ca.DM.zeros(1, steps))
+
+
+def _values(references: np.ndarray, step: float) -> np.ndarray:
+    """Return the values of these parameters."""
+    return np.append(references.ravel(order="F"), step)
+
+
+def _made_to_vary(scenario: Scenario, references: np.ndarray) -> np.ndarray:
+    """Return references that are constant only where all motions of a movable program are: carriers without a path."""
+    varies = np.zeros((1 + len(scenario.robot.carriers), 18, 1))
+    varies[0] = 1.0
+    for index, path in scenario.carrier_paths.items():
+        varies[1 + index] = not isinstance(path, RestPath)
+    return np.hstack([references, references + varies.reshape(-1, 1)])
 
 
 def _near_rows(near: Near, scheme: Scheme, node: Node, interval: Interval, columns: Columns) -> list[Block]:
@@ -302,6 +346,9 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
     lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
     low, high = scenario.bounds_at(nodes)
     reserve = np.minimum(mesh.reserve, (high - low) / 4)
+    for end, state in ((0, scenario.task.initial), (-1, scenario.task.final)):
+        if state is not None:
+            reserve[end] = 0.0  # what is given there may be next to a limit
     for part, count in ((layout.tensions, 1), (layout.wind_tensions, layout.winds)):
         lower[:, part] = np.tile((low + reserve) / scenario.robot.force_scale, count)
         upper[:, part] = np.tile((high - reserve) / scenario.robot.force_scale, count)
@@ -314,6 +361,11 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
     for column, (owner, coordinate) in enumerate(scenario.owners()):
         if owner is None and coordinate in ATTITUDE:
             lower[:, column], upper[:, column] = -turn, turn
+    if (measured := scenario.start_tensions) is not None:
+        # A little freedom: where balance fixes the tensions, they would be fixed twice.
+        band, force = START_BAND, scenario.robot.force_scale
+        lower[0, layout.tensions] = np.maximum(low[0] / force, measured / force - band)
+        upper[0, layout.tensions] = np.minimum(high[0] / force, measured / force + band)
     for end, column, order, value in fixed_values(scenario):
         lower[end, order * n + column] = upper[end, order * n + column] = value
     _on_ground(scenario, layout, nodes, lower, upper)

@@ -12,15 +12,17 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...errors import SolverError
+from ...errors import InputError, SolverError
+from ...inputs import shown
 from ..tasks.deviation import Deviation
+from ..tasks.scenario import Scenario
 from .guess import initial_guess
 from .one_thread import run_in_one_thread
 from .program import Program
 from .rows import MANY
 from .waiting import Errands, wait_for
 
-__all__ = ["Outcome", "Progress", "Solver"]
+__all__ = ["Outcome", "Progress", "Solver", "check_progress"]
 
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
@@ -68,7 +70,13 @@ _FROM_A_SOLUTION = {
 }
 
 
+# Of a program whose parameters have changed a little: with the accuracy of others each would take two iterations more,
+# and the motions differ by less than the audit can tell. What constraints may miss is the same.
+_FROM_A_NEAR_SOLUTION = _FROM_A_SOLUTION | {"mu_init": 1e-7, "tol": 1e-6}
+
+
 _STARTS: dict[str, dict[str, Any]] = {
+    "near": _FROM_A_NEAR_SOLUTION,
     "motion": _FROM_A_MOTION,
     "coarser": _FROM_COARSER,
     "solution": _FROM_A_SOLUTION,
@@ -94,13 +102,17 @@ class Solver:
         """Return whether a run without a guess starts from the solution of the last one."""
         return self._last is not None
 
-    def prepare(self, guess: Deviation | None, coarser: bool = False) -> ca.Function:
+    def prepare(self, guess: Deviation | None, coarser: bool = False, near: bool = False) -> ca.Function:
         """Return the solver for a run from `guess`, made at the first call."""
-        own = "motion" if self._last is None else "solution"
-        start = own if guess is None else "coarser" if coarser else "motion"
+        own = "motion" if self._last is None else "near" if near else "solution"
+        start = own if near or guess is None else "coarser" if coarser else "motion"
         if start not in self._solvers:
             self._solvers[start] = self._make(_STARTS[start])
         return self._solvers[start]
+
+    def take(self, scenario: Scenario) -> None:
+        """Go on with another scenario, of which the program with parameters is one too (`Program.of`)."""
+        self.program = self._watch.program = self.program.of(scenario)
 
     def _make(self, start: dict[str, Any]) -> ca.Function:
         # What its check of the inputs warns of, more equations than unknowns, is an answer here: no solution.
@@ -146,12 +158,14 @@ class Solver:
         coarser: bool = False,
         seconds: float = np.inf,
         parameters: ca.DM | None = None,
+        near: bool = False,
     ) -> Outcome:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
         with the best that it has; fatrop does not. A run without a solution is a result, not an error. `parameters` are
-        those of the program, if it has any.
+        those of the program, if it has any; default: its own. A guess that is `near` the last solution starts with its
+        multipliers.
 
         Raises
         ------
@@ -167,15 +181,16 @@ class Solver:
             "lbg": program.lower_g,
             "ubg": program.upper_g,
         }
-        if parameters is not None:
-            start["p"] = parameters
-        nlp = self.prepare(guess, coarser)
-        if guess is not None or self._last is None:
-            if guess is None:
-                guess = initial_guess(program.scenario, program.shares * program.scenario.duration)
+        if parameters is not None or program.parameters is not None:
+            start["p"] = program.parameters if parameters is None else parameters
+        own = self._last if near or guess is None else None
+        nlp = self.prepare(guess, coarser, near)
+        if own is not None:
+            start |= {"x0": own["x"], "lam_x0": own["lam_x"], "lam_g0": own["lam_g"]}
+        elif guess is None:
+            guess = initial_guess(program.scenario, program.shares * program.scenario.duration)
+        if guess is not None:
             start["x0"] = program.pack(guess)
-        else:
-            start |= {"x0": self._last["x"], "lam_x0": self._last["lam_x"], "lam_g0": self._last["lam_g"]}
         watch.begin(progress, seconds)
         self.interrupted = None
         try:
@@ -221,6 +236,19 @@ class Solver:
         self._solvers = {}
 
 
+def check_progress(progress: Any) -> None:
+    """Check that a user's `progress` is a function or None.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    """
+    if progress is not None and not callable(progress):
+        accepted = "a function of (iteration, objective, infeasibility)"
+        raise InputError(f"progress must be {accepted}, got {shown(progress)}")
+
+
 def _checked(call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
     """Call CasADi, and turn its exceptions into a SolverError of one line."""
     try:
@@ -240,7 +268,7 @@ class _Watch(ca.Callback):
     def __init__(self, program: Program):
         super().__init__()
         self._sizes = {name: part.numel() for name, part in program.problem.items()}
-        self._program = program
+        self.program = program  # of which bounds and parameters may change between runs
         self.begin(None)
         self.construct("watch", {})
 
@@ -268,7 +296,7 @@ class _Watch(ca.Callback):
 
     def infeasibility(self, g: np.ndarray) -> float:
         """Return the largest violation of the constraints' bounds by their values g."""
-        return float(np.maximum(np.maximum(self._program.lower_g - g, g - self._program.upper_g), 0).max(initial=0.0))
+        return float(np.maximum(np.maximum(self.program.lower_g - g, g - self.program.upper_g), 0).max(initial=0.0))
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -295,7 +323,7 @@ class _Watch(ca.Callback):
         objective = float(f[0])
         self._keep(x, g, objective)
         # What making up for what g misses would change, to first order.
-        missed = g - np.clip(g, self._program.lower_g, self._program.upper_g)
+        missed = g - np.clip(g, self.program.lower_g, self.program.upper_g)
         # A product of such long vectors by `@` would start a thread of BLAS, which then waits at full load.
         if objective + (lam_g * missed).sum() < self._better():
             self._since = self.iteration
@@ -312,7 +340,7 @@ class _Watch(ca.Callback):
 
     def _keep(self, x: np.ndarray, g: np.ndarray, objective: float) -> None:
         """Keep the best iterate that meets all constraints."""
-        if self._program.violation(x, g) > MET or objective >= self.objective:
+        if self.program.violation(x, g) > MET or objective >= self.objective:
             return
         if objective < self._better():
             self._mark = objective

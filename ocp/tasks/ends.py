@@ -67,12 +67,14 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
         orders = [0] * (word == "exact" or (word == "rest" and owner is None and coordinate in POSITION))
         orders += [1] * (word in ("exact", "rest"))
         orders += [2] * (word == "rest" and at_rest_without_acceleration(scenario.robot, owner, coordinate))
-        measured = [] if task.initial is None else list(task.initial.of(owner))
-        for order, value in measured:
-            off = value[coordinate] - float(reference[order][0, coordinate])
-            turns = order == 0 and coordinate not in POSITION
-            yield FixedValue(0, column, order, remainder(off, 2 * np.pi) if turns else off)
-        for end in (-1,) if measured else (0, -1):
+        for end, state in ((0, task.initial), (-1, task.final)):
+            given = [] if state is None else list(state.of(owner))
+            for order, value in given:
+                off = value[coordinate] - float(reference[order][end, coordinate])
+                turns = order == 0 and coordinate not in POSITION
+                yield FixedValue(end, column, order, remainder(off, 2 * np.pi) if turns else off)
+            if given:
+                continue
             if owner is None and rests and rests[end]:
                 continue  # on the ground, where the platform rests on its path from node to node
             for order in orders:

@@ -1,4 +1,4 @@
-"""`Initial`: the state that a motion starts from, as measured on a robot that moves."""
+"""`Initial` and `Final`: the states that a motion starts from, as measured on a robot that moves, and ends in."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pydantic import Field
 
 from ...errors import InputError
 from ...models import Robot
-from ...models.part import Part, Pose
+from ...models.part import Finite, Part, Pose
 
-__all__ = ["Initial", "check_initial"]
+__all__ = ["Final", "Initial", "check_ends"]
 
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -29,6 +29,11 @@ class Initial(Part):
     carrier_velocity: tuple[Pose, ...] | None = Field(
         default=None, description="of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
     )
+    tensions: tuple[Finite, ...] | None = Field(
+        default=None,
+        description="of each cable [N]; those outside the limits count as the limit. With them the cables give the "
+        "acceleration at the start. Default: as the planner chooses",
+    )
 
     def of(self, owner: int | None) -> Iterator[tuple[int, Pose]]:
         """Yield what is given of the platform (None) or of a carrier: the order of the derivative, and the value."""
@@ -42,22 +47,66 @@ class Initial(Part):
             yield 1, STILL if self.carrier_velocity is None else self.carrier_velocity[owner]
 
 
-def check_initial(robot: Robot, initial: Initial, frame: str, where: str) -> None:
-    """Check that an initial state fits a robot and the frame of a path.
+class Final(Part):
+    """The state at the end of a motion, in {G}: what is given replaces what `tube.ends` and `base.ends` require."""
+
+    pose: Pose | None = Field(default=None, description="of the platform [m, rad]; default: as tube.ends requires")
+    velocity: Pose | None = Field(default=None, description="its time derivative; default: at rest, if pose is given")
+    acceleration: Pose | None = Field(default=None, description="the second one; default: as the planner chooses")
+    carrier_pose: tuple[Pose, ...] | None = Field(
+        default=None, description="of each carrier [m, rad]; default: as base.ends requires"
+    )
+    carrier_velocity: tuple[Pose, ...] | None = Field(
+        default=None, description="of each carrier; default: at rest, if carrier_pose is given"
+    )
+    carrier_acceleration: tuple[Pose, ...] | None = Field(
+        default=None, description="of each carrier; default: as the planner chooses"
+    )
+
+    def of(self, owner: int | None) -> Iterator[tuple[int, Pose]]:
+        """Yield what is given of the platform (None) or of a carrier: the order of the derivative, and the value."""
+        if owner is None:
+            parts = self.pose, self.velocity, self.acceleration
+        else:
+            rows = self.carrier_pose, self.carrier_velocity, self.carrier_acceleration
+            parts = tuple(None if part is None else part[owner] for part in rows)
+        pose, velocity, acceleration = parts
+        if pose is not None:
+            yield 0, pose
+            yield 1, STILL if velocity is None else velocity
+            if acceleration is not None:
+                yield 2, acceleration
+
+
+def check_ends(robot: Robot, initial: Initial | None, final: Final | None, frame: str, where: str) -> None:
+    """Check that an initial and a final state fit a robot and the frame of a path.
 
     Raises
     ------
     InputError
         Naming the field, what is accepted and the value.
     """
-    if frame != "world":
-        raise InputError(f"{where}: initial must be left out for a path in the frame of a carrier, {frame!r}")
     count = len(robot.carriers)
-    for name in ("carrier_pose", "carrier_velocity"):
-        rows = getattr(initial, name)
-        if rows is not None and len(rows) != count:
-            raise InputError(
-                f"{where}: initial.{name} must have a row for each of the {count} carriers, got {len(rows)}"
-            )
-    if initial.carrier_velocity is not None and initial.carrier_pose is None:
-        raise InputError(f"{where}: initial.carrier_velocity must be left out without initial.carrier_pose")
+    for name, state in (("initial", initial), ("final", final)):
+        if state is None:
+            continue
+        if frame != "world":
+            raise InputError(f"{where}: {name} must be left out for a path in the frame of a carrier, {frame!r}")
+        for field in ("carrier_pose", "carrier_velocity", "carrier_acceleration"):
+            rows = getattr(state, field, None)
+            if rows is None:
+                continue
+            if len(rows) != count:
+                raise InputError(
+                    f"{where}: {name}.{field} must have a row for each of the {count} carriers, got {len(rows)}"
+                )
+            if state.carrier_pose is None:
+                raise InputError(f"{where}: {name}.{field} must be left out without {name}.carrier_pose")
+    for field in ("velocity", "acceleration"):
+        if final is not None and final.pose is None and getattr(final, field) is not None:
+            raise InputError(f"{where}: final.{field} must be left out without final.pose")
+    tensions = None if initial is None else initial.tensions
+    if tensions is not None and len(tensions) != robot.m:
+        raise InputError(
+            f"{where}: initial.tensions must have a number for each of the {robot.m} cables, got {len(tensions)}"
+        )

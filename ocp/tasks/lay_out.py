@@ -18,7 +18,7 @@ from ..limits.limit import Rate
 from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
 from .ends import carrier_ends
-from .initial import check_initial
+from .initial import Final, Initial, check_ends
 from .lay_out_phases import lay_out_phases
 from .limit_list import limit_list
 from .paths import LinePath, WaypointPath
@@ -31,6 +31,7 @@ from .wind_set import WindBox
 __all__ = ["check_margin", "lay_out"]
 
 
+ENDING = ("waypoints", "samples", "sequence", "return")  # kinds of paths that end at a time of their own
 TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on their path
 
 
@@ -50,8 +51,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
     if isinstance(task.wind, WindBox):
         _feels_no_tensions(robot, where)
-    if task.initial is not None:
-        check_initial(robot, task.initial, task.path.frame, where)
+    check_ends(robot, task.initial, task.final, task.path.frame, where)
     limits = limit_list(robot, task)
     _fit_limits(robot, task, limits, where)
     opened = [*POSITION] * (task.tube.radius > 0) + [*ATTITUDE] * (task.tube.turn > 0)
@@ -68,7 +68,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         carrier_paths=carrier_paths(robot, task),
         duration=task.seconds,
     )
-    _check_start(scenario, where)
+    _check_start_and_end(scenario, where)
     _check_times(task, where)
     _check_waypoints(task, where)
     _check_transcription(task, limits, where)
@@ -155,6 +155,12 @@ def _check_transcription(task: Task, limits: Limits, where: str) -> None:
             f"{where}: solver must be ipopt if base.ends is periodic, got fatrop, which cannot couple the "
             "last stage to the first"
         )
+    if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
+        raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
+    if task.initial is not None and task.initial.tensions is not None and not SCHEMES[task.scheme].continuous:
+        raise InputError(
+            f"{where}: initial.tensions must be left out with the scheme {task.scheme!r}, which has none at the start"
+        )
     if SCHEMES[task.scheme].continuous:
         return
     rates = [(f"limits.{limit.name}", limit.high, limit.unit) for limit in limits if isinstance(limit, Rate)]
@@ -168,16 +174,21 @@ def _check_transcription(task: Task, limits: Limits, where: str) -> None:
         )
 
 
-def _check_start(scenario: Scenario, where: str) -> None:
-    """Refuse an initial state that differs from what the task fixes where the planner has no freedom."""
-    if scenario.task.initial is None:
-        return
-    platform, carriers = scenario.references(np.zeros(1))
+def _check_start_and_end(scenario: Scenario, where: str) -> None:
+    """Refuse initial and final states that differ from what the task fixes where the planner has no freedom."""
+    task = scenario.task
+    for end, key, state in ((0, "initial", task.initial), (-1, "final", task.final)):
+        if state is not None:
+            _check_state(scenario, where, end, key, state)
+
+
+def _check_state(scenario: Scenario, where: str, end: int, key: str, state: Initial | Final) -> None:
+    platform, carriers = scenario.references(np.array([0.0, scenario.duration]))
     bodies = [(None, "platform", platform), *((i, c.name, carriers[i]) for i, c in enumerate(scenario.robot.carriers))]
     for owner, name, reference in bodies:
-        for order, value in scenario.task.initial.of(owner):
+        for order, value in state.of(owner):
             for i, coordinate in enumerate(COORDINATES):
-                off = value[i] - float(reference[order][0, i])
+                off = value[i] - float(reference[order][end, i])
                 if order == 0 and i in ATTITUDE:
                     off = remainder(off, 2 * np.pi)
                 if (owner, i) not in scenario.owners() and abs(off) > TOLERANCE:
@@ -186,8 +197,8 @@ def _check_start(scenario: Scenario, where: str) -> None:
                     if owner is None and not scenario.robot.dof_mask[i]:
                         hint = f"{coordinate} is not one of the platform's degrees of freedom"
                     raise InputError(
-                        f"{where}: initial must have the {what}{coordinate} of the {name} that the task fixes at its "
-                        f"start, {value[i] - off:g}, got {value[i]:g}; {hint}"
+                        f"{where}: {key} must have the {what}{coordinate} of the {name} that the task fixes at its "
+                        f"{'end' if end else 'start'}, {value[i] - off:g}, got {value[i]:g}; {hint}"
                     )
 
 
@@ -219,12 +230,12 @@ def _check_times(task: Task, where: str) -> None:
                     "times of its own; paths of kind rest, line, and waypoints without times and dwell take a range"
                 )
     for name, path in paths.items():
-        end = path.natural_duration if path.kind in ("waypoints", "samples", "sequence") else None
+        end = path.natural_duration if path.kind in ENDING else None
         if end is not None and task.seconds > end * (1 + 1e-9):
             raise InputError(
                 f"{where}: duration must be at most {end:g} s, where the times of {name} end, got {task.seconds:g} s"
             )
-    end = task.path.natural_duration if task.path.kind in ("waypoints", "samples", "sequence") else None
+    end = task.path.natural_duration if task.path.kind in ENDING else None
     if end is not None and task.seconds < end * (1 - 1e-9):
         raise InputError(
             f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"

@@ -22,11 +22,12 @@ from .scheme import SCHEMES, Scheme
 from .task import Task
 from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
-__all__ = ["ATTITUDE", "AUDIT_RATE", "LEAST_INTERVALS", "MOST_SAMPLES", "POSITION", "Scenario"]
+__all__ = ["ATTITUDE", "AUDIT_RATE", "LEAST_INTERVALS", "MOST_SAMPLES", "POSITION", "START_BAND", "Scenario"]
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
 LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too
+START_BAND = 1e-4  # of the force scale: how far planned tensions may start from the measured ones
 MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 
@@ -142,6 +143,15 @@ class Scenario:
         low, high = self.bounds()
         return self._where_taut(times, low), np.tile(high, (len(times), 1))
 
+    @property
+    def start_tensions(self) -> np.ndarray | None:
+        """Return the tensions with which the motion starts, (m,) [N], inside their limits; None if they are free."""
+        initial = self.task.initial
+        if initial is None or initial.tensions is None:
+            return None
+        low, high = self.bounds_at(np.zeros(1))
+        return np.clip(initial.tensions, low[0], high[0])
+
     def t_min_at(self, times: np.ndarray) -> np.ndarray:
         """Return the smallest tensions at `times`, (n, m) [N]: zero where cables may be slack."""
         return self._where_taut(times, self.robot.t_min)
@@ -195,7 +205,7 @@ class Scenario:
         on_path = self.path.at(times, self.duration).pose
         pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
         off = pose - on_path
-        off[:, 3:] = np.arctan2(np.sin(off[:, 3:]), np.cos(off[:, 3:]))
+        off[:, 3:] -= 2 * np.pi * np.round(off[:, 3:] / (2 * np.pi))
         return off
 
     def _spread(self, value: np.ndarray, carrier: int | None) -> np.ndarray:

@@ -14,7 +14,7 @@ from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
 from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
 from ...models.ranges import PositiveRange
-from .initial import Initial
+from .initial import Final, Initial
 from .paths import AnyPath
 from .phase import Phase, path_of
 from .scheme import SchemeName
@@ -160,6 +160,7 @@ class Task(Part):
     initial: Initial | None = Field(
         default=None, description="measured state from which a robot that moves starts; default: as `ends` require"
     )
+    final: Final | None = Field(default=None, description="state in which the motion ends; default: as `ends` require")
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
     wind: Vector3 | WindBox | None = Field(
         default=None,

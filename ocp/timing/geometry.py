@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from ..tasks.paths import AnyPath, Curve, LinePath, SamplePath, SequencePath, TimedPath, WaypointPath
+from ..tasks.paths import AnyPath, Curve, LinePath, ReturnPath, SamplePath, SequencePath, TimedPath, WaypointPath
 
 __all__ = ["geometry"]
 
@@ -20,10 +20,12 @@ def geometry(path: AnyPath, *, alone: bool) -> Curve:
     Raises
     ------
     InputError
-        If a spline or samples turn so sharply that they must rest, or move nowhere, or for a sequence.
+        If a spline or samples turn so sharply that they must rest, or move nowhere, or for a sequence or a return.
     """
     if isinstance(path, SequencePath):
         raise InputError("path.kind must be that of one path to be timed, got sequence; time its parts one by one")
+    if isinstance(path, ReturnPath):
+        raise InputError("path.kind must be that of a whole path to be timed, got return")
     if isinstance(path, TimedPath):
         return path.along
     if isinstance(path, LinePath):

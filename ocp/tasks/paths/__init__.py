@@ -10,6 +10,7 @@ from .curve import Curve
 from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
+from .returning import ReturnPath
 from .samples import SamplePath
 from .sequence import SequencePath, SinglePath
 from .timed import TimedPath
@@ -24,6 +25,7 @@ __all__ = [
     "PathBase",
     "PoseOrPosition",
     "RestPath",
+    "ReturnPath",
     "SamplePath",
     "SequencePath",
     "SinglePath",
@@ -32,6 +34,6 @@ __all__ = [
 ]
 
 AnyPath: TypeAlias = Annotated[
-    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath | SequencePath,
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath | SequencePath | ReturnPath,
     Field(discriminator="kind"),
 ]

@@ -1,0 +1,76 @@
+"""`ReturnPath`: the rest of a path for a robot that is off it: the offset decays, then the path is followed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import override
+
+from ....models.part import NonNegative, Pose, Positive
+from .base import PathBase
+from .motion import Motion
+from .sequence import SequencePath, SinglePath
+
+__all__ = ["ReturnPath", "decay"]
+
+STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class ReturnPath(PathBase):
+    """The rest of a path from `start` on, plus an offset that decays to zero as a polynomial of degree 5.
+
+    `Planner.replan` makes such.
+    """
+
+    kind: Literal["return"]
+    path: Annotated[SinglePath | SequencePath, Field(discriminator="kind")] = Field(description="the whole path")
+    duration: Positive = Field(description="of the whole path [s]")
+    start: NonNegative = Field(description="time on the whole path at which this one starts [s]")
+    settle: Positive = Field(description="time after which the offset is zero [s]")
+    offset: Pose = Field(default=STILL, description="from the path at the start [m, rad]")
+    offset_velocity: Pose = Field(default=STILL, description="its time derivative at the start [m/s, rad/s]")
+    offset_acceleration: Pose = Field(default=STILL, description="the second one [m/s^2, rad/s^2]")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.frame != self.path.frame:
+            raise ValueError(f"frame must be that of path, {self.path.frame!r}, got {self.frame!r}")
+        if not self.start < self.duration:
+            raise ValueError(f"start must be less than duration, {self.duration:g} s, got {self.start:g} s")
+        if self.settle > (self.duration - self.start) * (1 + 1e-9):
+            left = self.duration - self.start
+            raise ValueError(f"settle must be at most the {left:g} s that are left, got {self.settle:g} s")
+        return self
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return self.duration - self.start
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        offset = np.array([self.offset, self.offset_velocity, self.offset_acceleration])
+        motion = self.path.at(times + self.start, self.duration)
+        early, off = times < self.settle, np.zeros((3, len(times), 6))
+        off[:, early] = decay(times[early], self.settle, offset)
+        return motion.plus(off)
+
+
+def decay(times: np.ndarray, settle: float, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a value and its first two derivatives at `times`, (n, k) each, which are zero from `settle` [s] on.
+
+    They start as `offset` (3, k), and the value is (1 - s)^3 (c0 + c1 s + c2 s^2) with s = t / settle.
+    """
+    c0, rate, bend = offset
+    c1 = settle * rate + 3 * c0
+    c2 = settle**2 * bend / 2 + 3 * settle * rate + 6 * c0
+    s = np.minimum(times / settle, 1.0)[:, None]
+    left = 1 - s
+    g, slope, curve = c0 + s * (c1 + s * c2), c1 + 2 * s * c2, 2 * c2
+    return (
+        left**3 * g,
+        left**2 * (left * slope - 3 * g) / settle,
+        left * (6 * g - 6 * left * slope + left**2 * curve) / settle**2,
+    )
