@@ -1,4 +1,4 @@
-"""What a predictive controller moves of the carriers: coordinates that they leave, or directions of fixed cables."""
+"""What a predictive controller moves of the carriers: where they leave their reference, or what cables leave them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,19 @@ from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 from .machine import carriers_of, directions
 from .pending import Pending
-from .tethers import AXES, CABLE, LENGTH, TETHER_COLUMNS
+from .tethers import (
+    AT_HOME,
+    AXES,
+    CABLES,
+    FARTHEST,
+    HELD,
+    LENGTHS_OF,
+    TETHER_COLUMNS,
+    WHICH,
+    coordinates_of,
+)
+
+SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
 
 __all__ = ["Flown", "Freed", "Moved", "Tethered"]
 
@@ -23,11 +35,11 @@ class Moved(Protocol):
     Attributes
     ----------
     freed
-        (f, 2), carrier and coordinate of each that may leave the reference.
+        Carrier and coordinate of each that may leave the reference, (f, 2) or (0, 2).
     tethers
-        (k, TETHER_COLUMNS), the cables of fixed length, with two coordinates each.
+        (k, TETHER_COLUMNS), the carriers that cables of fixed length hold.
     count
-        How many there are, f + 2 k.
+        How many coordinates there are, f.
     late
         Number of stages after which an acceleration that is commanded now is there.
     """
@@ -159,12 +171,12 @@ class Flown(Freed):
 
 
 class Tethered:
-    """Directions of cables of fixed length, one for each carrier: a solution starts where they are measured."""
+    """Coordinates that cables of fixed length leave to carriers: a solution starts where they are measured."""
 
     def __init__(self, robot: Robot, arrays: tuple[np.ndarray, ...], delay: float, stage: float):
         self.freed = np.zeros((0, 2), dtype=np.int64)
         self.tethers = _tethers(robot)
-        self.count, self._robot = 2 * len(self.tethers), arrays
+        self.count, self._robot = coordinates_of(self.tethers), arrays
         self._pending = Pending(round(delay / stage), stage)
         self.late = self._pending.late
         self._directions, self._carriers_of = directions(), carriers_of()
@@ -211,29 +223,35 @@ class Tethered:
 
 
 def _tethers(robot: Robot) -> np.ndarray:
-    """Return the cables of fixed length, in the columns of `tethers`, with axes along and across them at home.
+    """Return the carriers that cables of fixed length hold, in the columns of `tethers`.
 
     Raises
     ------
     InputError
-        If a carrier has none or several.
+        If a carrier has none or more than three of them.
     """
     lengths: Any = robot.fixed_lengths
-    for carrier in robot.carriers:
-        owned = sum(cable.carrier == carrier.name for cable in robot.cables)
-        if owned != 1:
-            raise InputError(
-                f"robot must have one cable of fixed length on each carrier, got {robot.name!r} with {owned} on "
-                f"{carrier.name!r}"
-            )
     anchors, attachments = dynamics_of(robot).points(robot.home, robot.carrier_home)
     cy, sy = np.cos(robot.home[5]), np.sin(robot.home[5])
     level = np.array([[cy, sy, 0], [-sy, cy, 0], [0, 0, 1]])
-    result = np.zeros((robot.m, TETHER_COLUMNS))
-    for i, along in enumerate((anchors - attachments) @ level.T):
-        n = along / np.linalg.norm(along)
-        across = np.cross(np.eye(3)[2], n)
-        first = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.eye(3)[0]
-        result[i, CABLE], result[i, LENGTH] = i, lengths[i]
-        result[i, AXES:] = np.concatenate([first, np.cross(n, first), n])
+    result = np.zeros((len(robot.carriers), TETHER_COLUMNS))
+    for index, (row, carrier) in enumerate(zip(result, robot.carriers, strict=True)):
+        which = np.flatnonzero(robot.carrier_of_cable == index)
+        if not 1 <= len(which) <= 3:
+            raise InputError(
+                f"robot must have one to three cables of fixed length on each carrier, got {robot.name!r} with "
+                f"{len(which)} on {carrier.name!r}"
+            )
+        held = (anchors - attachments)[which] @ level.T
+        # Rows of U span what the cables hold at home; those before are free.
+        axes = np.linalg.svd(held)[2]
+        axes = np.concatenate([axes[len(which) :], axes[: len(which)]])
+        place = level @ (robot.carrier_home[index, :3] - attachments[which].mean(axis=0))
+        at_home = axes @ place
+        row[HELD], row[CABLES] = index, len(which)
+        row[WHICH : WHICH + len(which)], row[LENGTHS_OF : LENGTHS_OF + len(which)] = which, lengths[which]
+        row[AT_HOME : AT_HOME + 3], row[AXES:] = at_home, axes.ravel()
+        baseline = np.ptp(attachments[which], axis=0)
+        radius = lengths[which].mean() ** 2 - (baseline @ baseline) / 4
+        row[FARTHEST] = SHARE * np.sqrt(max(radius, 0.0))
     return result

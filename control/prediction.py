@@ -1,7 +1,7 @@
 """Kernel: the robot's motion over the stages of a predictive controller, to first order about a guess.
 
-A state is (pose, its rate, and place and rate of each coordinate in which a carrier may leave its reference, or of the
-direction of a cable with fixed length), a control (tensions, accelerations of those coordinates). With the tensions t,
+A state is (pose, its rate, and place and rate of each coordinate in which a carrier may leave its reference, or that
+cables of fixed length leave it), a control (tensions, accelerations of those coordinates). With the tensions t,
 the disturbance d and H ddx + h = w(x, dx, ddx),
 
     ddx = H^-1 (A(x) t + d - h(x, dx))
@@ -16,7 +16,7 @@ from ..models.plant.bodies import place_bodies
 from ..models.plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
 from ..models.plant.lines import run_cables
 from .mechanics import move_to_com, put_body, write_wrench, write_wrench_matrix
-from .tethers import put_tethered
+from .tethers import coordinates_of, put_tethered
 
 STEP = 1e-6  # [m, rad, rad/s], of a difference quotient
 # Rows of `vectors`: unit acceleration, wrench and momentum, and the wrench without acceleration.
@@ -33,7 +33,7 @@ def write_stages(robot, freed, tethers, dt, disturbance, carriers, states, contr
     freed
         (f, 2), carrier and coordinate of each that may leave the reference.
     tethers
-        (k, TETHER_COLUMNS), cables of fixed length, each with two coordinates of its direction after those; or none.
+        (k, TETHER_COLUMNS), carriers that cables of fixed length hold, whose coordinates follow those; or none.
     dt
         Duration of each stage, (N,) [s].
     disturbance
@@ -46,7 +46,7 @@ def write_stages(robot, freed, tethers, dt, disturbance, carriers, states, contr
         Results, (N, n, n), (N, n, u) and (N, n).
     """
     bodies, cables, settings, mask = robot
-    count, m, free = bodies.shape[0], cables.shape[0], freed.shape[0] + 2 * tethers.shape[0]
+    count, m, free = bodies.shape[0], cables.shape[0], freed.shape[0] + coordinates_of(tethers)
     state = np.zeros(BODY * count + CABLE_BLOCKS * m)
     command = np.zeros(COMMANDS + m + CARRIER * count)
     on_bodies, on_cables = np.zeros((count, BODY_WORK)), np.zeros((m, CABLE_WORK))
@@ -90,7 +90,7 @@ def put_robot(robot, freed, tethers, carriers, x, at):
     """Put bodies and cables where a state (n,) has them, and write the wrench matrix."""
     bodies, cables, settings, mask = robot
     state, command, on_bodies, on_cables, motion, matrix, _ = at
-    m, free = cables.shape[0], freed.shape[0] + 2 * tethers.shape[0]
+    m, free = cables.shape[0], freed.shape[0] + coordinates_of(tethers)
     for j in range(12):
         motion[0, j] = x[j]
     for b in range(1, bodies.shape[0]):

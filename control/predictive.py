@@ -52,8 +52,8 @@ class Predictive(ComputedTorque):
     Parameters
     ----------
     robot
-        A `Robot`, the name of one in the library, or the path of a robot file. A carrier with a cable of fixed length
-        has no other cable.
+        A `Robot`, the name of one in the library, or the path of a robot file. No carrier has more than three cables of
+        fixed length.
     bandwidth
         With which errors decay where no limit is near [rad/s], a number or one for each coordinate of the pose.
         Default: 40, but 6 where carriers have to correct errors: those of towing robots and of teams of quadrotors.
@@ -75,7 +75,7 @@ class Predictive(ComputedTorque):
     Raises
     ------
     InputError
-        If an argument has a wrong value, or a cable of fixed length is not the only one of its carrier.
+        If an argument has a wrong value, or a carrier none or more than three cables of fixed length.
     """
 
     batches = False

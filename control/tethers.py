@@ -1,9 +1,10 @@
-"""Kernel: carriers that cables of fixed length hold, each one cable, in two coordinates of the cable's direction.
+"""Kernel: carriers that one, two or three cables of fixed length hold, in the coordinates that these leave them.
 
-    anchor = attachment + Rz(yaw) (a e1 + b e2 + sqrt(l^2 - a^2 - b^2) n)
+    place = mean of the attachments + Rz(yaw) (y1 e1 + y2 e2 + y3 e3)
 
-with the yaw of the platform, so that a team turns with its load, and axes e1, e2, n of which n is the direction at home
-and the others are across it. Derivatives over time are quotients of differences along p + s v + s^2 a / 2.
+with the yaw of the platform, so that a team turns with its load. Of a carrier with k cables the first 3 - k of y are
+coordinates, across the directions in which the cables hold it at home; the lengths determine the others, by Newton's
+method. Derivatives over time are quotients of differences along p + s v + s^2 a / 2.
 """
 
 import math
@@ -19,45 +20,110 @@ from ..models.plant.layout import (
     CABLE_BLOCKS,
     CARRIER,
     COMMANDS,
-    OWNER,
 )
 from .mechanics import move_to_com, put_body
 
-# Columns of `tethers`: number of the cable, its length, and the axes e1, e2 and n.
-CABLE, LENGTH, AXES, TETHER_COLUMNS = 0, 1, 2, 11
-FARTHEST = 0.95  # of the length: beyond, a direction is taken to be there
+# Columns of `tethers`: number of the carrier, how many cables it has, which ones, their lengths, y at home, how far
+# coordinates may be from zero, and the axes e1, e2 and e3.
+HELD, CABLES, WHICH, LENGTHS_OF, AT_HOME, FARTHEST, AXES, TETHER_COLUMNS = 0, 1, 2, 5, 8, 11, 12, 21
+ROUNDS, EXACT = 20, 1e-14  # of Newton's method, and the change relative to the length at which it ends
 STEP_OF_TIME = 1e-3  # [s], of a difference quotient
 
 
-def put_tethered(tethers, cables, state, on_bodies, places):
-    """Put carriers where coordinates, (2 k,) [m], of their cables have them; rotations are those of `on_bodies`."""
-    yaw = math.atan2(on_bodies[0, 3], on_bodies[0, 0])
-    cy, sy = math.cos(yaw), math.sin(yaw)
+def coordinates_of(tethers):
+    """Return how many coordinates there are."""
+    total = 0
     for k in range(tethers.shape[0]):
-        i = int(tethers[k, CABLE])
-        c, length = int(cables[i, OWNER]), tethers[k, LENGTH]
-        a, b = places[2 * k], places[2 * k + 1]
-        far = math.sqrt(a * a + b * b)
-        if far > FARTHEST * length:
-            a, b, far = a * FARTHEST * length / far, b * FARTHEST * length / far, FARTHEST * length
-        along = math.sqrt(length * length - far * far)
-        axes = tethers[k, AXES:]
-        x = a * axes[0] + b * axes[3] + along * axes[6]
-        y = a * axes[1] + b * axes[4] + along * axes[7]
-        z = a * axes[2] + b * axes[5] + along * axes[8]
-        R, P, at = on_bodies[0], on_bodies[c], BODY * c
+        total += 3 - int(tethers[k, CABLES])
+    return total
+
+
+def put_tethered(tethers, cables, state, on_bodies, places):
+    """Put carriers where their coordinates (f,) [m] have them; rotations are those of `on_bodies`."""
+    R = on_bodies[0]
+    size = math.sqrt(R[0] * R[0] + R[3] * R[3])
+    cy, sy = (R[0] / size, R[3] / size) if size > 1e-12 else (1.0, 0.0)
+    first = 0
+    for k in range(tethers.shape[0]):
+        row = tethers[k]
+        held, at = int(row[CABLES]), BODY * (1 + int(row[HELD]))
+        free = 3 - held
+        px, py, pz = 0.0, 0.0, 0.0
+        y0, y1, y2 = row[AT_HOME], row[AT_HOME + 1], row[AT_HOME + 2]
+        far = 0.0
+        if free >= 1:
+            y0 = places[first]
+            far = abs(y0)
+        if free == 2:
+            y1 = places[first + 1]
+            far = math.sqrt(y0 * y0 + y1 * y1)
+        if far > row[FARTHEST]:
+            y0 *= row[FARTHEST] / far
+            y1 *= row[FARTHEST] / far if free == 2 else 1.0
+        if free == 2:
+            y2 = math.copysign(math.sqrt(row[LENGTHS_OF] * row[LENGTHS_OF] - y0 * y0 - y1 * y1), y2)
+        first += free
+        mx, my, mz = middle_of(row, cables, R)
+        for _ in range(ROUNDS):
+            x, y = row[AXES] * y0 + row[AXES + 3] * y1 + row[AXES + 6] * y2, row[AXES + 1] * y0
+            y += row[AXES + 4] * y1 + row[AXES + 7] * y2
+            px, py = state[0] + mx + cy * x - sy * y, state[1] + my + sy * x + cy * y
+            pz = state[2] + mz + row[AXES + 2] * y0 + row[AXES + 5] * y1 + row[AXES + 8] * y2
+            d0, d1, d2 = correction(row, cables, state, on_bodies, px, py, pz, cy, sy)
+            y0, y1, y2 = y0 + d0, y1 + d1, y2 + d2
+            if abs(d0) + abs(d1) + abs(d2) <= EXACT * row[LENGTHS_OF]:
+                break
+        state[at], state[at + 1], state[at + 2] = px, py, pz
+
+
+def middle_of(row, cables, R):
+    """Return the mean of the attachments of a carrier's cables, from the platform's CoM in {G}."""
+    x, y, z = 0.0, 0.0, 0.0
+    for j in range(int(row[CABLES])):
+        i = int(row[WHICH + j])
+        bx, by, bz = cables[i, ATTACHMENT], cables[i, ATTACHMENT + 1], cables[i, ATTACHMENT + 2]
+        x += (R[0] * bx + R[1] * by + R[2] * bz) / row[CABLES]
+        y += (R[3] * bx + R[4] * by + R[5] * bz) / row[CABLES]
+        z += (R[6] * bx + R[7] * by + R[8] * bz) / row[CABLES]
+    return x, y, z
+
+
+def correction(row, cables, state, on_bodies, px, py, pz, cy, sy):
+    """Return Newton's step of y for a carrier at (px, py, pz), zero in its coordinates."""
+    R, P, held = on_bodies[0], on_bodies[1 + int(row[HELD])], int(row[CABLES])
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    a, b, c, d, e, f, g, h, q = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    for j in range(held):
+        i = int(row[WHICH + j])
         bx, by, bz = cables[i, ATTACHMENT], cables[i, ATTACHMENT + 1], cables[i, ATTACHMENT + 2]
         ax, ay, az = cables[i, ANCHOR], cables[i, ANCHOR + 1], cables[i, ANCHOR + 2]
-        state[at] = state[0] + R[0] * bx + R[1] * by + R[2] * bz + cy * x - sy * y
-        state[at + 1] = state[1] + R[3] * bx + R[4] * by + R[5] * bz + sy * x + cy * y
-        state[at + 2] = state[2] + R[6] * bx + R[7] * by + R[8] * bz + z
-        state[at] -= P[0] * ax + P[1] * ay + P[2] * az
-        state[at + 1] -= P[3] * ax + P[4] * ay + P[5] * az
-        state[at + 2] -= P[6] * ax + P[7] * ay + P[8] * az
+        x = px + P[0] * ax + P[1] * ay + P[2] * az - state[0] - (R[0] * bx + R[1] * by + R[2] * bz)
+        y = py + P[3] * ax + P[4] * ay + P[5] * az - state[1] - (R[3] * bx + R[4] * by + R[5] * bz)
+        z = pz + P[6] * ax + P[7] * ay + P[8] * az - state[2] - (R[6] * bx + R[7] * by + R[8] * bz)
+        off = 0.5 * (row[LENGTHS_OF + j] * row[LENGTHS_OF + j] - x * x - y * y - z * z)
+        x, y = cy * x + sy * y, cy * y - sy * x
+        # The derivatives of half the squared length by y1, y2 and y3; the last cable is the last equation.
+        u = row[AXES] * x + row[AXES + 1] * y + row[AXES + 2] * z
+        v = row[AXES + 3] * x + row[AXES + 4] * y + row[AXES + 5] * z
+        w = row[AXES + 6] * x + row[AXES + 7] * y + row[AXES + 8] * z
+        equation = 3 - held + j
+        if equation == 0:
+            a, b, c, f0 = u, v, w, off
+        elif equation == 1:
+            d, e, f, f1 = (u if held == 3 else 0.0), v, w, off
+        else:
+            g, h, q, f2 = (u if held == 3 else 0.0), (v if held >= 2 else 0.0), w, off
+    det = a * (e * q - f * h) - b * (d * q - f * g) + c * (d * h - e * g)
+    if abs(det) < 1e-300:
+        return 0.0, 0.0, 0.0
+    d0 = (f0 * (e * q - f * h) - b * (f1 * q - f * f2) + c * (f1 * h - e * f2)) / det
+    d1 = (a * (f1 * q - f * f2) - f0 * (d * q - f * g) + c * (d * f2 - f1 * g)) / det
+    d2 = (a * (e * f2 - f1 * h) - b * (d * f2 - f1 * g) + f0 * (d * h - e * g)) / det
+    return d0, d1, d2
 
 
 def write_directions(robot, tethers, motions, directions):
-    """Write coordinates of the cables' directions, and their two derivatives over time.
+    """Write the coordinates of carriers as they move, and two derivatives over time.
 
     Parameters
     ----------
@@ -68,13 +134,13 @@ def write_directions(robot, tethers, motions, directions):
     motions
         (N, 1 + c, 18), pose, velocity and acceleration of platform and carriers.
     directions
-        Result, (N, 3, 2 k) [m, m/s, m/s^2].
+        Result, (N, 3, f) [m, m/s, m/s^2].
     """
     bodies, cables, settings, _ = robot
     count, m, h = bodies.shape[0], cables.shape[0], STEP_OF_TIME
     state, on_bodies = np.zeros(BODY * count + CABLE_BLOCKS * m), np.zeros((count, BODY_WORK))
     command, motion = np.zeros(COMMANDS + m + CARRIER * count), np.zeros((count, 12))
-    found = np.zeros((3, 2 * tethers.shape[0]))
+    found = np.zeros((3, directions.shape[2]))
     for row in range(motions.shape[0]):
         for s in range(3):
             time = (s - 1) * h
@@ -94,32 +160,31 @@ def write_directions(robot, tethers, motions, directions):
 
 
 def find_directions(tethers, cables, state, on_bodies, places):
-    """Write the coordinates, (2 k,), of carriers as they are placed; the inverse of `put_tethered`."""
-    yaw = math.atan2(on_bodies[0, 3], on_bodies[0, 0])
-    cy, sy = math.cos(yaw), math.sin(yaw)
+    """Write the coordinates, (f,), of carriers as they are placed; the inverse of `put_tethered`."""
+    R = on_bodies[0]
+    size = math.sqrt(R[0] * R[0] + R[3] * R[3])
+    cy, sy = (R[0] / size, R[3] / size) if size > 1e-12 else (1.0, 0.0)
+    first = 0
     for k in range(tethers.shape[0]):
-        i = int(tethers[k, CABLE])
-        c = int(cables[i, OWNER])
-        R, P, at, axes = on_bodies[0], on_bodies[c], BODY * c, tethers[k, AXES:]
-        bx, by, bz = cables[i, ATTACHMENT], cables[i, ATTACHMENT + 1], cables[i, ATTACHMENT + 2]
-        ax, ay, az = cables[i, ANCHOR], cables[i, ANCHOR + 1], cables[i, ANCHOR + 2]
-        x = state[at] - state[0] + P[0] * ax + P[1] * ay + P[2] * az - (R[0] * bx + R[1] * by + R[2] * bz)
-        y = state[at + 1] - state[1] + P[3] * ax + P[4] * ay + P[5] * az - (R[3] * bx + R[4] * by + R[5] * bz)
-        z = state[at + 2] - state[2] + P[6] * ax + P[7] * ay + P[8] * az - (R[6] * bx + R[7] * by + R[8] * bz)
+        row, at = tethers[k], BODY * (1 + int(tethers[k, HELD]))
+        mx, my, mz = middle_of(row, cables, R)
+        x, y, z = state[at] - state[0] - mx, state[at + 1] - state[1] - my, state[at + 2] - state[2] - mz
         x, y = cy * x + sy * y, cy * y - sy * x
-        places[2 * k] = axes[0] * x + axes[1] * y + axes[2] * z
-        places[2 * k + 1] = axes[3] * x + axes[4] * y + axes[5] * z
+        for j in range(3 - int(row[CABLES])):
+            axis = row[AXES + 3 * j :]
+            places[first] = axis[0] * x + axis[1] * y + axis[2] * z
+            first += 1
 
 
 def write_carriers(robot, tethers, motion, carriers):
-    """Write how carriers move if platform and directions do.
+    """Write how carriers move if the platform and their coordinates do.
 
     Parameters
     ----------
     robot, tethers
         As for `write_directions`.
     motion
-        (3, 6 + 2 k), pose of the platform and the coordinates of directions, and their two derivatives over time.
+        (3, 6 + f), pose of the platform and the coordinates, and their two derivatives over time.
     carriers
         Result, (c, 3, 6): their positions and two derivatives over time; attitudes are read, and stay.
     """
@@ -127,7 +192,7 @@ def write_carriers(robot, tethers, motion, carriers):
     count, m, h = bodies.shape[0], cables.shape[0], STEP_OF_TIME
     state, on_bodies = np.zeros(BODY * count + CABLE_BLOCKS * m), np.zeros((count, BODY_WORK))
     command, pose = np.zeros(COMMANDS + m + CARRIER * count), np.zeros(12)
-    places, found = np.zeros(2 * tethers.shape[0]), np.zeros((3, 3 * count))
+    places, found = np.zeros(motion.shape[1] - 6), np.zeros((3, 3 * count))
     for s in range(3):
         time = (s - 1) * h
         for b in range(count):
@@ -146,7 +211,7 @@ def write_carriers(robot, tethers, motion, carriers):
             for j in range(3):
                 found[s, 3 * b + j] = state[BODY * b + j]
     for k in range(tethers.shape[0]):
-        c = int(cables[int(tethers[k, CABLE]), OWNER])
+        c = 1 + int(tethers[k, HELD])
         for j in range(3):
             before, now, after = found[0, 3 * c + j], found[1, 3 * c + j], found[2, 3 * c + j]
             carriers[c - 1, 0, j] = now
