@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..inputs import number, shown, whole_number
 from ..models.files import as_robot
 from ..models.robot import Robot
+from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from .command import SHIFTED, Command
 from .computed_torque import ComputedTorque, positive, reach_of
@@ -23,6 +24,7 @@ from .mechanics import DISTURBANCE, HIGHEST, LOWEST, RATE_MAX
 from .moved import Flown, Freed, Moved, Tethered
 from .reference import Reference
 from .state import State
+from .surroundings import Surroundings
 from .weights import terminal, weights
 
 __all__ = ["Predictive"]
@@ -32,6 +34,7 @@ ITERATIONS = 20
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
 ALMOST = 1e-9  # of the largest entry of the gram matrix of efforts, whose rank may be less than six
 USUAL_REACH = 0.2  # of the cables' mean length
+FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
 CLOSE = 1e-9  # [m, rad] by which a reference may differ from the one that was announced
 
@@ -69,6 +72,11 @@ class Predictive(ComputedTorque):
         the reference's [m/s^2 and rad/s^2].
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
+    tube
+        How far the platform should be from its reference at most [m]; default: no limit.
+    keep_out
+        Bodies in {G} that the platform's frame and attachments should stay out of, as in a task's `keep_out`. Tube and
+        bodies are kept wherever tensions can, by exact penalties; the reference may pass through a body.
     observer, place, attitude, patience
         As for `ComputedTorque`.
 
@@ -90,6 +98,8 @@ class Predictive(ComputedTorque):
         carrier_bandwidth: float | None = None,
         carrier_acceleration: float = 5.0,
         rate: Any = None,
+        tube: float | None = None,
+        keep_out: Sequence[Shape | dict[str, Any]] = (),
         observer: float = 60.0,
         place: float = 5.0,
         attitude: float = 40.0,
@@ -135,8 +145,10 @@ class Predictive(ComputedTorque):
         self._weights = weights(self.robot, self._bandwidth, reaches, returning, self._steps[0], moves)
         self._efforts = np.concatenate([np.ones(m), (self._weights.states[12 : 12 + f]) / self._steps[0]])
         self._end = terminal(A, B, self._weights)
+        self._penalty = FIRM * self.robot.length * float(np.diag(self._end)[:3].max())
         # What all problems share.
-        h = self._horizon = Horizon(*self._sizes)
+        self._surroundings = Surroundings(self.robot, tube, keep_out)
+        h = self._horizon = Horizon(*self._sizes, self._surroundings.rows)
         h.tolerance, h.iterations_max = TOLERANCE, ITERATIONS
         h.Q[:count], h.Q[count], h.R[:] = np.diag(self._weights.states), self._end, np.diag(self._weights.controls)
         self.reset()
@@ -239,6 +251,8 @@ class Predictive(ComputedTorque):
         for k, more in enumerate(self._moved.under_way()[: len(h.B)]):
             h.c[k] += h.B[k, :, m:] @ (planned[k, m:] + more)
             h.B[k, :, m:] = 0.0
+        if self._surroundings.rows:
+            self._surroundings.write(h, states, wanted, self._penalty)
         h.start[:], h.r[:] = start, -self._weights.controls * planned[:-1]
         h.q[:-1], h.q[-1] = -self._weights.states * wanted[:-1], -self._end @ wanted[-1]
         self._write_bounds(controls, planned)

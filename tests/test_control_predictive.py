@@ -9,9 +9,11 @@ import pytest
 from towline import plan
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
 from towline.control.machine import carriers_of, directions, stages
+from towline.control.surroundings import Surroundings, _distance
 from towline.control.tethers import AXES, TETHER_COLUMNS
 from towline.errors import InputError
 from towline.models import Dynamics, load
+from towline.models.points import placed
 from towline.simulation import simulate
 from towline.solvers.horizon import Horizon, Residuals
 
@@ -199,6 +201,55 @@ def test_a_motion_is_flown_that_runs_out_of_tensions_step_by_step():
     assert command.direction @ w - most > 0.9 * command.shortfall > 0
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"kind": "sphere", "centre": [0.1, 0.2, 0.3], "radius": 0.5},
+        {"kind": "capsule", "start": [0, 0, -1], "end": [0.5, 0, 1], "radius": 0.2},
+        {"kind": "box", "min": [-0.4, -0.2, -0.1], "max": [0.4, 0.3, 0.5], "attitude": [0.3, 0.2, 1.0]},
+    ],
+)
+def test_distances_from_bodies_are_lengths_along_their_normals(body):
+    """A point goes to the surface by its distance along the normal, and its distance changes by what it moves."""
+    (shape,) = Surroundings(load("cogiro"), None, [body])._bodies
+    points = np.random.default_rng(3).normal(size=(200, 3))
+    distance, normals = _distance(shape, points)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(_distance(shape, points - distance[:, None] * normals)[0], 0.0, atol=1e-9)
+    outside = distance > 0
+    further, _ = _distance(shape, points + 0.1 * normals)
+    np.testing.assert_allclose(further[outside], distance[outside] + 0.1, atol=1e-9)
+    centre = np.array(body.get("centre", [0, 0.05, 0.2] if body["kind"] == "box" else [0.25, 0, 0]))
+    assert _distance(shape, centre)[0] < 0
+
+
+def test_a_tube_is_kept_that_a_push_would_leave():
+    robot = load("multi-quadrotor-3")
+    push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
+    flights = [
+        simulate(robot, robot.home, duration=1.5, controller=Predictive(robot, tube=tube), disturbance=push)
+        for tube in (None, 0.02)
+    ]
+    assert flights[0].error.max() > 0.03
+    assert flights[1].error.max() < 0.022
+
+
+def test_a_platform_goes_around_a_body_on_its_way():
+    robot = load("cogiro")
+    line = {"kind": "line", "start": [0, 0, 2.0], "end": [2.0, 0, 2.0]}
+    post = {"kind": "capsule", "start": [1, -0.55, 0], "end": [1, -0.55, 6], "radius": 0.2}
+    points = np.vstack([np.zeros(3), robot.attachments])
+    nearest = []
+    for bodies in ([], [post]):
+        controller = Predictive(robot, keep_out=bodies)
+        flight = simulate(robot, line, duration=3.0, controller=controller)
+        (shape,) = Surroundings(robot, None, [post])._bodies
+        nearest.append(_distance(shape, placed(flight.record.motions[:, 0, :6], points))[0].min())
+        assert flight.error[-1] < 1e-3
+    assert nearest[0] < -0.05
+    assert nearest[1] > -0.002
+
+
 @pytest.mark.parametrize(("name", "reach"), [("cogiro", (0.0, 0.0)), ("wang-flying", (0.5, 0.0))])
 def test_gusts_move_the_platform_a_fifth_as_far_as_with_computed_torque(name, reach):
     robot = load(name)
@@ -313,6 +364,9 @@ def test_nothing_is_planned_where_residuals_are_no_numbers(monkeypatch):
         ({"stage": 0}, "stage"),
         ({"reach": 3}, "reach"),
         ({"rate": -1}, "rate"),
+        ({"tube": 0}, "tube"),
+        ({"keep_out": "box"}, "keep_out"),
+        ({"keep_out": [{"kind": "sphere", "centre": [0, 0, 0], "radius": -1}]}, "radius"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_line(change, message):

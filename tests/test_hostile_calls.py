@@ -272,6 +272,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "ComputedTorque.follow.start": lambda: 0.0,
     "Predictive.follow.start": lambda: 0.0,
     "stage": lambda: 0.02,
+    "Predictive.tube": lambda: 0.02,
+    "Predictive.keep_out": lambda: [{"kind": "sphere", "centre": [0, 0, 0], "radius": 0.1}],
     "place": lambda: 5.0,
     "ComputedTorque.attitude": lambda: 40.0,
     "patience": lambda: 0.05,
