@@ -34,8 +34,8 @@ class Task:
         Constant force on the platform [N].
     reach :
         How far carriers may leave their reference [m].
-    bandwidth, observer :
-        Of predictive control, and of computed torque in its second row [rad/s].
+    stage :
+        Of predictive control [s].
     """
 
     name: str
@@ -43,25 +43,28 @@ class Task:
     wind: tuple[float, float, float] | None
     gusts: float
     reach: float = 0.0
-    bandwidth: float = 40.0
-    observer: float = 60.0
+    stage: float = 0.015
     push: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def conditions(self) -> dict[str, Any]:
         """Return the options of `simulate`."""
         return {"wind": self.wind, "gusts": self.gusts, "disturbance": (*self.push, 0.0, 0.0, 0.0)}
 
-    def gains(self) -> dict[str, Any]:
+    @property
+    def options(self) -> dict[str, Any]:
         """Return the options of predictive control."""
-        return {"reach": (self.reach, 0.0), "bandwidth": self.bandwidth, "observer": self.observer}
+        return {"reach": (self.reach, 0.0), "stage": self.stage}
 
     def controllers(self) -> dict[str, Callable[[Robot], Controller]]:
         """Return what makes each controller."""
+        reach = (self.reach, 0.0)
         return {
             "open loop": OpenLoop,
-            STANDARD: lambda robot: ComputedTorque(robot, reach=(self.reach, 0.0)),
-            "computed torque, gains of predictive": lambda robot: ComputedTorque(robot, **self.gains()),
-            "predictive": lambda robot: Predictive(robot, **self.gains()),
+            STANDARD: lambda robot: ComputedTorque(robot, reach=reach),
+            "computed torque, gains of predictive": lambda robot: ComputedTorque(
+                robot, 40.0, observer=60.0, reach=reach
+            ),
+            "predictive": lambda robot: Predictive(robot, **self.options),
         }
 
 
@@ -75,8 +78,8 @@ def _cogiro() -> Robot:
 
 
 TASKS = (
-    Task("wang-flying, free base", lambda: load("wang-flying"), (3, 2, 0.5), 1.0, 0.5),
-    Task("wang-flying, free base, at its limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, 0.5),
+    Task("wang-flying, free base", lambda: load("wang-flying"), (3, 2, 0.5), 1.0, 0.5, 0.03),
+    Task("wang-flying, free base, at its limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, 0.5, 0.03),
     Task("wang-flying-quadrotor", lambda: load("wang-flying-quadrotor"), (3, 2, 0.5), 1.0),
     Task("cogiro, elastic", _cogiro, (6, 4, 1), 3.0),
     Task("multi-quadrotor-3, pushed", lambda: load("multi-quadrotor-3"), None, 0.0, push=(0.2, 0.1, 0.0)),
@@ -127,6 +130,6 @@ def record(task: Task, robot: Robot, steps: int) -> list[Program]:
     InputError
         If predictive control does not accept the robot.
     """
-    controller = Recording(robot, **task.gains())
+    controller = Recording(robot, **task.options)
     simulate(robot, robot.home, controller, duration=steps * 1e-3, **task.conditions())
     return controller.programs

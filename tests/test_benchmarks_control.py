@@ -18,13 +18,14 @@ from towline.models import load
 from towline.simulation import simulate
 from towline.solvers import Horizon, StageProblem
 
-FREE, LIMITS, TEAM = TASKS[0], TASKS[1], TASKS[-1]
+FREE, TEAM = TASKS[0], TASKS[-1]
+LIMITS = Task("limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, reach=0.5, stage=0.015)
 
 
 @pytest.fixture(scope="module")
 def at_limits():
     """Programs of a flight whose tensions reach their limits."""
-    return record(LIMITS, LIMITS.robot(), 190)
+    return record(LIMITS, LIMITS.robot(), 200)
 
 
 def horizon_of(program, tolerance, iterations):
@@ -54,9 +55,9 @@ def test_condensed_costs_are_those_of_the_stages(at_limits):
 
 
 def test_programs_of_a_flight_at_its_limits_converge_from_a_cold_start(at_limits):
-    """Of these the steps of some went in circles; the first ones are at rest, where rounding is all that is left."""
+    """With a correction in each step 18 went in circles. The first ones are at rest: all that is left is rounding."""
     touched = 0
-    for program in at_limits[2:]:
+    for program in at_limits[3:]:
         horizon = horizon_of(program, 1e-8, 50)
         assert horizon.solve()
         touched += np.isclose(horizon.controls[:, :6], program.u_min[:, :6]).any()
