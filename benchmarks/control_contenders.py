@@ -21,6 +21,7 @@ __all__ = ["CONTENDERS", "FIELDS", "REFERENCE", "TOWLINE", "Contender", "Program
 
 Array = NDArray[np.float64]
 REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, as flown"
+FAR = 1e4  # in place of infinite bounds, for solvers that need numbers
 GOOD = 1e-3  # residuals at which predictive control uses a solution that did not converge
 FIELDS = ("A", "B", "c", "start", "Q", "R", "q", "r", "u_min", "u_max")
 
@@ -249,7 +250,8 @@ def _clarabel(first: Program) -> Solver:
     def arrange(program: Program) -> dict[str, Array]:
         entries = ends.copy()
         entries[places] = sparse.values(program)[which]
-        right = np.r_[sparse.right(program), -program.u_min.ravel(), program.u_max.ravel()]
+        bounds = np.clip(np.r_[-program.u_min.ravel(), program.u_max.ravel()], -FAR, FAR)
+        right = np.r_[sparse.right(program), bounds]
         return {"q": sparse.linear(program), "A": entries, "b": right}
 
     begun, settings = arrange(first), clarabel.DefaultSettings()
@@ -275,7 +277,7 @@ def _hpipm(first: Program) -> Solver:
     pattern = ca.DM(sparse.pattern).sparsity()
     sizes = {"N": N, "nx": [n] * (N + 1), "nu": [m] * N + [0], "ng": [0] * (N + 1)}
     # Bounds that are infinite are numbers to this interface: with its own, 1e8, the iterations do not converge.
-    settings = {"error_on_fail": False, "inf": 1e4, "hpipm": {"mode": "speed_abs", "iter_max": 100}}
+    settings = {"error_on_fail": False, "inf": FAR, "hpipm": {"mode": "speed_abs", "iter_max": 100}}
     options: dict[str, Any] = {**sizes, **settings}
     solver = ca.conic("stages", "hpipm", {"h": H.sparsity(), "a": pattern}, options)
 

@@ -115,9 +115,9 @@ def _known(program: Program) -> tuple[Array, Array, Array]:
 
 
 def _range(program: Program) -> Array:
-    """Return the range of each control, (N, m); 1 for a control that is fixed."""
+    """Return the range of each control, (N, m); 1 for a control that is fixed or has no limits."""
     width = program.u_max - program.u_min
-    return np.where(width > 0, width, 1.0)
+    return np.where((width > 0) & np.isfinite(width), width, 1.0)
 
 
 def _error(program: Program, controls: Array, best: Array) -> float:

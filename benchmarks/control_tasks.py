@@ -33,9 +33,9 @@ class Task:
     push :
         Constant force on the platform [N].
     reach :
-        How far carriers may leave their reference [m].
+        How far carriers may leave their reference [m]; 0: the controllers' default.
     stage :
-        Of predictive control [s].
+        Of predictive control [s]; default: its own.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Task:
     wind: tuple[float, float, float] | None
     gusts: float
     reach: float = 0.0
-    stage: float = 0.015
+    stage: float | None = None
     push: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def conditions(self) -> dict[str, Any]:
@@ -53,11 +53,11 @@ class Task:
     @property
     def options(self) -> dict[str, Any]:
         """Return the options of predictive control."""
-        return {"reach": (self.reach, 0.0), "stage": self.stage}
+        return {"reach": (self.reach, 0.0) if self.reach else None, "stage": self.stage}
 
     def controllers(self) -> dict[str, Callable[[Robot], Controller]]:
         """Return what makes each controller."""
-        reach = (self.reach, 0.0)
+        reach = self.options["reach"]
         return {
             "open loop": OpenLoop,
             STANDARD: lambda robot: ComputedTorque(robot, reach=reach),
@@ -80,7 +80,7 @@ def _cogiro() -> Robot:
 TASKS = (
     Task("wang-flying, free base", lambda: load("wang-flying"), (3, 2, 0.5), 1.0, 0.5, 0.03),
     Task("wang-flying, free base, at its limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, 0.5, 0.03),
-    Task("wang-flying-quadrotor", lambda: load("wang-flying-quadrotor"), (3, 2, 0.5), 1.0),
+    Task("wang-flying-quadrotor", lambda: load("wang-flying-quadrotor"), (3, 2, 0.5), 1.0, 0.5),
     Task("cogiro, elastic", _cogiro, (6, 4, 1), 3.0),
     Task("multi-quadrotor-3, pushed", lambda: load("multi-quadrotor-3"), None, 0.0, push=(0.2, 0.1, 0.0)),
 )
