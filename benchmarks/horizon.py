@@ -164,7 +164,7 @@ def _hpipm(dense: Dense) -> Call:
     H[:n, :n], H[n:, n:], h[n:] = problem.Q[0], dense.H, dense.h
     G = np.zeros((N * n, size))
     G[:, n:], G[:n, :n] = dense.G, problem.A[0]
-    low, high = np.full(size, -1e8), np.full(size, 1e8)
+    low, high = np.full(size, -np.inf), np.full(size, np.inf)
     low[n + dense.controls], high[n + dense.controls] = dense.low, dense.high
     options: dict[str, Any] = {
         "N": N,
@@ -173,6 +173,8 @@ def _hpipm(dense: Dense) -> Call:
         "ng": [0] * (N + 1),
         "error_on_fail": False,
         "print_time": False,
+        "inf": 1e4,  # what infinite bounds become: with the default, 1e8, it does not converge
+        "hpipm": {"mode": "speed_abs", "iter_max": 100},
     }
     shapes = {"h": ca.DM(H).sparsity(), "a": ca.sparsify(ca.DM(G)).sparsity()}
     shapes["h"] = ca.sparsify(ca.DM(H)).sparsity()

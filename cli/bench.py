@@ -47,3 +47,20 @@ def tension(
         typer.echo(benchmark.markdown(report), nl=False)
         for name in written:
             typer.echo(name)
+
+
+@app.command("control", cls=Command)
+def control(
+    steps: Annotated[int, typer.Option(help="Steps of a flight, one each millisecond.")] = 500,
+    seeds: Annotated[int, typer.Option(help="Flights of each controller, each in other gusts.")] = 3,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure control steps, and the programs of predictive control against other solvers."""
+    from ..benchmarks import control as benchmark
+
+    with progress_bar("control", quiet=as_json) as progress:
+        report = benchmark.run(steps, seeds, progress=progress)
+    if as_json:
+        print_json(report.to_dict())
+    else:
+        typer.echo(benchmark.markdown(report), nl=False)

@@ -67,7 +67,7 @@ def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_uses_the_public_interface(path):
     """Notebooks import the front door, and modules that the README names; they store nothing of this machine."""
-    allowed = {"towline", "towline.models.statics", "towline.solvers", "towline.workspace"}
+    allowed = {"towline", "towline.control", "towline.models.statics", "towline.solvers", "towline.workspace"}
     text = path.read_text()
     assert set(re.findall(r"from (towline[\w.]*) import", text)) <= allowed
     assert not re.search(r"/home/|/tmp/|site-packages|Traceback", text)

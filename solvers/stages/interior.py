@@ -57,6 +57,11 @@ from .vectors import fused, largest8, load8, splat8, store8, total8
 LEAST_PUSH, MOST_PUSH = 1e-3, 0.1
 APART = 1e-3  # smallest product of slack and multiplier, in units of their mean
 PATIENCE = 20  # iterations after which a warm start is given up
+# Iterations without progress, or in all, after which the correction of second order may lead in circles: then steps go
+# without it, to products of this part of their mean.
+CYCLE, LATE, CENTRAL = 7, 32, 0.3
+# Iterations without progress, and residual in tolerances, at which rounding permits no more.
+STUCK, NEAR = 4, 1e3
 SHORT = 0.2  # a step that is shorter is replaced
 
 
@@ -74,11 +79,12 @@ def solve_stages(work, at, settings):
         begin_point(work, at, False)
         _begin_cold(work, at, settings)
     best, count, most = math.inf, 0, int(settings[ITERATIONS])
+    better = 0  # the iteration in which the best was found
     settings[CONVERGED] = 0.0
     for count in range(most + 1):
         error = measure(work, at, settings)
         if error < best:
-            best = error
+            best, better = error, count
             _copy_iterate(work, at[POINT], at[BEST], at)
         if error <= settings[TOLERANCE]:
             # What counts is the trajectory; where its rounding costs accuracy, the iterate must be better.
@@ -91,11 +97,13 @@ def solve_stages(work, at, settings):
             error = measure(work, at, settings)
         if not error < math.inf or count == most:
             break
+        if count - better >= STUCK and best <= NEAR * settings[TOLERANCE]:
+            break
         if warm and count == PATIENCE:
             begin_point(work, at, False)
             _begin_cold(work, at, settings)
             measure(work, at, settings)
-        _iterate(work, at, pairs)
+        _iterate(work, at, pairs, count - better >= CYCLE or count >= LATE)
     settings[COUNT] = count
     if settings[CONVERGED] == 0.0:
         if best < math.inf:
@@ -131,8 +139,8 @@ def _copy_iterate(work, source, to, at):
         work[to + i] = work[source + i]
 
 
-def _iterate(work, at, pairs):
-    """Replace the iterate by the next."""
+def _iterate(work, at, pairs, central):
+    """Replace the iterate by the next, by a step along the central path if `central`."""
     _weigh_rows(work, at)
     factorise(work, at)
     if pairs == 0.0:
@@ -160,10 +168,11 @@ def _iterate(work, at, pairs):
         z = fused(length8, load8(work, at[D_MULTIPLIER] + i), load8(work, multiplier + i))
         total = fused(t * z, load8(work, mask + i), total)
     ratio = total8(total) / gap
-    centre = splat8(ratio * ratio * ratio * gap / pairs)
+    correction = splat8(0.0 if central else 1.0)
+    centre = splat8(max(ratio * ratio * ratio, CENTRAL if central else 0.0) * gap / pairs)
     for i in range(0, size, 8):
         t, z, exists = load8(work, slack + i), load8(work, multiplier + i), load8(work, mask + i)
-        second = load8(work, at[D_SLACK] + i) * load8(work, at[D_MULTIPLIER] + i)
+        second = correction * load8(work, at[D_SLACK] + i) * load8(work, at[D_MULTIPLIER] + i)
         store8(work, product + i, (centre - t * z - second) * exists)
     _redirect(work, at)
     most = 1.0 - min(0.005, 0.5 * ratio)

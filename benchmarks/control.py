@@ -1,0 +1,245 @@
+"""Control steps: predictive control against computed torque, and its quadratic programs against other solvers.
+
+    towline bench control [--steps 500] [--seeds 3] [--json]
+
+Each robot flies at rest in gusts, with elastic cables and a controller every millisecond. Three tables: how long the
+steps of each controller take, whole steps from state to command; how long each solver takes for the programs that
+predictive control had in such a flight, in turns of a few programs; and how far each controller lets the platform go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..control import Controller
+from ..errors import InputError
+from ..models import Robot
+from ..simulation import simulate
+from .control_contenders import CONTENDERS, REFERENCE, TOWLINE
+from .control_programs import BLOCK, FAILED, Row, measure
+from .control_tasks import STANDARD, TASKS, Task, record
+from .machine import machine
+
+__all__ = ["Error", "Report", "Step", "markdown", "run"]
+
+Progress = Callable[[str, int, int], None]
+
+TIMED = ("casadi", "daqp", "osqp", "clarabel", "numpy", "numba")
+
+
+@dataclass(frozen=True)
+class Step:
+    """A controller's steps: times [us], and the ratio of medians to computed torque; without, why there are none."""
+
+    task: str
+    controller: str
+    median_us: float | None = None
+    p99_us: float | None = None
+    ratio: float | None = None
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Error:
+    """A controller's errors over all seeds.
+
+    Attributes
+    ----------
+    task, controller :
+        The task and the controller.
+    rms_mm, max_mm :
+        Of the distance from the reference [mm]: root of the mean square, and largest of all flights.
+    ratio :
+        Median over the seeds of the largest error over that of computed torque with the same wind.
+    soft :
+        In how many steps, of all, there were no tensions for the wrench, or no new solution.
+    slack :
+        In how many steps a cable was slack.
+    """
+
+    task: str
+    controller: str
+    rms_mm: float
+    max_mm: float
+    ratio: float
+    soft: float
+    slack: float
+
+
+@dataclass(frozen=True)
+class Report:
+    """Rows, and what they were measured on and with."""
+
+    rows: list[Row]
+    steps: list[Step]
+    errors: list[Error]
+    machine: str
+    count: int
+    seeds: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain lists and numbers, ready for JSON."""
+        lists = {name: [asdict(row) for row in getattr(self, name)] for name in ("rows", "steps", "errors")}
+        return {**lists, "machine": self.machine, "count": self.count, "seeds": self.seeds}
+
+
+def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progress: Progress | None = None) -> Report:
+    """Fly and measure.
+
+    Parameters
+    ----------
+    steps :
+        Of a flight, one each millisecond.
+    seeds :
+        Of gusts, for the errors.
+    tasks :
+        Robots and winds.
+    progress :
+        Called with the task's name and how many of how many parts are done.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    """
+    for name, value, most in (("steps", steps, 1_000_000), ("seeds", seeds, 10_000)):
+        if not 1 <= value <= most:
+            raise InputError(f"{name} must be a whole number from 1 to {most}, got {value}")
+    rows, whole, errors = list[Row](), list[Step](), list[Error]()
+    for number, task in enumerate(tasks):
+
+        def show(part: int, at: int = 3 * number, name: str = task.name) -> None:
+            if progress is not None:
+                progress(name, at + part, 3 * len(tasks))
+
+        robot = task.robot()
+        show(0)
+        rows += _programs(task, robot, steps)
+        show(1)
+        whole += _steps(task, robot, steps)
+        show(2)
+        errors += _errors(task, robot, steps, seeds)
+    return Report(rows, whole, errors, machine=machine(TIMED), count=steps, seeds=seeds)
+
+
+def _accepted(task: Task, robot: Robot) -> tuple[dict[str, Callable[[Robot], Controller]], dict[str, str]]:
+    """Return what makes the controllers that accept the robot, and why others do not."""
+    accepted, refused = {}, {}
+    for name, make in task.controllers().items():
+        try:
+            make(robot)
+        except InputError as error:
+            refused[name] = f"refused: {error}"
+        else:
+            accepted[name] = make
+    return accepted, refused
+
+
+def _steps(task: Task, robot: Robot, steps: int) -> list[Step]:
+    """Measure the steps of one flight with each controller, after one that is not counted."""
+    accepted, refused = _accepted(task, robot)
+    times = {}
+    for _ in range(2):
+        for name, make in accepted.items():
+            flight = simulate(robot, robot.home, make(robot), duration=steps * 1e-3, **task.conditions())
+            times[name] = 1e6 * flight.seconds
+    standard = float(np.median(times[STANDARD]))
+    measured = [
+        Step(task.name, name, float(np.median(of)), float(np.percentile(of, 99)), float(np.median(of)) / standard)
+        for name, of in times.items()
+    ]
+    return [*measured, *(Step(task.name, name, detail=why) for name, why in refused.items())]
+
+
+def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
+    """Fly all seeds with each controller."""
+    flown = {}
+    for name, make in _accepted(task, robot)[0].items():
+        given = {**task.conditions(), "duration": steps * 1e-3, "runs": seeds}
+        flown[name] = simulate(robot, robot.home, make(robot), **given)
+    rows = []
+    for name, flights in flown.items():
+        largest, rms = flights["error_max"].values, flights["error_rms"].values
+        known = flown[STANDARD]["error_max"].values
+        answers = flights["answered"].values
+        rows.append(
+            Error(
+                task=task.name,
+                controller=name,
+                rms_mm=float(1e3 * np.sqrt((rms**2).mean())),
+                max_mm=float(1e3 * largest.max()),
+                ratio=float(np.median(largest / np.maximum(known, 1e-12))),
+                soft=float(answers[:, 1:].sum() / answers.sum()),
+                slack=float(flights["slack_s"].values.sum() / flights["duration"].values.sum()),
+            )
+        )
+    return rows
+
+
+def _programs(task: Task, robot: Robot, steps: int) -> list[Row]:
+    """Solve the programs of one flight with each solver, in turns."""
+    try:
+        programs = record(task, robot, steps)
+    except InputError:
+        return []
+    return measure(task.name, programs, CONTENDERS)
+
+
+def markdown(report: Report) -> str:
+    """Return the report as a page."""
+    lines = [
+        "# Control",
+        "",
+        f"Measured on {report.machine}.",
+        f"Flights of {report.count} steps of 1 ms in gusts, with elastic cables.",
+        "",
+        "## Whole steps, from state to command",
+        "",
+        f"Ratio: to {STANDARD}.",
+        "",
+        "| task | controller | median us | p99 us | ratio |",
+        "|---|---|---:|---:|---:|",
+    ]
+    for row in report.steps:
+        cells = [row.detail or "-", "-", "-"]
+        if row.median_us is not None:
+            cells = [f"{row.median_us:.0f}", f"{row.p99_us:.0f}", f"{row.ratio:.1f}"]
+        lines.append(f"| {row.task} | {row.controller} | {' | '.join(cells)} |")
+    lines += [
+        "",
+        "## Quadratic programs of predictive control",
+        "",
+        f"Ratios: to `{REFERENCE}` and to `{TOWLINE}`, medians over turns of {BLOCK}. Error: of the first stage's "
+        "controls, in units of their range. Residual: of the conditions of optimality, in the same units, all stages.",
+        f"Failures: no answer, or an error of more than {FAILED:g}.",
+        "",
+        "| task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures |",
+        "|---|---|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    order = list(dict.fromkeys(row.task for row in report.rows))
+    for row in sorted(report.rows, key=lambda row: (order.index(row.task), row.ratio)):
+        off = " | ".join("-" if value is None else f"{value:.0e}" for value in (row.max_error, row.residual))
+        lines.append(
+            f"| {row.task} | {row.contender} | {row.tolerance} | {row.median_us:.0f} | {row.p99_us:.0f} | "
+            f"{row.ratio:.2f} | {row.ratio_to_horizon:.2f} | {off} | {row.failures} of {row.programs} |"
+        )
+    lines += [
+        "",
+        "## Errors of the position",
+        "",
+        f"{report.seeds} flights, the same gusts for all controllers. Ratio: of a flight's largest error to that with "
+        f"{STANDARD}, median of the flights.",
+        "",
+        "| task | controller | rms mm | largest mm | ratio | not as planned | slack |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for row in report.errors:
+        lines.append(
+            f"| {row.task} | {row.controller} | {row.rms_mm:.3g} | {row.max_mm:.3g} | {row.ratio:.2g} | "
+            f"{100 * row.soft:.1f} % | {100 * row.slack:.1f} % |"
+        )
+    return "\n".join(lines) + "\n"

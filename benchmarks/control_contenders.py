@@ -1,0 +1,310 @@
+"""Define the contenders at the quadratic programs of a predictive controller: towline's `Horizon`, and other solvers.
+
+Each contender has a function that writes a program into the layout which its solver wants, which is not timed, and one
+that solves it, which is. What solvers keep from one program to the next they keep: working sets, last solutions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..solvers import Horizon
+
+__all__ = ["CONTENDERS", "FIELDS", "REFERENCE", "TOWLINE", "Contender", "Program", "condense", "exact"]
+
+Array = NDArray[np.float64]
+REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, as flown"
+FAR = 1e4  # in place of infinite bounds, for solvers that need numbers
+GOOD = 1e-3  # residuals at which predictive control uses a solution that did not converge
+FIELDS = ("A", "B", "c", "start", "Q", "R", "q", "r", "u_min", "u_max")
+
+
+class Program(NamedTuple):
+    """A program as a flight has had it: arrays of `StageProblem`, the guess, and whether it was used."""
+
+    A: Array  # (N, n, n)
+    B: Array  # (N, n, m)
+    c: Array  # (N, n)
+    start: Array  # (n,)
+    Q: Array  # (N + 1, n, n)
+    R: Array  # (N, m, m)
+    q: Array  # (N + 1, n)
+    r: Array  # (N, m)
+    u_min: Array  # (N, m)
+    u_max: Array  # (N, m)
+    states: Array  # (N + 1, n)
+    controls: Array  # (N, m)
+    warm: bool
+
+
+class Solver(NamedTuple):
+    """One solver at the programs of one flight: `solve(arrange(program))` is the controls (N, m), None if none."""
+
+    arrange: Callable[[Program], Any]
+    solve: Callable[[Any], Array | None]
+
+
+class Contender(NamedTuple):
+    """A solver, the accuracy that is required of it, and how to start it with the first program of a flight."""
+
+    name: str
+    tolerance: str
+    prepare: Callable[[Program], Solver]
+
+
+def condense(program: Program) -> tuple[Array, Array]:
+    """Return matrix (N m, N m) and vector of the cost of the controls alone, in time that grows with N^2."""
+    N, n, m = program.B.shape
+    effect, state = np.zeros((N, n, N * m)), program.start
+    states = np.zeros((N, n))
+    for k in range(N):
+        if k > 0:
+            np.matmul(program.A[k], effect[k - 1, :, : k * m], out=effect[k, :, : k * m])
+        effect[k, :, k * m : k * m + m] = program.B[k]
+        state = states[k] = program.A[k] @ state + program.c[k]
+    cost, slope = np.zeros((N * m, N * m)), program.r.copy()
+    weighed, along = np.zeros((n, N * m)), np.zeros(n)
+    for k in range(N - 1, -1, -1):
+        if k < N - 1:
+            weighed, along = program.A[k + 1].T @ weighed[:, : k * m + m], program.A[k + 1].T @ along
+        weighed = weighed[:, : k * m + m] + program.Q[k + 1] @ effect[k, :, : k * m + m]
+        along = along + program.Q[k + 1] @ states[k] + program.q[k + 1]
+        rows = slice(k * m, k * m + m)
+        part = program.B[k].T @ weighed
+        cost[rows, : k * m + m], cost[: k * m + m, rows] = part, part.T
+        cost[rows, rows] += program.R[k]
+        slope[k] += program.B[k].T @ along
+    return cost, slope.ravel()
+
+
+def exact(program: Program) -> list[Array]:
+    """Return the controls of the optimum, (N, m), as accurately as `Horizon`, and daqp, can; one of them may be off."""
+    import daqp
+
+    horizon = _horizon(program, 1e-11, 100)
+    horizon.solve()
+    kinds, none = np.zeros(program.r.size, dtype=np.int32), np.zeros((0, program.r.size))
+    found = daqp.solve(*condense(program), none, program.u_max.ravel(), program.u_min.ravel(), kinds, primal_tol=1e-11)
+    return [horizon.controls.copy(), found[0].reshape(program.r.shape)]
+
+
+def _horizon(program: Program, tolerance: float, iterations: int) -> Horizon:
+    N, n, m = program.B.shape
+    horizon = Horizon(N, n, m)
+    horizon.tolerance, horizon.iterations_max = tolerance, iterations
+    for name in FIELDS:
+        getattr(horizon, name)[...] = getattr(program, name)
+    return horizon
+
+
+def _towline(warm: bool) -> Callable[[Program], Solver]:
+    def prepare(first: Program) -> Solver:
+        horizon = _horizon(first, 1e-6, 20)
+
+        def arrange(program: Program) -> bool:
+            for name in FIELDS:
+                getattr(horizon, name)[...] = getattr(program, name)
+            horizon.states[:], horizon.controls[:] = program.states, program.controls
+            return warm and program.warm
+
+        def solve(begun: bool) -> Array | None:
+            horizon.solve(warm=begun)
+            usable = horizon.converged or all(residual <= GOOD for residual in horizon.residuals)
+            return horizon.controls.copy() if usable else None
+
+        return Solver(arrange, solve)
+
+    return prepare
+
+
+def _daqp(first: Program) -> Solver:
+    import daqp
+
+    shape = first.r.shape
+    none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
+
+    def solve(program: Program) -> Array | None:
+        cost, slope = condense(program)
+        u, _, flag, _ = daqp.solve(cost, slope, none, program.u_max.ravel(), program.u_min.ravel(), kinds)
+        return u.reshape(shape) if flag > 0 else None
+
+    return Solver(lambda program: program, solve)
+
+
+def _daqp_alone(first: Program) -> Solver:
+    import daqp
+
+    shape = first.r.shape
+    none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
+
+    def solve(given: tuple[Array, ...]) -> Array | None:
+        cost, slope, high, low, guess = given
+        u, _, flag, _ = daqp.solve(cost, slope, none, high, low, kinds, primal_start=guess)
+        return u.reshape(shape) if flag > 0 else None
+
+    return Solver(lambda p: (*condense(p), p.u_max.ravel(), p.u_min.ravel(), p.controls.ravel()), solve)
+
+
+class Sparse:
+    """Sparse matrices of programs of one size, for z = (u_0, x_1, u_1, ..., x_N); behind x_0 if that is a variable."""
+
+    def __init__(self, first: Program, fixed_start: bool):
+        N, n, m = first.B.shape
+        self.offset = 0 if fixed_start else n
+        self.size, self.rows = N * (m + n) + self.offset, N * n
+        self.controls = (np.arange(N)[:, None] * (m + n) + np.arange(m)).ravel() + self.offset
+        self.states = (np.arange(N)[:, None] * (m + n) + m + np.arange(n)) + self.offset
+        before = np.vstack([np.arange(n), self.states[:-1]])  # where a stage's state is, if x_0 is a variable
+        H = np.zeros((self.size, self.size))
+        inputs = self.controls.reshape(N, m)
+        for k in range(N):
+            H[np.ix_(inputs[k], inputs[k])] = first.R[k]
+            H[np.ix_(self.states[k], self.states[k])] = first.Q[k + 1]
+        self.H = sp.csc_matrix(H)
+        row = np.arange(self.rows).reshape(N, n)
+        begin = 1 if fixed_start else 0  # the first stage whose state is a variable
+        places = [
+            (np.broadcast_to(row[:, :, None], first.B.shape), np.broadcast_to(inputs[:, None, :], first.B.shape)),
+            (
+                np.broadcast_to(row[begin:, :, None], first.A[begin:].shape),
+                np.broadcast_to(before[begin:, None, :], first.A[begin:].shape),
+            ),
+            (row, self.states),
+        ]
+        at = [np.concatenate([part[i].ravel() for part in places]) for i in range(2)]
+        self._first, self._order = begin, np.lexsort((at[0], at[1]))
+        ordered = (np.ones(self._order.size), (at[0][self._order], at[1][self._order]))
+        self.pattern = sp.csc_matrix(ordered, shape=(self.rows, self.size))
+
+    def values(self, program: Program) -> Array:
+        """Return the entries of the dynamics' rows, B u + A x - x of the next stage, in the order of `pattern`."""
+        entries = (program.B.ravel(), program.A[self._first :].ravel(), np.full(self.rows, -1.0))
+        return np.concatenate(entries)[self._order]
+
+    def right(self, program: Program) -> Array:
+        """Return the right side of the dynamics' rows, (N n,)."""
+        right = -program.c.copy()
+        if self.offset == 0:
+            right[0] -= program.A[0] @ program.start
+        return right.ravel()
+
+    def linear(self, program: Program) -> Array:
+        """Return the linear cost."""
+        slope = np.zeros(self.size)
+        slope[self.controls], slope[self.states] = program.r.ravel(), program.q[1:]
+        return slope
+
+
+def _osqp(tolerance: float) -> Callable[[Program], Solver]:
+    def prepare(first: Program) -> Solver:
+        import osqp
+
+        sparse, shape = Sparse(first, fixed_start=True), first.r.shape
+        unit = sp.csc_matrix(np.eye(sparse.size)[sparse.controls])
+        # Rows of controls have no entries that change, so that those of the dynamics can be exchanged by their places.
+        dynamics = sp.csc_matrix(
+            (np.arange(1.0, 1 + sparse.pattern.nnz), sparse.pattern.indices, sparse.pattern.indptr)
+        )
+        both = sp.vstack([dynamics, -unit], format="csc")
+        places, which = np.flatnonzero(both.data > 0), both.data[both.data > 0].astype(int) - 1
+        both.data[both.data < 0] = 1.0
+
+        def arrange(program: Program) -> dict[str, Array]:
+            entries, right = np.ones(both.nnz), sparse.right(program)
+            entries[places] = sparse.values(program)[which]
+            low, high = np.r_[right, program.u_min.ravel()], np.r_[right, program.u_max.ravel()]
+            return {"q": sparse.linear(program), "Ax": entries, "l": low, "u": high}
+
+        begun, solver = arrange(first), osqp.OSQP()
+        both.data[:] = begun["Ax"]
+        options = {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": 20_000, "verbose": False}
+        solver.setup(sp.triu(sparse.H, format="csc"), begun["q"], both, begun["l"], begun["u"], **options)
+
+        def solve(given: dict[str, Array]) -> Array | None:
+            solver.update(**given)
+            found = solver.solve(raise_error=False)
+            return found.x[sparse.controls].reshape(shape) if found.info.status == "solved" else None
+
+        return Solver(arrange, solve)
+
+    return prepare
+
+
+def _clarabel(first: Program) -> Solver:
+    clarabel: Any = import_module("clarabel")
+
+    sparse, shape = Sparse(first, fixed_start=True), first.r.shape
+    unit = sp.csc_matrix(np.eye(sparse.size)[sparse.controls])
+    dynamics = sp.csc_matrix((np.arange(2.0, 2 + sparse.pattern.nnz), sparse.pattern.indices, sparse.pattern.indptr))
+    rows = sp.vstack([dynamics, -unit, unit], format="csc")
+    places, which = np.flatnonzero(rows.data > 1), rows.data[rows.data > 1].astype(int) - 2
+    ends = np.where(rows.data > 1, 0.0, rows.data)
+
+    def arrange(program: Program) -> dict[str, Array]:
+        entries = ends.copy()
+        entries[places] = sparse.values(program)[which]
+        bounds = np.clip(np.r_[-program.u_min.ravel(), program.u_max.ravel()], -FAR, FAR)
+        right = np.r_[sparse.right(program), bounds]
+        return {"q": sparse.linear(program), "A": entries, "b": right}
+
+    begun, settings = arrange(first), clarabel.DefaultSettings()
+    settings.verbose = settings.presolve_enable = False  # without presolve the data can be changed
+    rows.data[:] = begun["A"]
+    cones = [clarabel.ZeroConeT(sparse.rows), clarabel.NonnegativeConeT(2 * sparse.controls.size)]
+    cost = sp.triu(sparse.H, format="csc")
+    solver = clarabel.DefaultSolver(cost, begun["q"], rows, begun["b"], cones, settings)
+
+    def solve(given: dict[str, Array]) -> Array | None:
+        solver.update(**given)
+        found = solver.solve()
+        well = found.status == clarabel.SolverStatus.Solved
+        return np.array(found.x)[sparse.controls].reshape(shape) if well else None
+
+    return Solver(arrange, solve)
+
+
+def _hpipm(first: Program) -> Solver:
+    N, n, m = first.B.shape
+    sparse, shape = Sparse(first, fixed_start=False), first.r.shape
+    H = ca.DM(sparse.H + sp.csc_matrix(([1.0] * n, (range(n), range(n))), shape=sparse.H.shape))
+    pattern = ca.DM(sparse.pattern).sparsity()
+    sizes = {"N": N, "nx": [n] * (N + 1), "nu": [m] * N + [0], "ng": [0] * (N + 1)}
+    # Bounds that are infinite are numbers to this interface: with its own, 1e8, the iterations do not converge.
+    settings = {"error_on_fail": False, "inf": FAR, "hpipm": {"mode": "speed_abs", "iter_max": 100}}
+    options: dict[str, Any] = {**sizes, **settings}
+    solver = ca.conic("stages", "hpipm", {"h": H.sparsity(), "a": pattern}, options)
+
+    def arrange(program: Program) -> dict[str, ca.DM]:
+        low, high = np.full(sparse.size, -np.inf), np.full(sparse.size, np.inf)
+        low[:n] = high[:n] = program.start
+        low[sparse.controls], high[sparse.controls] = program.u_min.ravel(), program.u_max.ravel()
+        right = ca.DM(sparse.right(program))
+        given = {"g": sparse.linear(program), "lbx": low, "ubx": high}
+        rows = ca.DM(pattern, sparse.values(program))
+        return {name: ca.DM(value) for name, value in given.items()} | {"h": H, "a": rows, "lba": right, "uba": right}
+
+    def solve(given: dict[str, ca.DM]) -> Array | None:
+        found = solver(**given)
+        well = solver.stats()["success"]
+        return np.array(found["x"]).ravel()[sparse.controls].reshape(shape) if well else None
+
+    return Solver(arrange, solve)
+
+
+CONTENDERS = (
+    Contender(TOWLINE, "1e-6", _towline(True)),
+    Contender("towline Horizon, cold", "1e-6", _towline(False)),
+    Contender(REFERENCE, "1e-6, its own", _daqp),
+    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", _daqp_alone),
+    Contender("osqp, sparse, warm", "1e-6", _osqp(1e-6)),
+    Contender("osqp, sparse, warm, loose", "1e-3, its own", _osqp(1e-3)),
+    Contender("clarabel, sparse, reuse", "1e-8, its own", _clarabel),
+    Contender("hpipm through CasADi", "speed_abs, its own", _hpipm),
+)

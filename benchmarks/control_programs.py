@@ -1,0 +1,131 @@
+"""Measure solvers at the programs of a predictive controller: in turns, beside the best solution that is known."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .control_contenders import REFERENCE, TOWLINE, Contender, Program, condense, exact
+
+__all__ = ["BLOCK", "FAILED", "Row", "measure"]
+
+Array = NDArray[np.float64]
+
+FAILED = 1e-3  # controls this far off are a failure, in units of their range
+BLOCK = 25  # programs of a turn
+
+
+@dataclass(frozen=True)
+class Row:
+    """A solver at the programs of a task.
+
+    Attributes
+    ----------
+    task, contender, tolerance :
+        The task, the contender, and the accuracy required.
+    median_us, p99_us :
+        Time of a program [us].
+    ratio, ratio_to_horizon :
+        To condensing and `daqp.solve`, and to `Horizon` as it was flown: medians over the turns.
+    max_error :
+        Largest error of the first stage's controls, in units of their range.
+    residual :
+        Largest step of a control of any stage along its gradient, over its curvature, inside its bounds; in the same
+        units.
+    failures :
+        Programs, of `programs`, without an answer or with an error above `FAILED`.
+    programs :
+        How many it was given.
+    """
+
+    task: str
+    contender: str
+    tolerance: str
+    median_us: float
+    p99_us: float
+    ratio: float
+    ratio_to_horizon: float
+    max_error: float | None
+    residual: float | None
+    failures: int
+    programs: int
+
+
+def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:
+    """Measure contenders at the programs of one flight, in turns of a few; `TOWLINE` and `REFERENCE` among them."""
+    times = {each.name: np.full(len(programs), np.nan) for each in contenders}
+    errors, residuals = ({each.name: np.full(len(programs), np.nan) for each in contenders} for _ in range(2))
+    solvers = {each.name: each.prepare(programs[0]) for each in contenders}
+    for solver in solvers.values():  # imports and machine code belong to no program
+        solver.solve(solver.arrange(programs[0]))
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        for begin in range(0, len(programs), BLOCK):
+            block = range(begin, min(begin + BLOCK, len(programs)))
+            known = [_known(programs[k]) for k in block]
+            for name, solver in solvers.items():
+                for k, (best, cost, slope) in zip(block, known, strict=True):
+                    given = solver.arrange(programs[k])
+                    start = time.perf_counter_ns()
+                    controls = solver.solve(given)
+                    times[name][k] = (time.perf_counter_ns() - start) / 1e3
+                    if controls is not None:
+                        errors[name][k] = _error(programs[k], controls, best)
+                        residuals[name][k] = _residual(programs[k], controls, cost, slope)
+            gc.collect()
+    finally:
+        if collecting:
+            gc.enable()
+
+    def ratio(name: str, to: str) -> float:
+        turns = [slice(at, at + BLOCK) for at in range(0, len(programs), BLOCK)]
+        return float(np.median([np.median(times[name][turn]) / np.median(times[to][turn]) for turn in turns]))
+
+    rows = []
+    for each in contenders:
+        off, answered = errors[each.name], np.isfinite(errors[each.name])
+        rows.append(
+            Row(
+                task=task,
+                contender=each.name,
+                tolerance=each.tolerance,
+                median_us=float(np.median(times[each.name])),
+                p99_us=float(np.percentile(times[each.name], 99)),
+                ratio=ratio(each.name, REFERENCE),
+                ratio_to_horizon=ratio(each.name, TOWLINE),
+                max_error=float(off[answered].max()) if answered.any() else None,
+                residual=float(residuals[each.name][answered].max()) if answered.any() else None,
+                failures=int((~(off <= FAILED)).sum()),
+                programs=len(programs),
+            )
+        )
+    return rows
+
+
+def _known(program: Program) -> tuple[Array, Array, Array]:
+    """Return the best solution that is known, (N, m), by its residual, and the condensed cost."""
+    cost, slope = condense(program)
+    return min(exact(program), key=lambda u: _residual(program, u, cost, slope)), cost, slope
+
+
+def _range(program: Program) -> Array:
+    """Return the range of each control, (N, m); 1 for a control that is fixed or has no limits."""
+    width = program.u_max - program.u_min
+    return np.where((width > 0) & np.isfinite(width), width, 1.0)
+
+
+def _error(program: Program, controls: Array, best: Array) -> float:
+    return float((np.abs(controls[0] - best[0]) / _range(program)[0]).max())
+
+
+def _residual(program: Program, controls: Array, cost: Array, slope: Array) -> float:
+    """Return how far each control alone would move to lower the cost inside its bounds, by the condensed cost."""
+    u = controls.ravel()
+    moved = np.clip(u - (cost @ u + slope) / np.diag(cost), program.u_min.ravel(), program.u_max.ravel())
+    return float((np.abs(moved - u) / _range(program).ravel()).max())
