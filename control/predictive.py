@@ -253,14 +253,17 @@ class Predictive(ComputedTorque):
             h.B[k, :, m:] = 0.0
         if self._surroundings.rows:
             self._surroundings.write(h, states, wanted, self._penalty)
-        h.start[:], h.r[:] = start, -self._weights.controls * planned[:-1]
-        h.q[:-1], h.q[-1] = -self._weights.states * wanted[:-1], -self._end @ wanted[-1]
         self._write_bounds(controls, planned)
-        h.states[:], h.controls[:] = states, controls
+        # What is left of errors and tensions near the reference must not drown in the rounding of large numbers.
+        h.c += np.einsum("kij,kj->ki", h.A, wanted[:-1]) + np.einsum("kij,kj->ki", h.B, planned[:-1]) - wanted[1:]
+        h.d -= np.einsum("kij,kj->ki", h.C, wanted[:-1]) + np.einsum("kij,kj->ki", h.D, planned[:-1])
+        h.u_min -= planned[:-1]
+        h.u_max -= planned[:-1]
+        h.start[:], h.states[:], h.controls[:] = start - wanted[0], states - wanted, controls - planned[:-1]
         h.solve(warm=h.converged)
         if h.converged or all(residual <= GOOD for residual in h.residuals):  # false for nan
-            self._guess[0][:], self._guess[1][:] = h.states, h.controls
-            states, controls, self._solved = h.states, h.controls, time
+            states, controls, self._solved = h.states + wanted, h.controls + planned[:-1], time
+            self._guess = states, controls
         elif not time - self._solved <= self._times[-1]:
             return None
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
