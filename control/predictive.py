@@ -61,7 +61,8 @@ class Predictive(ComputedTorque):
         With which errors decay where no limit is near [rad/s], a number or one for each coordinate of the pose.
         Default: 40, but 6 where carriers have to correct errors: those of towing robots and of teams of quadrotors.
     stages, stage
-        How many there are, and how long each lasts [s]; default: 20 of 0.015 s, but of 0.025 s where carriers correct.
+        How many there are, and how long each lasts [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may leave
+        their reference, which takes longer, and of 0.025 s where they have to correct errors.
     reach
         How far carriers should leave their reference at most: position [m] and attitude [rad]. A weight, and no limit:
         there a carrier costs as much as 5 % of the robot's weight in a tension. Default: they follow their reference,
@@ -117,7 +118,7 @@ class Predictive(ComputedTorque):
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
         count, duration = whole_number("stages", stages, 1, 200), stage
         if duration is None:
-            duration = 0.025 if correct else 0.015
+            duration = 0.025 if correct else 0.03 if far.any() else 0.015
         self._steps = np.full(count, number("stage", duration, 1e-4, 10.0))
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
         super().__init__(
