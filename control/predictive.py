@@ -112,6 +112,10 @@ class Predictive(ComputedTorque):
             lengths = np.linalg.norm(the_robot.home_anchors - the_robot.home_attachments, axis=1)
             reach = (USUAL_REACH * float(lengths.mean()) if correct else 0.0, 0.0)
         far = reach_of(the_robot, reach)
+        # Carriers that fly are slow, and react as with `ComputedTorque`, unless they have to correct.
+        flies = np.array([bool(carrier.efforts) for carrier in the_robot.carriers])
+        reacts = far * flies[:, None] * (not correct)
+        far = far - reacts
         self._bandwidth = positive("bandwidth", (6.0 if correct else 40.0) if bandwidth is None else bandwidth, 6)
         returning = (12.0 if correct else 2.0) if carrier_bandwidth is None else carrier_bandwidth
         returning = number("carrier_bandwidth", returning, 1e-3, 1e3)
@@ -124,11 +128,7 @@ class Predictive(ComputedTorque):
         super().__init__(
             the_robot, observer=observer, rate=rate, reach=reach, place=place, attitude=attitude, patience=patience
         )
-        # Carriers that fly are slow, and react as with `ComputedTorque`, unless they have to correct.
-        flies = np.array([bool(carrier.efforts) for carrier in the_robot.carriers])
-        reacts = far * flies[:, None] * (not correct)
         self._reach = reacts if reacts.any() else np.zeros((0, 6))
-        far = far - reacts
         self._followed = flies & ~far.any(axis=1)
         delay = 2.0 / self._loops[1], self._steps[0]
         if the_robot.fixed_lengths is None:
