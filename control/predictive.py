@@ -33,7 +33,7 @@ TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS = 20
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
 ALMOST = 1e-9  # of the largest entry of the gram matrix of efforts, whose rank may be less than six
-USUAL_REACH = 0.2  # of the cables' mean length
+USUAL_REACH = 0.06  # of the cables' mean length
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
 CLOSE = 1e-9  # [m, rad] by which a reference may differ from the one that was announced
@@ -66,11 +66,11 @@ class Predictive(ComputedTorque):
     reach
         How far carriers should leave their reference at most: position [m] and attitude [rad]. A weight, and no limit:
         there a carrier costs as much as 5 % of the robot's weight in a tension. Default: they follow their reference,
-        but where they correct errors they may leave it by a fifth of the cables' length. One that flies and does not
+        but where they correct errors they may leave it by 6 % of the cables' length. One that flies and does not
         have to correct is moved by the reaction of `ComputedTorque`, not by the solution.
     carrier_bandwidth, carrier_acceleration
-        With which those return [rad/s], default: 2, but 12 where they correct, and their largest acceleration beside
-        the reference's [m/s^2 and rad/s^2].
+        With which those return [rad/s], default: 2, but 6 where they correct, and their largest acceleration beside the
+        reference's [m/s^2 and rad/s^2].
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     tube
@@ -78,7 +78,9 @@ class Predictive(ComputedTorque):
     keep_out
         Bodies in {G} that the platform's frame and attachments should stay out of, as in a task's `keep_out`. Tube and
         bodies are kept wherever tensions can, by exact penalties; the reference may pass through a body.
-    observer, place, attitude, patience
+    observer
+        Bandwidth of the estimates of disturbances [rad/s], 0: none; default: 60, but 20 where carriers correct.
+    place, attitude, patience
         As for `ComputedTorque`.
 
     Raises
@@ -101,7 +103,7 @@ class Predictive(ComputedTorque):
         rate: Any = None,
         tube: float | None = None,
         keep_out: Sequence[Shape | dict[str, Any]] = (),
-        observer: float = 60.0,
+        observer: float | None = None,
         place: float = 5.0,
         attitude: float = 40.0,
         patience: float = 0.05,
@@ -117,7 +119,7 @@ class Predictive(ComputedTorque):
         reacts = far * flies[:, None] * (not correct)
         far = far - reacts
         self._bandwidth = positive("bandwidth", (6.0 if correct else 40.0) if bandwidth is None else bandwidth, 6)
-        returning = (12.0 if correct else 2.0) if carrier_bandwidth is None else carrier_bandwidth
+        returning = (6.0 if correct else 2.0) if carrier_bandwidth is None else carrier_bandwidth
         returning = number("carrier_bandwidth", returning, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
         count, duration = whole_number("stages", stages, 1, 200), stage
@@ -125,6 +127,8 @@ class Predictive(ComputedTorque):
             duration = 0.025 if correct else 0.03 if far.any() else 0.015
         self._steps = np.full(count, number("stage", duration, 1e-4, 10.0))
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
+        if observer is None:
+            observer = 20.0 if correct else 60.0
         super().__init__(
             the_robot, observer=observer, rate=rate, reach=reach, place=place, attitude=attitude, patience=patience
         )

@@ -227,7 +227,9 @@ def test_a_tube_is_kept_that_a_push_would_leave():
     robot = load("multi-quadrotor-3")
     push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
     flights = [
-        simulate(robot, robot.home, duration=1.5, controller=Predictive(robot, tube=tube), disturbance=push)
+        simulate(
+            robot, robot.home, duration=1.5, controller=Predictive(robot, bandwidth=3, tube=tube), disturbance=push
+        )
         for tube in (None, 0.02)
     ]
     assert flights[0].error.max() > 0.03
