@@ -265,7 +265,7 @@ class Predictive(ComputedTorque):
         h.u_min -= planned[:-1]
         h.u_max -= planned[:-1]
         h.start[:], h.states[:], h.controls[:] = start - wanted[0], states - wanted, controls - planned[:-1]
-        h.solve(warm=h.converged)
+        h.solve(warm=h.converged and isfinite(self._solved))  # not with what is left of another flight
         if h.converged or all(residual <= GOOD for residual in h.residuals):  # false for nan
             states, controls, self._solved = h.states + wanted, h.controls + planned[:-1], time
             self._guess = states, controls

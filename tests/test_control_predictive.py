@@ -358,6 +358,18 @@ def test_nothing_is_planned_where_residuals_are_no_numbers(monkeypatch):
     assert np.isnan(controller._solved)
 
 
+def test_a_controller_that_was_used_before_flies_as_a_new_one():
+    robot, controller = load("multi-quadrotor-3"), Predictive("multi-quadrotor-3")
+    push = np.array([2.0, 1.0, 0, 0, 0, 0.1])
+    simulate(robot, robot.home, duration=0.1, controller=controller, disturbance=-push)
+    flights = [
+        simulate(robot, robot.home, duration=0.1, controller=each, disturbance=push)
+        for each in (controller, Predictive(robot))
+    ]
+    np.testing.assert_array_equal(flights[0].record.commanded, flights[1].record.commanded)
+    np.testing.assert_array_equal(flights[0].record.motions, flights[1].record.motions)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
