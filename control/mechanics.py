@@ -122,7 +122,7 @@ def write_rows(
     at_reference = np.zeros_like(state), command, *spare
     for row in range(measured.shape[0]):
         write_bounds(limits, patience, dt, pulls[row], heard[row], bounds[:, row])
-        usable = is_usable(measured[row], reference[row], pulls[row])
+        usable = is_usable(measured[row], reference[row], pulls[row], t_ref[row], carriers[row])
         if usable:
             for b in range(count):
                 put_body(state, BODY * b, measured[row, b])
@@ -224,11 +224,17 @@ def hear(elapsed, reported, commanded, little, highest, heard, i):
             heard[IS_CUT, i], heard[REPORTED, i] = 1.0, 0.0
 
 
-def is_usable(measured, reference, pulls):
+def is_usable(measured, reference, pulls, t_ref, carriers):
     """Return whether all numbers of a row are finite and at most LARGEST."""
     usable = is_measured(measured, pulls)
     for k in range(18):
         usable &= abs(reference[k]) <= LARGEST
+    for i in range(t_ref.shape[0]):
+        usable &= abs(t_ref[i]) <= LARGEST
+    for c in range(carriers.shape[0]):
+        for k in range(6):
+            for order in range(3):
+                usable &= abs(carriers[c, order, k]) <= LARGEST
     return usable
 
 

@@ -105,10 +105,10 @@ class Freed:
         return np.stack([carriers[:, chosen, order, coordinate] for order in range(3)], axis=1)
 
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Return them and their rate, (2, f): the reference's in the first step, then as ordered."""
+        """Return them and their rate, (2, f): the reference's at first, then as ordered."""
         del measured
         place, rate, acceleration = self._placed
-        if dt > 0:
+        if np.isfinite(self._placed).all():
             place += dt * rate + dt * dt / 2 * acceleration
             rate += dt * acceleration
         else:
@@ -168,6 +168,7 @@ class Flown(Freed):
     @override
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Leave carriers to their reference."""
+        self._pending.add(np.zeros(self.count))
 
 
 class Tethered:
@@ -220,6 +221,7 @@ class Tethered:
 
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Leave carriers to their reference."""
+        self._pending.add(np.zeros(self.count))
 
 
 def _tethers(robot: Robot) -> np.ndarray:

@@ -210,7 +210,9 @@ class Predictive(ComputedTorque):
     def _rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, ...]:
         """Return platforms (K, 3, 6), carriers (K, c, 3, 6), moved coordinates (K, 3, f) and tensions (K, m)."""
         platform = np.array([reference[:3] for reference in references])
+        platform[:, 0, 3:] = np.unwrap(platform[:, 0, 3:], axis=0)
         carriers = np.stack([np.stack(reference[3:6], axis=1) for reference in references])
+        carriers[:, :, 0, 3:] = np.unwrap(carriers[:, :, 0, 3:], axis=0)
         unknown = self._statics if self.robot.fixed_lengths is not None else np.zeros(self.robot.m)
         tensions = [unknown if each.tensions is None else np.asarray(each.tensions, dtype=float) for each in references]
         return platform, carriers, self._moved.along(platform, carriers), np.stack(tensions)
@@ -239,7 +241,7 @@ class Predictive(ComputedTorque):
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
         bounds, now = self._problems.bounds[:, 0], self._rows([reference])
         placed = self._moved.now(dt, self._measured[0], now[2][0])
-        if not np.isfinite(self._problems.w).all():
+        if not all(np.isfinite(part).all() for part in (self._problems.w, *now)):
             self._solved = np.nan
             return None
         wanted, carriers, planned, ramps = self._look_ahead(time, now)
@@ -293,14 +295,16 @@ class Predictive(ComputedTorque):
             start, period, rows = self._announced
             steps, last = (time + self._times - start) / period, len(rows[0]) - 1
             at = np.clip(np.rint(steps), 0, last).astype(int)
-            if np.abs(rows[0][at[0]] - now[0][0]).max() <= CLOSE:
+            off = rows[0][at[0]] - now[0][0]
+            off[0, 3:] -= _turns(off[0, 3:])
+            if np.abs(off).max() <= CLOSE:
                 parts, beyond = [part[at] for part in rows], period * np.maximum(steps - last, 0.0)
         platform, carriers, moved, tensions = parts
         if beyond.any():
             platform, moved = (_extrapolated(part, beyond[:, None]) for part in (platform, moved))
             carriers = _extrapolated(carriers, beyond[:, None, None])
         states = np.concatenate([platform[:, 0], platform[:, 1], moved[:, 0], moved[:, 1]], axis=1)
-        states[:, 3:6] += self._turns(states[0, 3:6])
+        states[:, 3:6] += _turns(self._measured[0, 0, 3:6] - states[0, 3:6])
         ramp, dt = np.diff(np.concatenate([platform[:, 2], moved[:, 2]], axis=1), axis=0), self._steps[:, None]
         further, faster = dt * dt / 6 * ramp, dt / 2 * ramp
         ramps = np.concatenate([further[:, :6], faster[:, :6], further[:, 6:], faster[:, 6:]], axis=1)
@@ -327,10 +331,6 @@ class Predictive(ComputedTorque):
         wanted[:-1, 12 : 12 + f] += change[:, m:]
         wanted[-1, 12 : 12 + f] += change[-1, m:]
 
-    def _turns(self, angles: np.ndarray) -> np.ndarray:
-        """Return the whole turns that bring angles near to those measured [rad]."""
-        return 2 * np.pi * np.rint((self._measured[0, 0, 3:6] - angles) / (2 * np.pi))
-
     def _shifted(
         self, time: float, start: np.ndarray, wanted: np.ndarray, planned: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -343,7 +343,7 @@ class Predictive(ComputedTorque):
             states = (1 - share) * self._guess[0][first] + share * self._guess[0][second]
             first, second = np.minimum(first[:-1], count - 1), np.minimum(second[:-1], count - 1)
             controls = (1 - share) * self._guess[1][first] + share * self._guess[1][second]
-            states[:, 3:6] += self._turns(states[0, 3:6])
+            states[:, 3:6] += _turns(start[3:6] - states[0, 3:6])
         else:
             states, controls = wanted.copy(), np.zeros(self._guess[1].shape)
             states[:, :12] += np.exp(-self._bandwidth.min() * self._times)[:, None] * (start - wanted[0])[:12]
@@ -367,6 +367,11 @@ class Predictive(ComputedTorque):
         most = np.where(np.abs(controls[:, m:] - usual) > NEAR * self._strongest, self._strongest, np.inf)
         h.u_min[:, m:], h.u_max[:, m:] = usual - most, usual + most
         h.u_min[:, :m][:, cut] = h.u_max[:, :m][:, cut] = 0.0
+
+
+def _turns(off: np.ndarray) -> np.ndarray:
+    """Return the whole turns that are nearest to differences of angles [rad]."""
+    return 2 * np.pi * np.rint(off / (2 * np.pi))
 
 
 def _extrapolated(motion: np.ndarray, times: np.ndarray) -> np.ndarray:

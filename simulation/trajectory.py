@@ -154,8 +154,12 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     if (name and name != robot.name) or dataset["carrier_pose"].shape[1:] != (count, 6):
         raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
     nodes = dataset["time"].values
-    platform = [dataset[part].values for part in ("pose", "velocity", "acceleration")]
-    carriers = [dataset[f"carrier_{part}"].values for part in ("pose", "velocity", "acceleration")]
+    platform = [np.array(dataset[part].values, dtype=float) for part in ("pose", "velocity", "acceleration")]
+    carriers = [
+        np.array(dataset[f"carrier_{part}"].values, dtype=float) for part in ("pose", "velocity", "acceleration")
+    ]
+    for poses in (platform[0], carriers[0]):  # those of a flight are measured, and may jump by turns
+        poses[..., 3:] = np.unwrap(poses[..., 3:], axis=0)
     if len(nodes) < 2 or not all(np.isfinite(part).all() for part in (nodes, *platform, *carriers)):
         raise InputError("reference must be a plan of finite poses at two times or more")
 

@@ -1,0 +1,72 @@
+"""References as users have them: with angles that jump by a turn, and with what is no number."""
+
+import numpy as np
+import pytest
+
+from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
+from towline.models import load
+from towline.simulation import simulate
+from towline.simulation.trajectory import read_trajectory
+
+RATE, PERIOD = 1.0, 1e-3  # [rad/s], [s]
+
+
+def turning(robot, time, wrapped):
+    """Return the reference of a team that turns about the load's axis with RATE, past half a turn."""
+    yaw, still = np.pi - 0.05 + RATE * time, np.zeros(6)
+    pose, velocity = robot.home.copy(), RATE * np.eye(6)[5]
+    pose[5] = yaw - 2 * np.pi * (wrapped and yaw > np.pi)
+    c, s = np.cos(yaw), np.sin(yaw)
+    arms = (robot.carrier_home[:, :3] - robot.home[:3]) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    carriers = np.stack([robot.carrier_home, *np.zeros((2, *robot.carrier_home.shape))])
+    carriers[0, :, :3] = robot.home[:3] + arms
+    carriers[1, :, :3] = RATE * np.cross([0, 0, 1], arms)
+    carriers[2, :, :3] = -(RATE**2) * arms * [1, 1, 0]
+    return Reference(pose, velocity, still, *carriers)
+
+
+def test_announced_angles_may_jump_by_a_turn():
+    """The same motion with yaw between half turns has the same commands."""
+    robot, commands = load("multi-quadrotor-3"), []
+    for wrapped in (False, True):
+        references = [turning(robot, PERIOD * k, wrapped) for k in range(100)]
+        controller = Predictive(robot)
+        controller.follow(references, PERIOD)
+        steps = [controller.step(PERIOD * k, State(*r[:2], *r[3:5]), r) for k, r in enumerate(references)]
+        commands.append([np.concatenate([each.tensions, each.carrier_acceleration.ravel()]) for each in steps])
+    np.testing.assert_allclose(commands[1], commands[0], atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", [ComputedTorque, Predictive])
+@pytest.mark.parametrize("field", ["pose", "carrier_pose", "carrier_acceleration", "tensions"])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_reference_that_is_no_number_leaves_nothing_behind(kind, field, first):
+    """The answer to it is to hold, and those to the next ones are numbers again."""
+    robot = load("wang-ctmrts-4")
+    state = State(robot.home, np.zeros(6), robot.carrier_home, 0 * robot.carrier_home)
+    good = Reference(
+        robot.home, *np.zeros((2, 6)), robot.carrier_home, *(0 * robot.carrier_home,) * 2, np.full(4, 40.0)
+    )
+    controller = kind(robot)
+    if not first:
+        controller.step(0.0, state, good)
+    bad = good._replace(**{field: np.full_like(getattr(good, field), np.nan)})
+    command = controller.step(0.1, state, bad)
+    assert ANSWERS[command.answered] == "hold"
+    assert np.isfinite(command.tensions).all()
+    for k in range(1, 4):
+        command = controller.step(0.1 + PERIOD * k, state, good)
+        assert ANSWERS[command.answered] != "hold"
+        for part in (command.tensions, command.carrier_pose, command.carrier_velocity, command.carrier_acceleration):
+            assert np.isfinite(part).all()
+
+
+def test_a_flight_past_half_a_turn_is_a_reference():
+    """Attitudes of a flight are measured between half turns; between its samples they turn on."""
+    robot = load("wang-flying")
+    flown = simulate(robot, robot.home, duration=0.1).trajectory.copy(deep=True)
+    time = flown["time"].values
+    flown["pose"].values[:, 5] = np.where(time < 0.05, np.pi - 0.05 + time, -np.pi - 0.05 + time)
+    flown["velocity"].values[:, 5], flown["acceleration"].values[:, 5] = RATE, 0.0
+    platform, _ = read_trajectory(robot, flown, None).at(np.linspace(0, 0.099, 400))
+    np.testing.assert_allclose(platform[1][:, 5], RATE, rtol=1e-6)
