@@ -34,6 +34,7 @@ ITERATIONS = 20
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
 ALMOST = 1e-9  # of the largest entry of the gram matrix of efforts, whose rank may be less than six
 USUAL_REACH = 0.06  # of the cables' mean length
+LEAST_REACH = 0.02  # the same for cables of fixed length: with less, errors of the load are not corrected
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
 CLOSE = 1e-9  # [m, rad] by which a reference may differ from the one that was announced
@@ -65,9 +66,10 @@ class Predictive(ComputedTorque):
         their reference, which takes longer, and of 0.025 s where they have to correct errors.
     reach
         How far carriers should leave their reference at most: position [m] and attitude [rad]. A weight, and no limit:
-        there a carrier costs as much as 5 % of the robot's weight in a tension. Default: they follow their reference,
-        but where they correct errors they may leave it by 6 % of the cables' length. One that flies and does not
-        have to correct is moved by the reaction of `ComputedTorque`, not by the solution.
+        there a carrier costs as much as 5 % of the robot's weight in a tension. Less than 2 % of the cables' length
+        counts as that where these have fixed lengths. Default: they follow their reference, but where they correct
+        errors they may leave it by 6 % of the cables' length. One that flies and does not have to correct is moved by
+        the reaction of `ComputedTorque`, not by the solution.
     carrier_bandwidth, carrier_acceleration
         With which those return [rad/s], default: 2, but 6 where they correct, and their largest acceleration beside the
         reference's [m/s^2 and rad/s^2].
@@ -141,7 +143,8 @@ class Predictive(ComputedTorque):
             reaches = far[far > 0]
         else:
             self._moved = Tethered(self.robot, self._robot, *delay)
-            reaches = np.full(self._moved.count, far.max() or 1e-3)  # [m]: next to none
+            least = LEAST_REACH * float(self.robot.fixed_lengths.mean())
+            reaches = np.full(self._moved.count, max(far.max(), least))
         m, f = self.robot.m, self._moved.count
         self._sizes = count, 12 + 2 * f, m + f
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
