@@ -213,9 +213,10 @@ class Predictive(ComputedTorque):
     def _rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, ...]:
         """Return platforms (K, 3, 6), carriers (K, c, 3, 6), moved coordinates (K, 3, f) and tensions (K, m)."""
         platform = np.array([reference[:3] for reference in references])
-        platform[:, 0, 3:] = np.unwrap(platform[:, 0, 3:], axis=0)
         carriers = np.stack([np.stack(reference[3:6], axis=1) for reference in references])
-        carriers[:, :, 0, 3:] = np.unwrap(carriers[:, :, 0, 3:], axis=0)
+        if len(references) > 1:
+            platform[:, 0, 3:] = np.unwrap(platform[:, 0, 3:], axis=0)
+            carriers[:, :, 0, 3:] = np.unwrap(carriers[:, :, 0, 3:], axis=0)
         unknown = self._statics if self.robot.fixed_lengths is not None else np.zeros(self.robot.m)
         tensions = [unknown if each.tensions is None else np.asarray(each.tensions, dtype=float) for each in references]
         return platform, carriers, self._moved.along(platform, carriers), np.stack(tensions)
