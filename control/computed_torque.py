@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from math import isfinite
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -212,7 +213,7 @@ class ComputedTorque(Controller):
             raise InputError(f"state must be a State, got {shown(state)}")
         if not isinstance(reference, Reference):
             raise InputError(f"reference must be a Reference, got {shown(reference)}")
-        if not isinstance(time, float | int) or not isfinite(time):
+        if not isinstance(time, Real) or not isfinite(time):
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
         rows = 1 if np.ndim(state.pose) == 1 else len(state.pose)
         if rows != len(self._wanted):

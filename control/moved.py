@@ -88,10 +88,16 @@ class Moved(Protocol):
 class Freed:
     """Coordinates of carriers whose place is commanded: a solution starts where the last command left them."""
 
-    def __init__(self, reach: np.ndarray, strongest: float):
+    def __init__(self, reach: np.ndarray, strongest: float, boxes: tuple[np.ndarray, np.ndarray] | None = None):
         self.freed = np.ascontiguousarray(np.argwhere(reach))
         self.tethers, self.count, self.late = np.zeros((0, TETHER_COLUMNS)), len(self.freed), 0
         self._strongest = strongest
+        self._low, self._high = np.full(self.count, -np.inf), np.full(self.count, np.inf)
+        if boxes is not None:
+            chosen, coordinate = self.freed.T
+            moves = coordinate < 3
+            for side, own in zip(boxes, (self._low, self._high), strict=True):
+                own[moves] = side[chosen[moves], coordinate[moves]]
         self.reset()
 
     def reset(self) -> None:
@@ -111,6 +117,10 @@ class Freed:
         if np.isfinite(self._placed).all():
             place += dt * rate + dt * dt / 2 * acceleration
             rate += dt * acceleration
+            # They are commanded no further than the sides of their boxes.
+            outside = (place < self._low) | (place > self._high)
+            place[:] = np.clip(place, self._low, self._high)
+            rate[outside] = 0.0
         else:
             self._placed[:2], self._placed[2] = reference[:2], 0.0
         return self._placed[:2]

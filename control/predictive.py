@@ -136,14 +136,15 @@ class Predictive(ComputedTorque):
         )
         self._reach = reacts if reacts.any() else np.zeros((0, 6))
         self._followed = flies & ~far.any(axis=1)
-        delay = 2.0 / self._loops[1], self._steps[0]
+        # What is under way for longer than half of the stages would leave nothing to decide.
+        delay = min(2.0 / self._loops[1], self._times[-1] / 2), self._steps[0]
         if the_robot.fixed_lengths is None:
             late = Flown(far, self._strongest, *delay) if (far.any(axis=1) & flies).any() else None
-            self._moved: Moved = late or Freed(far, self._strongest)
+            self._moved: Moved = late or Freed(far, self._strongest, self._boxes)
             reaches = far[far > 0]
         else:
             self._moved = Tethered(self.robot, self._robot, *delay)
-            least = LEAST_REACH * float(self.robot.fixed_lengths.mean())
+            least = LEAST_REACH * float(the_robot.fixed_lengths.mean())
             reaches = np.full(self._moved.count, max(far.max(), least))
         m, f = self.robot.m, self._moved.count
         self._sizes = count, 12 + 2 * f, m + f
