@@ -22,6 +22,7 @@ from .computed_torque import ComputedTorque, positive, reach_of
 from .machine import stages as write_stages
 from .mechanics import DISTURBANCE, HIGHEST, LOWEST, RATE_MAX
 from .moved import Flown, Freed, Moved, Tethered
+from .preview import ROUNDING, rows_at
 from .reference import Reference
 from .state import State
 from .surroundings import Surroundings
@@ -30,14 +31,15 @@ from .weights import terminal, weights
 __all__ = ["Predictive"]
 
 TOLERANCE = 1e-6  # of the residuals of a solution
-ITERATIONS = 20
+ITERATIONS, COLD_ITERATIONS = 20, 30
+NEARLY = 0.1  # residuals of an iterate that the next step goes on from, though it is not used
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
-ALMOST = 1e-9  # of the largest entry of the gram matrix of efforts, whose rank may be less than six
+ALMOST = 1e-4  # of the largest entry of the gram matrix of efforts: wrenches that cost more are not corrected
 USUAL_REACH = 0.06  # of the cables' mean length
 LEAST_REACH = 0.02  # the same for cables of fixed length: with less, errors of the load are not corrected
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
-CLOSE = 1e-9  # [m, rad] by which a reference may differ from the one that was announced
+CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was announced
 
 
 class Predictive(ComputedTorque):
@@ -183,6 +185,7 @@ class Predictive(ComputedTorque):
         count, n, u = self._sizes
         self._guess = np.zeros((count + 1, n)), np.zeros((count, u))
         self._solved = np.nan  # when it was [s]
+        self._is_near = False  # whether the next solution may start from the last
         self._moved.reset()
         self._announced: tuple[float, float, tuple[np.ndarray, ...]] | None = None
 
@@ -193,7 +196,8 @@ class Predictive(ComputedTorque):
         Parameters
         ----------
         references
-            One for each period, from `start` [s] on; beyond the last one its accelerations stay.
+            One for each period, from `start` [s] on; between them accelerations change evenly, and beyond the last one
+            they stay.
         period
             [s].
 
@@ -272,8 +276,12 @@ class Predictive(ComputedTorque):
         h.u_min -= planned[:-1]
         h.u_max -= planned[:-1]
         h.start[:], h.states[:], h.controls[:] = start - wanted[0], states - wanted, controls - planned[:-1]
-        h.solve(warm=h.converged and isfinite(self._solved))  # not with what is left of another flight
-        if h.converged or all(residual <= GOOD for residual in h.residuals):  # false for nan
+        warm = self._is_near and isfinite(self._solved)  # not with what is left of another flight
+        h.iterations_max = ITERATIONS if warm else COLD_ITERATIONS
+        h.solve(warm=warm)
+        worst = max(residual if residual >= 0 else np.inf for residual in h.residuals)  # infinite for nan
+        self._is_near = h.converged or (not warm and worst <= NEARLY)
+        if worst <= GOOD:
             states, controls, self._solved = h.states + wanted, h.controls + planned[:-1], time
             self._guess = states, controls
         elif not time - self._solved <= self._times[-1]:
@@ -294,20 +302,17 @@ class Predictive(ComputedTorque):
         the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
         early.
         """
-        beyond = self._times
-        parts = [np.repeat(part, len(beyond), axis=0) for part in now]
+        parts = rows_at(now, self._times, np.zeros(len(self._times), dtype=int), 1.0)
         if self._announced is not None:
             start, period, rows = self._announced
-            steps, last = (time + self._times - start) / period, len(rows[0]) - 1
-            at = np.clip(np.rint(steps), 0, last).astype(int)
-            off = rows[0][at[0]] - now[0][0]
-            off[0, 3:] -= _turns(off[0, 3:])
+            steps = (time + self._times - start) / period
+            before = np.clip(np.floor(steps + ROUNDING), 0, len(rows[0]) - 1).astype(int)
+            announced = rows_at(rows, period * (steps - before), before, period)
+            off = announced[0][0, 0] - now[0][0, 0]
+            off[3:] -= _turns(off[3:])
             if np.abs(off).max() <= CLOSE:
-                parts, beyond = [part[at] for part in rows], period * np.maximum(steps - last, 0.0)
+                parts = announced
         platform, carriers, moved, tensions = parts
-        if beyond.any():
-            platform, moved = (_extrapolated(part, beyond[:, None]) for part in (platform, moved))
-            carriers = _extrapolated(carriers, beyond[:, None, None])
         states = np.concatenate([platform[:, 0], platform[:, 1], moved[:, 0], moved[:, 1]], axis=1)
         states[:, 3:6] += _turns(self._measured[0, 0, 3:6] - states[0, 3:6])
         ramp, dt = np.diff(np.concatenate([platform[:, 2], moved[:, 2]], axis=1), axis=0), self._steps[:, None]
@@ -325,8 +330,9 @@ class Predictive(ComputedTorque):
         """
         h, m, f, dt = self._horizon, self.robot.m, self._moved.count, self._steps
         missed = wanted[1:] - np.einsum("kij,kj->ki", h.A, wanted[:-1]) - np.einsum("kij,kj->ki", h.B, planned[:-1])
-        missing = (missed - h.c)[:, 6:12] / dt[:, None]
-        gains = np.concatenate([h.B[:, 6:12, :m], h.A[:, 6:12, 12 : 12 + f]], axis=2) / dt[:, None, None]
+        by = np.repeat([1.0, self.robot.length], 3) / dt[:, None]  # accelerations, all of them in m/s^2
+        missing = by * (missed - h.c)[:, 6:12]
+        gains = by[:, :, None] * np.concatenate([h.B[:, 6:12, :m], h.A[:, 6:12, 12 : 12 + f]], axis=2)
         weighted = gains / self._efforts
         gram = np.einsum("kij,klj->kil", weighted, gains)  # of what may be no numbers, far off
         size = np.einsum("kii->ki", gram)
@@ -377,9 +383,3 @@ class Predictive(ComputedTorque):
 def _turns(off: np.ndarray) -> np.ndarray:
     """Return the whole turns that are nearest to differences of angles [rad]."""
     return 2 * np.pi * np.rint(off / (2 * np.pi))
-
-
-def _extrapolated(motion: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return places and rates moved on with their accelerations, (..., 3, k), by times [s]."""
-    place, rate, acceleration = motion[..., 0, :], motion[..., 1, :], motion[..., 2, :]
-    return np.stack([place + times * (rate + times / 2 * acceleration), rate + times * acceleration, acceleration], -2)

@@ -15,6 +15,7 @@ SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much a
 SINGULAR = 1e-3  # of the largest singular value: directions with less are not controlled by tensions
 ROUNDS = 2000  # of the Riccati recursion
 SETTLED = 1e-9  # relative change at which it ends
+DISCOUNT = 0.95  # of the cost of each stage, if it does not settle without
 
 
 class Weights(NamedTuple):
@@ -82,8 +83,17 @@ def weights(
 def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:
     """Return the cost that follows the last stage if the dynamics x' = A x + B u stay, without limits, (n, n).
 
-    By the Riccati recursion; for a state that controls do not reach it never settles, and ends after `ROUNDS`.
+    By the Riccati recursion. It never settles for motions that controls do not reach, as the swing of a load with few
+    cables: then costs count less, the later they are.
     """
+    for discount in (1.0, DISCOUNT):
+        P, settled = _cost_to_go(np.sqrt(discount) * A, np.sqrt(discount) * B, by)
+        if settled:
+            break
+    return P
+
+
+def _cost_to_go(A: np.ndarray, B: np.ndarray, by: Weights) -> tuple[np.ndarray, bool]:
     Q, R = np.diag(by.states), np.diag(by.controls)
     P = Q
     for _ in range(ROUNDS):
@@ -92,5 +102,5 @@ def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:
         last, P = P, Q + A.T @ (P @ A - PB @ gain)
         P = (P + P.T) / 2
         if np.abs(P - last).max() <= SETTLED * np.abs(P).max():
-            break
-    return P
+            return P, True
+    return P, False

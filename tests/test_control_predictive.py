@@ -358,6 +358,48 @@ def test_nothing_is_planned_where_residuals_are_no_numbers(monkeypatch):
     assert np.isnan(controller._solved)
 
 
+def test_references_may_be_announced_with_another_period_than_that_of_the_steps():
+    """Every 20 ms, of a motion that turns around within the stages: the command is nearly that of all references."""
+    robot = load("cogiro")
+    state, still = rest(robot)
+
+    def reference(time):
+        w, x = 3.0, np.eye(6)[0]
+        place, speed = 0.1 * np.sin(w * time), 0.1 * w * np.cos(w * time)
+        return still._replace(pose=robot.home + place * x, velocity=speed * x, acceleration=-(w**2) * place * x)
+
+    commands = []
+    for period in (None, 0.02, 0.001):
+        controller = Predictive(robot)
+        if period is not None:
+            controller.follow([reference(period * k) for k in range(round(1.0 / period))], period)
+        for time in (0.411, 0.412, 0.413):
+            now = reference(time)
+            moving = state._replace(pose=now.pose, velocity=now.velocity)
+            tensions = controller.step(time, moving, now).tensions
+        commands.append(tensions)
+    unannounced, sparse, dense = commands
+    assert np.abs(sparse - dense).max() < 0.5 * np.abs(unannounced - dense).max() < 0.01  # [N], of 400
+
+
+def test_wrenches_that_no_cable_gives_do_not_use_up_the_tensions():
+    """Four cables of which three are independent, with carriers that stay: tensions answer what they can."""
+    robot = load("wang-ctmrts-4")
+    controller = Predictive(robot, reach=(0, 0))
+    flight = simulate(robot, robot.home, duration=1.0, controller=controller, disturbance=[5, 3, 0, 0, 0, 0])
+    assert flight.error.max() < 0.05
+    assert flight.record.tensions.min() > 20
+
+
+def test_a_calm_motion_at_the_lowest_tensions_is_answered_as_planned():
+    robot = load("ipanema-1")
+    end = robot.home[:3] + np.array([0.05, 0.04, 0.03])
+    line = {"kind": "line", "start": robot.home[:3].tolist(), "end": end.tolist()}
+    flight = simulate(robot, line, duration=1.0, controller=Predictive(robot))
+    assert flight.answered["as planned"] == 1000
+    assert (flight.record.commanded <= robot.t_min * (1 + 1e-6)).any()
+
+
 def test_a_controller_that_was_used_before_flies_as_a_new_one():
     robot, controller = load("multi-quadrotor-3"), Predictive("multi-quadrotor-3")
     push = np.array([2.0, 1.0, 0, 0, 0, 0.1])
