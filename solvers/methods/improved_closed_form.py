@@ -32,6 +32,7 @@ class ImprovedClosedForm(Method):
         """Hold the cable farthest outside its limits and distribute the rest again, until all are inside."""
         s = middle(form)
         free = np.ones(s.size, dtype=bool)
+        near = ROUNDING * (1.0 + np.abs(s).max(initial=0.0))  # of the numbers that results are differences of
         for reduction in range(s.size + 1):
             left = form.b - form.Q @ s
             s[free] += np.linalg.pinv(form.Q[:, free], rcond=RANK) @ left
@@ -40,8 +41,8 @@ class ImprovedClosedForm(Method):
                 return Proposal(None, reduction + 1, f"no redundancy left after {reduction} cables were held")
             if not outside(form, s):
                 # Up to rounding this is at a limit: a problem that requires no wrench has no tolerance.
-                s = np.where(np.abs(s - form.lower) < ROUNDING, form.lower, s)
-                return Proposal(np.where(np.abs(s - form.upper) < ROUNDING, form.upper, s), reduction + 1)
+                s = np.where(np.abs(s - form.lower) < near, form.lower, s)
+                return Proposal(np.where(np.abs(s - form.upper) < near, form.upper, s), reduction + 1)
             beyond = np.where(free, np.maximum(form.lower - s, s - form.upper), -np.inf)
             worst = int(np.argmax(beyond))
             s[worst] = form.lower[worst] if s[worst] < form.lower[worst] else form.upper[worst]
