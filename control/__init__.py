@@ -1,6 +1,7 @@
 """One step of control: a measured state and a reference in, a command out.
 
-`Controller` is the base of all controllers, `ComputedTorque` one for every robot, `OpenLoop` the plan without sensors.
+`Controller` is the base of all controllers, `ComputedTorque` one for every robot, `Predictive` one that looks ahead,
+and `OpenLoop` the plan without sensors.
 """
 
 from .command import ANSWERS, Command

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
-from towline.models import load
+from towline.control.moved import Freed
+from towline.models import Dynamics, load
 from towline.simulation import simulate
 from towline.simulation.trajectory import read_trajectory
 
@@ -80,3 +82,36 @@ def test_a_team_that_should_not_leave_its_reference_still_corrects_its_load():
     assert flight.passed
     assert flight.answered["as planned"] == 1000
     assert flight.trajectory["tracking_error"].max() < 0.02
+
+
+def test_what_pushes_a_quadrotor_sideways_turns_its_thrust_against_the_push():
+    """A velocity that nothing explains is a force of K m v; the torque is that of the angle by which it turns F."""
+    robot = load("multi-quadrotor-3")
+    still = np.zeros(6), np.zeros(6), robot.carrier_home, *np.zeros((2, 3, 6))
+    reference, moved = Reference(robot.home, *still, np.full(3, 8.7)), np.zeros((3, 6))
+    moved[0, :2] = 0.02, -0.03
+    torques = []
+    for observer in (0.0, 10.0):
+        controller = ComputedTorque(robot, reach=(0, 0), observer=observer)
+        for time, velocity in ((0.0, 0 * moved), (1e-9, moved)):
+            state = State(robot.home, np.zeros(6), robot.carrier_home, velocity, np.full(3, 8.7))
+            command = controller.step(time, state, reference)
+        torques.append(command.actuation[0, 1:])
+    mass, inertia = robot.carriers[0].mass, np.array(robot.carriers[0].inertia[:3])
+    force = 10.0 * mass * moved[0, :3]
+    np.testing.assert_allclose(controller.disturbance_of_carriers[0, 0], force, atol=1e-6)
+    R = Rotation.from_euler("xyz", robot.carrier_home[0, 3:]).as_matrix()
+    anchors, attachments = Dynamics(robot).points(robot.home, robot.carrier_home)
+    along = (anchors - attachments)[0] / np.linalg.norm((anchors - attachments)[0])
+    thrust = 8.7 * along - mass * (np.array(robot.gravity) + 2 * 5.0 * moved[0, :3])
+    turned = [R.T @ np.cross(R[:, 2], F / np.linalg.norm(F)) for F in (thrust, thrust - force)]
+    np.testing.assert_allclose(torques[1] - torques[0], inertia * 1600 * (turned[1] - turned[0]), rtol=2e-3, atol=1e-9)
+
+
+def test_a_carrier_at_the_side_of_its_box_is_expected_to_stay_there():
+    box = np.full((1, 3), -0.1), np.full((1, 3), 0.1)
+    freed = Freed(np.array([[0.5, 0.0, 0.0, 0.0, 0.0, 0.0]]), 5.0, box)
+    freed.now(0.0, np.zeros((2, 12)), np.array([[0.09], [1.0], [0.0]]))
+    freed.order(np.zeros(1), np.zeros(1), np.zeros(6), np.zeros((1, 3, 6)))
+    place, rate = freed.now(0.02, np.zeros((2, 12)), np.zeros((3, 1)))
+    assert (place, rate) == (0.1, 0.0)
