@@ -302,7 +302,7 @@ class Predictive(ComputedTorque):
         the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
         early.
         """
-        parts = rows_at(now, self._times, np.zeros(len(self._times), dtype=int), 1.0)
+        parts = None
         if self._announced is not None:
             start, period, rows = self._announced
             steps = (time + self._times - start) / period
@@ -312,6 +312,8 @@ class Predictive(ComputedTorque):
             off[3:] -= _turns(off[3:])
             if np.abs(off).max() <= CLOSE:
                 parts = announced
+        if parts is None:
+            parts = rows_at(now, self._times, np.zeros(len(self._times), dtype=int), 1.0)
         platform, carriers, moved, tensions = parts
         states = np.concatenate([platform[:, 0], platform[:, 1], moved[:, 0], moved[:, 1]], axis=1)
         states[:, 3:6] += _turns(self._measured[0, 0, 3:6] - states[0, 3:6])

@@ -33,12 +33,12 @@ def rows_at(
     following = np.minimum(before + 1, len(rows[0]) - 1)
     result = []
     for part in rows[:3]:
-        t = after.reshape(-1, *[1] * (part.ndim - 2))
-        place, rate, acceleration = np.moveaxis(part[before], -2, 0)
-        ramp = (part[following][..., 2, :] - acceleration) / period
-        moved = place + t * (rate + t / 2 * (acceleration + t / 3 * ramp))
-        faster = rate + t * (acceleration + t / 2 * ramp)
-        result.append(np.stack([moved, faster, acceleration + t * ramp], axis=-2))
-    share = after[:, None] / period
+        t, motion = after.reshape(-1, *[1] * (part.ndim - 2)), part[before]
+        rate, acceleration = motion[..., 1, :], motion[..., 2, :]
+        change = t / period * (part[following][..., 2, :] - acceleration)
+        motion[..., 0, :] += t * (rate + t / 2 * (acceleration + change / 3))
+        rate += t * (acceleration + change / 2)
+        acceleration += change
+        result.append(motion)
     last = rows[3][before]
-    return *result, last + share * (rows[3][following] - last)
+    return *result, last + after[:, None] / period * (rows[3][following] - last)
