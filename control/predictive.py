@@ -272,7 +272,8 @@ class Predictive(ComputedTorque):
         self._write_bounds(controls, planned)
         # What is left of errors and tensions near the reference must not drown in the rounding of large numbers.
         h.c += np.einsum("kij,kj->ki", h.A, wanted[:-1]) + np.einsum("kij,kj->ki", h.B, planned[:-1]) - wanted[1:]
-        h.d -= np.einsum("kij,kj->ki", h.C, wanted[:-1]) + np.einsum("kij,kj->ki", h.D, planned[:-1])
+        if self._surroundings.rows:
+            h.d -= np.einsum("kij,kj->ki", h.C, wanted[:-1]) + np.einsum("kij,kj->ki", h.D, planned[:-1])
         h.u_min -= planned[:-1]
         h.u_max -= planned[:-1]
         h.start[:], h.states[:], h.controls[:] = start - wanted[0], states - wanted, controls - planned[:-1]
