@@ -19,7 +19,7 @@ from ..models.shapes import Block, Capsule, Shape, Sphere
 __all__ = ["Surroundings"]
 
 STEP = 1e-6  # [rad], of a difference quotient
-FAR = 4.0  # a row whose limit is further away than this many times its scale is left out
+FAR = 4.0  # of the robot's length: a row whose limit is further away is left out, one that is exceeded never
 NOT_THERE = 1e-3  # [m]: a point that is nearer to the middle of a body is pushed up
 
 
@@ -86,7 +86,7 @@ class Surroundings:
         self, h: Any, index: int, gradients: np.ndarray, limit: np.ndarray, room: np.ndarray, penalty: float
     ) -> None:
         """Write a row of each stage: gradient of the pose times the next state at most the limit."""
-        near = (np.abs(room) < FAR * self._scale)[:, None]
+        near = (room < FAR * self._scale)[:, None]
         h.C[:, index] = np.where(near, np.einsum("ki,kij->kj", gradients, h.A[:, :6]), 0.0)
         h.D[:, index] = np.where(near, np.einsum("ki,kij->kj", gradients, h.B[:, :6]), 0.0)
         h.d[:, index] = np.where(near[:, 0], limit - np.einsum("ki,ki->k", gradients, h.c[:, :6]), self._scale)

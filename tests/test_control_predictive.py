@@ -223,6 +223,18 @@ def test_distances_from_bodies_are_lengths_along_their_normals(body):
     assert _distance(shape, centre)[0] < 0
 
 
+def test_rows_are_left_out_where_their_limit_is_far_and_never_where_it_is_exceeded():
+    robot = load("cogiro")
+    surroundings = Surroundings(robot, 0.1, [{"kind": "sphere", "centre": [0, 0, 0], "radius": 0.5}])
+    for off, tube, ball in ((0.0, True, True), (100.0, True, False)):
+        horizon = Horizon(1, 12, 8, surroundings.rows)
+        horizon.A[0] = np.eye(12)
+        states = np.zeros((2, 12))
+        states[:, 0] = off
+        surroundings.write(horizon, states, np.zeros((2, 12)), 1.0)
+        assert list(horizon.C[0].any(axis=1)) == [tube, ball]
+
+
 def test_a_tube_is_kept_that_a_push_would_leave():
     robot = load("multi-quadrotor-3")
     push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
