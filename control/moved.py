@@ -24,9 +24,9 @@ from .tethers import (
     coordinates_of,
 )
 
-SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
-
 __all__ = ["Flown", "Freed", "Moved", "Tethered"]
+
+SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
 
 
 class Moved(Protocol):
@@ -40,14 +40,11 @@ class Moved(Protocol):
         (k, TETHER_COLUMNS), the carriers that cables of fixed length hold.
     count
         How many coordinates there are, f.
-    late
-        Number of stages after which an acceleration that is commanded now is there.
     """
 
     freed: np.ndarray
     tethers: np.ndarray
     count: int
-    late: int
 
     def reset(self) -> None:
         """Forget all earlier steps."""
@@ -70,7 +67,10 @@ class Moved(Protocol):
         ...
 
     def under_way(self) -> np.ndarray:
-        """Return the accelerations of the stages that earlier commands decide, (late, f), less the reference's."""
+        """Return the accelerations of the stages that earlier commands decide, (d, f), less the reference's.
+
+        What is commanded now comes after these.
+        """
         ...
 
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
@@ -90,7 +90,7 @@ class Freed:
 
     def __init__(self, reach: np.ndarray, strongest: float, boxes: tuple[np.ndarray, np.ndarray] | None = None):
         self.freed = np.ascontiguousarray(np.argwhere(reach))
-        self.tethers, self.count, self.late = np.zeros((0, TETHER_COLUMNS)), len(self.freed), 0
+        self.tethers, self.count = np.zeros((0, TETHER_COLUMNS)), len(self.freed)
         self._strongest = strongest
         self._low, self._high = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         if boxes is not None:
@@ -151,7 +151,6 @@ class Flown(Freed):
     def __init__(self, reach: np.ndarray, strongest: float, delay: float, stage: float):
         self._pending = Pending(round(delay / stage), stage)
         super().__init__(reach, strongest)
-        self.late = self._pending.late
 
     @override
     def reset(self) -> None:
@@ -189,7 +188,6 @@ class Tethered:
         self.tethers = _tethers(robot)
         self.count, self._robot = coordinates_of(self.tethers), arrays
         self._pending = Pending(round(delay / stage), stage)
-        self.late = self._pending.late
         self._directions, self._carriers_of = directions(), carriers_of()
         self.reset()
 
@@ -215,7 +213,7 @@ class Tethered:
         return self._now[0, :2]
 
     def under_way(self) -> np.ndarray:
-        """Return the accelerations of the stages that earlier commands decide, (late, f), less the reference's."""
+        """Return the accelerations of the stages that earlier commands decide, (d, f), less the reference's."""
         return self._pending.means()
 
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
@@ -255,8 +253,7 @@ def _tethers(robot: Robot) -> np.ndarray:
                 f"{len(which)} on {carrier.name!r}"
             )
         held = (anchors - attachments)[which] @ level.T
-        # Rows of U span what the cables hold at home; those before are free.
-        axes = np.linalg.svd(held)[2]
+        axes = np.linalg.svd(held)[2]  # the first span what the cables hold at home, and go behind the free ones
         axes = np.concatenate([axes[len(which) :], axes[: len(which)]])
         place = level @ (robot.carrier_home[index, :3] - attachments[which].mean(axis=0))
         at_home = axes @ place

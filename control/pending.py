@@ -10,16 +10,10 @@ __all__ = ["Pending"]
 
 
 class Pending:
-    """Remember commands for as long as they take to come true.
-
-    Attributes
-    ----------
-    late
-        How many stages that is.
-    """
+    """Remember commands for as long as they take to come true, a number of stages."""
 
     def __init__(self, late: int, stage: float):
-        self.late, self._stage = late, stage
+        self._late, self._stage = late, stage
         self.reset(0)
 
     def reset(self, count: int) -> None:
@@ -37,14 +31,14 @@ class Pending:
 
     def means(self) -> np.ndarray:
         """Return the mean accelerations in each stage from now on, (late, f); zeros for what was not commanded."""
-        result, commands = np.zeros((self.late, self._count)), self._commands
-        first = self._time - self.late * self._stage
+        result, commands = np.zeros((self._late, self._count)), self._commands
+        first = self._time - self._late * self._stage
         while len(commands) > 1 and commands[1][0] <= first:
             commands.popleft()
         if commands:
             begins, values = np.array([each[0] for each in commands]), np.array([each[1] for each in commands])
             ends = np.append(begins[1:], self._time)
-            low = first + self._stage * np.arange(self.late)[:, None]
+            low = first + self._stage * np.arange(self._late)[:, None]
             overlap = np.minimum(ends, low + self._stage) - np.maximum(begins, low)
             result = np.maximum(overlap, 0.0) @ values / self._stage
         return result

@@ -26,7 +26,7 @@ from .preview import ROUNDING, rows_at
 from .reference import Reference
 from .state import State
 from .surroundings import Surroundings
-from .weights import terminal, weights
+from .weights import CORRECTING, PATIENT, STILL, terminal, weights
 
 __all__ = ["Predictive"]
 
@@ -122,17 +122,15 @@ class Predictive(ComputedTorque):
         flies = np.array([bool(carrier.efforts) for carrier in the_robot.carriers])
         reacts = far * flies[:, None] * (not correct)
         far = far - reacts
-        self._bandwidth = positive("bandwidth", (6.0 if correct else 40.0) if bandwidth is None else bandwidth, 6)
-        returning = (6.0 if correct else 2.0) if carrier_bandwidth is None else carrier_bandwidth
+        usual = CORRECTING if correct else PATIENT if far.any() else STILL
+        self._bandwidth = positive("bandwidth", usual.bandwidth if bandwidth is None else bandwidth, 6)
+        returning = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
         returning = number("carrier_bandwidth", returning, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
-        count, duration = whole_number("stages", stages, 1, 200), stage
-        if duration is None:
-            duration = 0.025 if correct else 0.03 if far.any() else 0.015
-        self._steps = np.full(count, number("stage", duration, 1e-4, 10.0))
+        count = whole_number("stages", stages, 1, 200)
+        self._steps = np.full(count, number("stage", usual.stage if stage is None else stage, 1e-4, 10.0))
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
-        if observer is None:
-            observer = 20.0 if correct else 60.0
+        observer = usual.observer if observer is None else observer
         super().__init__(
             the_robot, observer=observer, rate=rate, reach=reach, place=place, attitude=attitude, patience=patience
         )
@@ -264,7 +262,8 @@ class Predictive(ComputedTorque):
         write_stages()(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
         h.c += ramps
         self._aim(wanted, planned)
-        for k, more in enumerate(self._moved.under_way()[: len(h.B)]):
+        under_way = self._moved.under_way()
+        for k, more in enumerate(under_way):
             h.c[k] += h.B[k, :, m:] @ (planned[k, m:] + more)
             h.B[k, :, m:] = 0.0
         if self._surroundings.rows:
@@ -288,7 +287,7 @@ class Predictive(ComputedTorque):
         elif not time - self._solved <= self._times[-1]:
             return None
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
-        late = min(self._moved.late, len(controls) - 1)
+        late = len(under_way)
         more = np.clip(controls[late, m:] - planned[late, m:], -self._strongest, self._strongest)
         self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
         return np.clip(controls[:1, :m], *bounds)

@@ -38,11 +38,16 @@ def coordinates_of(tethers):
     return total
 
 
+def heading(R):
+    """Return cosine and sine of the yaw of a rotation matrix; of one that has none, those of zero."""
+    size = math.sqrt(R[0] * R[0] + R[3] * R[3])
+    return (R[0] / size, R[3] / size) if size > 1e-12 else (1.0, 0.0)
+
+
 def put_tethered(tethers, cables, state, on_bodies, places):
     """Put carriers where their coordinates (f,) [m] have them; rotations are those of `on_bodies`."""
     R = on_bodies[0]
-    size = math.sqrt(R[0] * R[0] + R[3] * R[3])
-    cy, sy = (R[0] / size, R[3] / size) if size > 1e-12 else (1.0, 0.0)
+    cy, sy = heading(R)
     first = 0
     for k in range(tethers.shape[0]):
         row = tethers[k]
@@ -162,8 +167,7 @@ def write_directions(robot, tethers, motions, directions):
 def find_directions(tethers, cables, state, on_bodies, places):
     """Write the coordinates, (f,), of carriers as they are placed; the inverse of `put_tethered`."""
     R = on_bodies[0]
-    size = math.sqrt(R[0] * R[0] + R[3] * R[3])
-    cy, sy = (R[0] / size, R[3] / size) if size > 1e-12 else (1.0, 0.0)
+    cy, sy = heading(R)
     first = 0
     for k in range(tethers.shape[0]):
         row, at = tethers[k], BODY * (1 + int(tethers[k, HELD]))

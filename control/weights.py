@@ -9,7 +9,21 @@ import numpy as np
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 
-__all__ = ["Weights", "terminal", "weights"]
+__all__ = ["CORRECTING", "PATIENT", "STILL", "Usual", "Weights", "terminal", "weights"]
+
+
+class Usual(NamedTuple):
+    """The defaults of robots of one kind: bandwidths [rad/s], and how long a stage lasts [s]."""
+
+    bandwidth: float
+    carrier_bandwidth: float
+    observer: float
+    stage: float
+
+
+# Carriers that correct errors; those that may leave their reference, and are slower than tensions; and those that stay.
+CORRECTING = Usual(6.0, 6.0, 20.0, 0.025)
+PATIENT, STILL = Usual(40.0, 2.0, 60.0, 0.03), Usual(40.0, 2.0, 60.0, 0.015)
 
 SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach
 SINGULAR = 1e-3  # of the largest singular value: directions with less are not controlled by tensions
