@@ -88,14 +88,15 @@ def exact(program: Program) -> list[Array]:
     """Return the controls of the optimum, (N, m), as accurately as `Horizon`, and daqp, can; one of them may be off."""
     import daqp
 
-    horizon = _horizon(program, 1e-11, 100)
+    horizon = horizon_of(program, 1e-11, 100)
     horizon.solve()
     kinds, none = np.zeros(program.r.size, dtype=np.int32), np.zeros((0, program.r.size))
     found = daqp.solve(*condense(program), none, program.u_max.ravel(), program.u_min.ravel(), kinds, primal_tol=1e-11)
     return [horizon.controls.copy(), found[0].reshape(program.r.shape)]
 
 
-def _horizon(program: Program, tolerance: float, iterations: int) -> Horizon:
+def horizon_of(program: Program, tolerance: float, iterations: int) -> Horizon:
+    """Write a program into a horizon."""
     N, n, m = program.B.shape
     horizon = Horizon(N, n, m)
     horizon.tolerance, horizon.iterations_max = tolerance, iterations
@@ -106,7 +107,7 @@ def _horizon(program: Program, tolerance: float, iterations: int) -> Horizon:
 
 def _towline(warm: bool) -> Callable[[Program], Solver]:
     def prepare(first: Program) -> Solver:
-        horizon = _horizon(first, 1e-6, 20)
+        horizon = horizon_of(first, 1e-6, 20)
 
         def arrange(program: Program) -> bool:
             for name in FIELDS:

@@ -1,6 +1,6 @@
 """Random steps of closed loops over all robots: whether each is answered, inside limits and rates, and how.
 
-    python -m towline.benchmarks.control_steps [--count 1000000] [--robots wang-flying,...]
+    python -m towline.benchmarks.control_steps [--count 1000000] [--robots wang-flying,...] [--seed 0]
 
 Each robot of the library is simulated in a batch whose platforms are kicked and displaced, while sensors report
 nonsense now and then and references jump. Every command must be finite and inside the limits of tensions, rates and
@@ -168,23 +168,30 @@ def random_steps(robot: Robot, count: int, seed: int) -> Steps:
     return Steps(answered, proofs, {name: n for name, n in broken.items() if n}, seconds / (steps * rows))
 
 
-def main() -> None:
-    """Run and report."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=1_000_000, help="steps of all robots together")
+def read_options(description: str | None, count: int) -> tuple[int, list[str], int]:
+    """Return how many steps, of which robots and from which seed the command line requires; `count` by default."""
+    parser = argparse.ArgumentParser(description=(description or "").splitlines()[0])
+    parser.add_argument("--count", type=int, default=count, help="steps of all robots together")
     parser.add_argument("--robots", default=",".join(available()), help="names, separated by commas")
+    parser.add_argument("--seed", type=int, default=0, help="the first one; all are different")
     options = parser.parse_args()
     names = options.robots.split(",")
     if options.count < 1:
         parser.error(f"--count must be at least 1, got {options.count}")
     if unknown := set(names) - {*available()}:
         parser.error(f"--robots must be among {', '.join(available())}, got {', '.join(sorted(unknown))}")
+    return options.count, names, options.seed
+
+
+def main() -> None:
+    """Run and report."""
+    count, names, first = read_options(__doc__, 1_000_000)
     print(f"# Random steps of closed loops\n\nMeasured on {machine()}.\n")
     heads = [*ANSWERS, "directions proven", "broken promises", "controller [us]"]
     print(f"| robot | {' | '.join(heads)} |\n|---|{'---:|' * len(heads)}")
     total, well = 0, True
-    for seed, name in enumerate(names):
-        steps = random_steps(load(name), -(-options.count // len(names)), seed)
+    for seed, name in enumerate(names, first):
+        steps = random_steps(load(name), -(-count // len(names)), seed)
         total, well = total + int(steps.answered.sum()), well and not steps.faults
         faults = ", ".join(f"{count} not {promise}" for promise, count in steps.faults.items()) or "none"
         cells = [*steps.answered, steps.proofs, faults, f"{1e6 * steps.seconds:.2f}"]

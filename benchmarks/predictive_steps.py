@@ -10,7 +10,6 @@ bandwidth and horizon are random too. For each broken promise the first case is 
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -20,8 +19,9 @@ from typing_extensions import override
 
 from ..control import ANSWERS, Command, Controller, Predictive, Reference, State
 from ..errors import InputError
-from ..models import Robot, available, load
+from ..models import Robot, load
 from ..simulation import simulate
+from .control_steps import read_options
 from .machine import machine
 
 __all__ = ["Checked", "fly_random"]
@@ -179,16 +179,7 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> dict[str, Any]:
 
 def main() -> None:
     """Run and report."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=100_000, help="steps of all robots together")
-    parser.add_argument("--robots", default=",".join(available()), help="names, separated by commas")
-    parser.add_argument("--seed", type=int, default=0, help="of the first flight; each one has another")
-    options = parser.parse_args()
-    names = options.robots.split(",")
-    if options.count < 1:
-        parser.error(f"--count must be at least 1, got {options.count}")
-    if unknown := set(names) - {*available()}:
-        parser.error(f"--robots must be among {', '.join(available())}, got {', '.join(sorted(unknown))}")
+    count, names, seeds = read_options(__doc__, 100_000)
     print(f"# Random flights of predictive control\n\nMeasured on {machine()}.\n")
     print(f"| robot | {' | '.join(ANSWERS)} | broken promises |\n|---|{'---:|' * len(ANSWERS)}---|")
     accepted = []
@@ -199,10 +190,10 @@ def main() -> None:
             print(f"{name}: left out: {error}", file=sys.stderr)
         else:
             accepted.append(name)
-    flights, total, well = -(-options.count // (PERIODS * max(len(accepted), 1))), 0, True
+    flights, total, well = -(-count // (PERIODS * max(len(accepted), 1))), 0, True
     for number, name in enumerate(accepted):
         robot, answered, firsts = load(name), np.zeros(len(ANSWERS), dtype=np.int64), dict[str, str]()
-        first = options.seed + number * flights
+        first = seeds + number * flights
         for seed in range(first, first + flights):
             counts, broken = fly_random(robot, seed)
             answered += counts

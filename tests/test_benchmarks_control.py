@@ -7,7 +7,15 @@ import pytest
 from typer.testing import CliRunner
 
 from towline.benchmarks.control import run
-from towline.benchmarks.control_contenders import CONTENDERS, FIELDS, REFERENCE, TOWLINE, Contender, condense
+from towline.benchmarks.control_contenders import (
+    CONTENDERS,
+    FIELDS,
+    REFERENCE,
+    TOWLINE,
+    Contender,
+    condense,
+    horizon_of,
+)
 from towline.benchmarks.control_programs import measure
 from towline.benchmarks.control_tasks import TASKS, Task, record
 from towline.benchmarks.predictive_steps import Checked, fly_random
@@ -16,7 +24,7 @@ from towline.control import Predictive
 from towline.errors import InputError
 from towline.models import load
 from towline.simulation import simulate
-from towline.solvers import Horizon, StageProblem
+from towline.solvers import StageProblem
 
 FREE, TEAM = TASKS[0], TASKS[-1]
 LIMITS = Task("limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, reach=0.5, stage=0.015)
@@ -26,15 +34,6 @@ LIMITS = Task("limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, reach=0.5, 
 def at_limits():
     """Programs of a flight whose tensions reach their limits."""
     return record(LIMITS, LIMITS.robot(), 200)
-
-
-def horizon_of(program, tolerance, iterations):
-    N, n, m = program.B.shape
-    horizon = Horizon(N, n, m)
-    horizon.tolerance, horizon.iterations_max = tolerance, iterations
-    for name in FIELDS:
-        getattr(horizon, name)[...] = getattr(program, name)
-    return horizon
 
 
 def test_condensed_costs_are_those_of_the_stages(at_limits):
@@ -65,7 +64,7 @@ def test_programs_of_a_flight_at_its_limits_converge_from_a_cold_start(at_limits
 
 
 def test_a_robot_at_rest_costs_few_iterations():
-    """Its gradients are differences of large terms: no iteration makes them smaller than rounding."""
+    """At the reference there is nothing left to do but rounding."""
     calm = Task("calm", lambda: load("wang-flying"), None, 0.0, reach=0.5)
     program = record(calm, calm.robot(), 20)[-1]
     horizon = horizon_of(program, 1e-6, 50)
@@ -76,7 +75,7 @@ def test_a_robot_at_rest_costs_few_iterations():
 
 
 def test_who_is_right_is_measured_as_right(at_limits):
-    """Most solvers reach the optimum, some at a coarse tolerance; those that are off or give nothing are counted."""
+    """Count those that are off or give nothing; most reach the optimum, some at a coarse tolerance."""
     prepare = CONTENDERS[0].prepare
 
     def wrong(first):

@@ -11,11 +11,14 @@ from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, Stat
 from towline.control.machine import carriers_of, directions, stages
 from towline.control.surroundings import Surroundings, _distance
 from towline.control.tethers import AXES, TETHER_COLUMNS
+from towline.control.weights import Weights, terminal
 from towline.errors import InputError
-from towline.models import Dynamics, load
+from towline.models import Dynamics, Robot, load
 from towline.models.points import placed
 from towline.simulation import simulate
 from towline.solvers.horizon import Horizon, Residuals
+
+LAWS = Predictive, ComputedTorque
 
 
 def rest(robot):
@@ -153,6 +156,40 @@ def test_carriers_with_two_cables_have_one_coordinate():
     push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
     flight = simulate(robot, robot.home, duration=3.0, controller=controller, disturbance=push)
     assert flight.error[-1] < 1e-3
+
+
+def test_a_carrier_with_three_cables_is_where_the_load_has_it():
+    """It has no coordinate of its own: its place follows from three lengths, which CasADi confirms."""
+    given = load("multi-quadrotor-3").model_dump(exclude_defaults=True)
+    given["carriers"] = ({**given["carriers"][0], "home": (0, 0, 1.5, 0, 0, 0), "thrust_max": 80},)
+    for cable in given["cables"]:
+        length = float(np.linalg.norm(np.array([0, 0, 1.5]) - np.array(cable["attachment"])))
+        cable |= {"carrier": given["carriers"][0]["name"], "length": length}
+    robot = Robot.model_validate(given)
+    controller = Predictive(robot)
+    assert controller._moved.count == 0
+    motion, commanded = 0.2 * np.random.default_rng(1).normal(size=(3, 6)), np.zeros((1, 3, 6))
+    carriers_of()(controller._robot, controller._moved.tethers, motion, commanded)
+    lengths = Dynamics(robot).cable_lengths(motion[0], commanded[:, 0])
+    np.testing.assert_allclose(lengths, robot.fixed_lengths, atol=1e-12)
+    push = [1, 0, 0, 0, 0, 0]
+    flights = [simulate(robot, robot.home, duration=1.0, controller=law(robot), disturbance=push) for law in LAWS]
+    assert flights[0].error.max() < 0.5 * flights[1].error.max()
+
+
+def test_quadrotors_with_winches_correct_the_errors_of_their_load():
+    """Their places are measured, and what is commanded comes after the delay of their attitude."""
+    robot = load("multi-quadrotor-3").model_copy(update={"drive": "both"})
+    push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
+    flights = [simulate(robot, robot.home, duration=2.0, controller=law(robot), disturbance=push) for law in LAWS]
+    assert flights[0].error[-1] < 1e-3 < 5e-3 < flights[1].error[-1]
+
+
+def test_the_cost_of_what_no_control_reaches_is_that_of_a_series():
+    """An error that stays for ever costs Q + 0.95 Q + 0.95^2 Q + ..."""
+    rest = terminal(np.eye(2), np.array([[0.0], [1.0]]), Weights(np.array([2.0, 1.0]), np.array([1.0])))
+    assert rest[0, 0] == pytest.approx(2.0 / (1 - 0.95), rel=1e-6)
+    assert rest[1, 1] < 2.0
 
 
 def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_than_in_its_file():

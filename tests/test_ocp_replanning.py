@@ -64,7 +64,7 @@ def test_the_rest_starts_as_measured_and_ends_where_and_when_the_whole_does():
 
 
 def test_tensions_go_on_as_planned_or_as_measured(circle):
-    """What balances the motion at the start, by inverse dynamics of the audited motion, are those tensions."""
+    """Balance the motion at the start with them, by inverse dynamics of the audited motion."""
     planner, whole = circle
     time, audit = 3.0, whole.audit
     planned = [np.interp(time, audit.times, its) for its in audit.tensions.T]
@@ -106,7 +106,7 @@ def test_the_program_with_parameters_has_the_solution_of_one_without(circle):
 
 @pytest.mark.parametrize("tube", [{}, {"position": 0.1, "attitude": 0.1}])
 def test_the_rest_of_a_line_ends_at_rest_at_its_end(tube):
-    """Of a robot with more cables than degrees of freedom; without a tube nothing but tensions is left to choose."""
+    """Choose tensions alone, as there is no tube, for a robot with more cables than degrees of freedom."""
     planner = Planner(GROUND, LINE | {"tube": tube})
     whole = planner.plan()
     last, begun = whole, 0.0
