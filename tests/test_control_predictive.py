@@ -178,11 +178,12 @@ def test_a_carrier_with_three_cables_is_where_the_load_has_it():
 
 
 def test_quadrotors_with_winches_correct_the_errors_of_their_load():
-    """Their places are measured, and what is commanded comes after the delay of their attitude."""
+    """Their places are measured; gains this high are stable only with the delay of the attitude in the prediction."""
     robot = load("multi-quadrotor-3").model_copy(update={"drive": "both"})
     push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
-    flights = [simulate(robot, robot.home, duration=2.0, controller=law(robot), disturbance=push) for law in LAWS]
-    assert flights[0].error[-1] < 1e-3 < 5e-3 < flights[1].error[-1]
+    laws = Predictive(robot, bandwidth=8, carrier_bandwidth=16), ComputedTorque(robot)
+    flights = [simulate(robot, robot.home, duration=2.0, controller=law, disturbance=push) for law in laws]
+    assert flights[0].error[1500:].max() < 1e-3 < 5e-3 < flights[1].error[1500:].max()
 
 
 def test_the_cost_of_what_no_control_reaches_is_that_of_a_series():
