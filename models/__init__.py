@@ -11,12 +11,35 @@ from .library import available
 if TYPE_CHECKING:
     from .dynamics import Dynamics
     from .files import load
+    from .forward_kinematics.branches import branches
+    from .forward_kinematics.estimate import PoseEstimate
+    from .forward_kinematics.from_lengths import pose_from_lengths
+    from .forward_kinematics.tracker import PoseTracker
     from .relative_dynamics import RelativeDynamics
     from .robot import Robot
 
-__all__ = ["Dynamics", "RelativeDynamics", "Robot", "available", "load"]
+__all__ = [
+    "Dynamics",
+    "PoseEstimate",
+    "PoseTracker",
+    "RelativeDynamics",
+    "Robot",
+    "available",
+    "branches",
+    "load",
+    "pose_from_lengths",
+]
 
-_HOME = {"Dynamics": "dynamics", "RelativeDynamics": "relative_dynamics", "Robot": "robot", "load": "files"}
+_HOME = {
+    "Dynamics": "dynamics",
+    "PoseEstimate": "forward_kinematics.estimate",
+    "PoseTracker": "forward_kinematics.tracker",
+    "RelativeDynamics": "relative_dynamics",
+    "Robot": "robot",
+    "branches": "forward_kinematics.branches",
+    "load": "files",
+    "pose_from_lengths": "forward_kinematics.from_lengths",
+}
 
 
 def __getattr__(name: str) -> Any:

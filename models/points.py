@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .robot import Robot
 
-__all__ = ["anchors", "attachments", "default_home", "in_frame", "placed", "rotations"]
+__all__ = ["anchors", "angles", "attachments", "default_home", "in_frame", "placed", "rotations"]
 
 
 def rotations(angles: np.ndarray) -> np.ndarray:
@@ -24,6 +24,13 @@ def rotations(angles: np.ndarray) -> np.ndarray:
     R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
     R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -sp, cp * sr, cp * cr
     return R
+
+
+def angles(R: np.ndarray) -> np.ndarray:
+    """Return (roll, pitch, yaw) of rotations (..., 3, 3), (..., 3) [rad]: pitch within a quarter turn."""
+    upright = np.hypot(R[..., 2, 1], R[..., 2, 2])
+    roll, pitch = np.arctan2(R[..., 2, 1], R[..., 2, 2]), np.arctan2(-R[..., 2, 0], upright)
+    return np.stack([roll, pitch, np.arctan2(R[..., 1, 0], R[..., 0, 0])], axis=-1)
 
 
 def placed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -8,12 +8,20 @@ platform rests where its potential energy has a minimum among the poses that the
 whose multipliers are the tensions [N]: zero for slack cables, and A t + m g = 0 is its condition of optimality. That
 holds for any number of cables. There may be several minima; starts spread over the pose space look for them.
 
+Near a rest with all cables taut, Newton's method on the same conditions takes a few steps of
+
+    [ K  -A ; -A^T  0 ] (delta ; t) = (m g ; L - l(q))
+
+with the stiffness K at constant tensions, and its matrix gives how the rest moves with the lengths.
+
 Source: the energy form of the direct geometrico-static problem of Berti, Merlet and Carricato (2016).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -21,10 +29,12 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..inputs import required, whole_number
-from .dynamics import Dynamics
+from . import points
+from .dynamics import Dynamics, dynamics_of
 from .robot import Robot
 from .rotation import rotation
 
+NEWTON = 40  # most steps
 UNSTABLE = 1e-3  # [Hz]; slower than this counts as neutral
 DESCENTS = 4  # from a saddle, along its unstable motion
 SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length`, are one solution
@@ -101,27 +111,103 @@ def equilibria(
         raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}")
     if robot.weight == 0:
         raise InputError(f"gravity must not be zero, got none for robot {robot.name!r}")
-    dynamics = Dynamics(robot)
+    dynamics = dynamics_of(robot)
     carriers = robot.carrier_home if carrier_pose is None else carrier_pose
     if dynamics.cable_lengths(robot.home, carriers).ndim != 1:  # checks shape and values too
         raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {np.shape(carriers)}")
     carriers = np.asarray(carriers, dtype=float)
-    solver = _energy_program(robot, dynamics, carriers)
     poses: list[Equilibrium] = []
     for start in _starts(robot, starts, seed):
-        candidate = _descend(robot, dynamics, solver, start, carriers, longest)
+        candidate = _descend(robot, start, carriers, longest)
         if candidate is not None and not any(_same(robot, candidate, known) for known in poses):
             poses.append(candidate)
     return sorted(poses, key=lambda equilibrium: equilibrium.energy)
 
 
-def _descend(
-    robot: Robot, dynamics: Dynamics, solver: ca.Function, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray
-) -> Equilibrium | None:
+def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
+    """Return a stable rest near a pose, or None; by Newton's method if all cables are taut there, else by descent.
+
+    Parameters
+    ----------
+    lengths
+        (m,) [m].
+    start
+        Pose (6,), in {G}.
+    carriers
+        (c, 6), in {G}.
+    """
+    return _newton(robot, lengths, start, carriers) or _descend(robot, start, carriers, lengths)
+
+
+def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
+    """Return the rest with all cables taut that Newton's method reaches, or None."""
+    dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
+    n, m = len(rows), robot.m
+    weight = robot.platform.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0]) * robot.wrench_scale
+    tensions = np.full(m, robot.weight / m)
+    pose, com = start.copy(), np.array(robot.platform.com)
+    for _ in range(NEWTON):
+        system = _newton_system(robot, dynamics, pose, tensions, carriers)
+        missing = np.concatenate([weight[rows], lengths - dynamics.cable_lengths(pose, carriers)])
+        step = np.linalg.lstsq(system, missing, rcond=1e-12)[0]  # a neutral motion leaves the system singular
+        twist = np.zeros(6)
+        twist[rows] = step[:n] * robot.wrench_scale[rows]
+        size = float(np.linalg.norm(step[:n]))
+        if not np.isfinite(size):
+            return None
+        pose = _displaced(pose, twist * min(1.0, 0.3 * robot.length / max(size, 1e-300)), com)
+        tensions = np.maximum(step[n:], 0.0) if size > 1e-3 * robot.length else step[n:]
+        if size <= 1e-12 * robot.length:
+            break
+    reached = _judge(robot, dynamics, pose, carriers, tensions)
+    close = np.abs(reached.lengths - lengths).max() <= 1e-9 * max(robot.length, lengths.max())
+    if not close or reached.residual > 1e-9 * robot.weight or tensions.min() < -1e-9 * robot.weight:
+        return None
+    frequencies, _ = dynamics.natural_frequencies(pose, np.maximum(tensions, 0.0), carriers)
+    if len(frequencies) and frequencies[0] < -UNSTABLE:
+        return None
+    neutral = bool(len(frequencies)) and bool(np.abs(frequencies).min() < UNSTABLE)
+    return replace(reached, neutral=neutral)
+
+
+def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndarray:
+    """Return how the CoM and a rotation vector in {G} move with the lengths at a rest, (6, m) [-, rad/m].
+
+    Carriers, (c, 6), stay. Slack cables have no effect; along neutral motions there is no answer, and here none.
+    """
+    dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
+    taut = np.setdiff1d(np.arange(robot.m), rest.slack)
+    system = _newton_system(robot, dynamics, rest.pose, rest.tensions, carriers)
+    kept = np.concatenate([np.arange(len(rows)), len(rows) + taut])
+    moves = np.zeros((6, robot.m))
+    inverse = np.linalg.pinv(system[np.ix_(kept, kept)], rcond=1e-9)
+    moves[np.ix_(rows, taut)] = inverse[: len(rows), len(rows) :] * robot.wrench_scale[rows, None]
+    return moves
+
+
+def _newton_system(
+    robot: Robot, dynamics: Dynamics, pose: np.ndarray, tensions: np.ndarray, carriers: np.ndarray
+) -> np.ndarray:
+    """Return the matrix of Newton's step, rotations times `Robot.length`, in the coordinates that move."""
+    rows, scale = np.flatnonzero(robot.dof_mask), robot.wrench_scale
+    A = (dynamics.wrench_matrix(pose, carriers) * scale[:, None])[rows]
+    K = dynamics.stiffness(pose, tensions, carriers, elastic=False) * np.outer(scale, scale)
+    return np.block([[(K + K.T)[np.ix_(rows, rows)] / 2, -A], [-A.T, np.zeros((robot.m, robot.m))]])
+
+
+def _displaced(pose: np.ndarray, twist: np.ndarray, com: np.ndarray) -> np.ndarray:
+    """Return the pose after a small displacement of the CoM and a rotation vector, (6,), in {G}."""
+    R = points.rotations(pose[3:])
+    turned = Rotation.from_rotvec(twist[3:]).as_matrix() @ R
+    return np.concatenate([pose[:3] + R @ com + twist[:3] - turned @ com, points.angles(turned)])
+
+
+def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray) -> Equilibrium | None:
     """Search for the rest pose from `start`, or return None; a saddle is left along its unstable motion."""
-    rows = np.flatnonzero(robot.dof_mask)
+    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
+    dynamics, solver, rows = dynamics_of(robot), _energy_program(key), np.flatnonzero(robot.dof_mask)
     for _ in range(DESCENTS):
-        result = solver(x0=start[rows], lbg=-np.inf, ubg=longest**2)
+        result = solver(x0=start[rows], p=carriers.T.ravel(), lbg=-np.inf, ubg=longest**2)
         if not solver.stats()["success"]:
             return None
         pose = robot.home.copy()
@@ -135,8 +221,7 @@ def _descend(
         frequencies, modes = dynamics.natural_frequencies(pose, tensions, carriers)
         if not len(frequencies) or frequencies[0] > -UNSTABLE:
             return replace(candidate, neutral=bool(len(frequencies)) and bool(np.abs(frequencies).min() < UNSTABLE))
-        turned = Rotation.from_rotvec(0.1 * _unit(modes[:, 0], robot.length)[3:]) * _orientation(pose)
-        start = np.concatenate([pose[:3] + 0.1 * _unit(modes[:, 0], robot.length)[:3], turned.as_euler("ZYX")[::-1]])
+        start = _displaced(pose, 0.1 * _unit(modes[:, 0], robot.length), np.array(robot.platform.com))
     return None
 
 
@@ -145,11 +230,11 @@ def _unit(mode: np.ndarray, length: float) -> np.ndarray:
     return mode / max(np.linalg.norm(mode[:3]) / length, np.linalg.norm(mode[3:]))
 
 
-def _orientation(pose: np.ndarray) -> Rotation:
-    return Rotation.from_euler("ZYX", pose[5:2:-1])
-
-
-def _energy_program(robot: Robot, dynamics: Dynamics, carriers: np.ndarray) -> ca.Function:
+@lru_cache(maxsize=16)
+def _energy_program(robot: Any) -> ca.Function:
+    """Return the program of a robot, with its carriers at home; others are its parameter."""
+    dynamics = dynamics_of(robot)
+    carriers = ca.SX.sym("carriers", *robot.carrier_home.shape)
     rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
     free = ca.SX.sym("q", len(rows))
     pose = ca.SX(robot.home)
@@ -162,7 +247,7 @@ def _energy_program(robot: Robot, dynamics: Dynamics, carriers: np.ndarray) -> c
         "print_time": False,
         "error_on_fail": False,
     }
-    return ca.nlpsol("rest", "ipopt", {"x": free, "f": energy, "g": squares}, options)
+    return ca.nlpsol("rest", "ipopt", {"x": free, "p": ca.vec(carriers), "f": energy, "g": squares}, options)
 
 
 def _starts(robot: Robot, count: int, seed: int) -> np.ndarray:

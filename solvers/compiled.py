@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import tolerances
+from .. import simd, tolerances
 from ..writing import whole_file
 from .kernels import rows
 
@@ -32,7 +32,7 @@ _SECONDS_TO_COMPILE = 15.0
 _DISK_SPACE = 50_000_000  # bytes; the machine code takes about 5 MB
 
 _FOLDER = Path(__file__).parent / "kernels"
-_SHARED = Path(tolerances.__file__)  # its numbers are in the machine code
+_SHARED = (tolerances.__file__, simd.__file__, Path(simd.__file__).with_name("simd_llvm.py"))  # in the machine code too
 _MODULES = ("codes", "lanes", "lanes_newton", "lanes_proof", "lanes_slabs", "rows")
 
 _lock = threading.Lock()
@@ -108,7 +108,7 @@ def _lose(seconds: float) -> None:
 
 def _compile() -> Kernels:
     """Hand copies of the marked functions to Numba; the plain ones stay as they are."""
-    from .kernels import simd, simd_llvm
+    from .. import simd_llvm
 
     spaces = [dict(vars(import_module(f"{__package__}.kernels.{name}"))) for name in _MODULES]
     machine: dict[Any, Any] = {
@@ -166,7 +166,7 @@ def _on_disk() -> bool:
 def _forget_old_code() -> None:
     """Remove machine code of other sources than those that lie here: Numba compares a function's own file only."""
     folder = _FOLDER / "__pycache__"
-    sources = [*sorted(_FOLDER.glob("*.py")), _SHARED]
+    sources = [*sorted(_FOLDER.glob("*.py")), *map(Path, _SHARED)]
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources if source.exists())).hexdigest()
     seal = folder / "sources.sha256"
     with suppress(OSError):

@@ -20,7 +20,20 @@ FLOORS = [
     {"cli"},
 ]
 COMMON = {
-    *("checkpoint", "errors", "execution", "inputs", "kernel", "netcdf", "processors", "text", "tolerances", "writing")
+    *(
+        "checkpoint",
+        "errors",
+        "execution",
+        "inputs",
+        "kernel",
+        "netcdf",
+        "processors",
+        "simd",
+        "simd_llvm",
+        "text",
+        "tolerances",
+        "writing",
+    )
 }
 CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
 

@@ -30,7 +30,7 @@ def arithmetic():
     """Return what computes everything that `simd_llvm` can do with two vectors and a number."""
     import numba
 
-    from towline.solvers.kernels.simd_llvm import load, magnitude, maximum, minimum, splat, sqrt, store, where
+    from towline.simd_llvm import load, magnitude, maximum, minimum, splat, sqrt, store, where
 
     @numba.njit
     def compute(x, y, a, result):
@@ -230,7 +230,7 @@ def test_machine_code_of_other_sources_is_forgotten(tmp_path, monkeypatch):
     (folder / "__pycache__").mkdir(parents=True)
     index, source = folder / "__pycache__" / "rows.solve_rows-1.py311.nbi", folder / "single.py"
     monkeypatch.setattr(compiled, "_FOLDER", folder)
-    monkeypatch.setattr(compiled, "_SHARED", tmp_path / "tolerances.py")
+    monkeypatch.setattr(compiled, "_SHARED", (tmp_path / "tolerances.py",))
     assert Path(tolerances.__file__).is_file()
     source.write_text("a = 1")
     compiled._forget_old_code()

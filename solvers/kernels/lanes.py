@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
 from ...tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, OPTIMAL, SLACK, UNSURE
 from .jit import compilable
-from .simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
 
 # Single rows.
 PER_LENGTH, REQUIRED, ROUNDED, SIZE, SLACKS, GOOD_MATRIX, GOOD, PROVEN, SUPPORT, SHORTFALL = range(10)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
 from ...tolerances import FEASIBILITY, NEGLIGIBLE, ROUNDING
 from .codes import CLEAR
 from .jit import compilable
@@ -22,7 +23,6 @@ from .lanes import (
     matrix,
     wrench,
 )
-from .simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
 
 __all__ = ["prove_in_lanes"]
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, sqrt, store, where
 from .codes import DECISIVE, PARALLEL, SLACK, STATIONARY
 from .jit import compilable
 from .lanes import (
@@ -31,7 +32,6 @@ from .lanes import (
     wrench,
 )
 from .lanes_proof import prove_in_lanes
-from .simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, sqrt, store, where
 
 __all__ = ["reduce_lanes", "slabs_in_lanes", "slabs_size"]
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...simd import TOGETHER, WIDTH, any_of, gather, load, places, scatter, splat, store, vectors, where
 from .codes import INFEASIBLE, OPTIMAL, STEPS, TURNS, UNSURE
 from .jit import GIVEN, VECTOR, compilable
 from .lanes import GOOD, PROVEN, ROUNDED, S_, SHORTFALL, SUPPORT, D, cable, judge, lane_size, prepare, wrench
 from .lanes_newton import newton_in_lanes, newton_size
 from .lanes_slabs import reduce_lanes, slabs_in_lanes, slabs_size
-from .simd import TOGETHER, WIDTH, any_of, gather, load, places, scatter, splat, store, vectors, where
 
 __all__ = ["solve_rows"]
 

@@ -28,6 +28,7 @@ __all__ = [
     "TOGETHER",
     "WIDTH",
     "any_of",
+    "floor",
     "gather",
     "load",
     "magnitude",
@@ -223,6 +224,7 @@ def _unary(name: str, doc: str) -> Any:
 
 sqrt = _unary("sqrt", "Return the square root.")
 magnitude = _unary("fabs", "Return the absolute value.")
+floor = _unary("floor", "Return the largest whole number that is not above x.")
 
 
 def _compared(comparison: str, doc: str) -> Any:

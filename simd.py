@@ -18,6 +18,7 @@ __all__ = [
     "TOGETHER",
     "WIDTH",
     "any_of",
+    "floor",
     "gather",
     "load",
     "magnitude",
@@ -84,6 +85,11 @@ def any_of(chosen: Any) -> bool:
 def sqrt(x: Any) -> Any:
     """Return the square root."""
     return np.sqrt(x)
+
+
+def floor(x: Any) -> Any:
+    """Return the largest whole number that is not above x."""
+    return np.floor(x)
 
 
 def magnitude(x: Any) -> Any:

@@ -1,0 +1,122 @@
+"""`pose_from_lengths`: the pose of the platform from the lengths of its cables."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import InputError
+from ...inputs import shown
+from ..batch import as_array, leading
+from ..files import as_robot
+from ..robot import Robot
+from .estimate import PoseEstimate
+from .problem import Problem, problem_of
+from .search import search
+
+__all__ = ["SIGMA", "checked_lengths", "checked_sigma", "pose_from_lengths"]
+
+SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
+
+
+def pose_from_lengths(
+    robot: Robot | str | os.PathLike[str],
+    lengths: ArrayLike,
+    start: ArrayLike | None = None,
+    carrier_pose: ArrayLike | None = None,
+    sigma: ArrayLike = SIGMA,
+) -> PoseEstimate:
+    """Estimate the pose of the platform from the lengths of its cables: forward kinematics.
+
+    It minimises the squared errors of the lengths by Levenberg and Marquardt's method, with rotations as increments on
+    SO(3). Where the lengths leave a motion open, as with parallel cables or few of them, the estimate is the pose in which the platform rests under its weight, see `models.statics`.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    lengths
+        Measured lengths of taut cables, from anchor to attachment, over the pulley where there is one, (..., m) [m].
+    start
+        Pose to start from, (..., 6) [m, rad], as the last one of a stream: the estimate is the minimum nearest to it.
+        Default: a search that needs none; where several poses fit, `branches` lists them.
+    carrier_pose
+        Of the carriers in {G}, (..., c, 6); default: at home.
+    sigma
+        Standard deviations of the lengths [m], one number or (m,).
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value.
+    """
+    robot = as_robot(robot)
+    lengths, deviations = checked_lengths(lengths, robot), checked_sigma(sigma, robot.m)
+    shapes = {"lengths": lengths.shape[:-1]}
+    carriers = None
+    if carrier_pose is not None:
+        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
+        shapes["carrier_pose"] = carriers.shape[:-2]
+    if start is not None:
+        start = as_array("start", start, (6,))
+        shapes["start"] = start.shape[:-1]
+    batch = next(iter(shapes.values())) if len(set(shapes.values())) == 1 else leading(shapes)
+    rows = _rows(lengths, batch, 1)
+    each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
+    problem = problem_of(robot, each)
+    starts = None if start is None else _start(problem, start, batch)
+    ambiguous = covariance = None
+    if problem.open:
+        from .resting import resting
+
+        places = np.broadcast_to(robot.carrier_home if each is None else each, (len(rows), *robot.carrier_home.shape))
+        poses, residuals, converged, covariance = resting(robot, problem, rows, starts, places, deviations)
+    else:
+        if starts is None:
+            best = search(robot, problem, rows, deviations, each)
+            poses, errors, converged, ambiguous = best.poses, best.errors, best.ended, best.ambiguous
+        else:
+            poses, errors, converged = problem.descend(rows, 1.0 / deviations, starts, 0.0)
+        residuals = errors * deviations
+    if not batch:
+        pose, ambiguous = poses[0], None if ambiguous is None else bool(ambiguous[0])
+        covariance = None if covariance is None else covariance[0]
+        return PoseEstimate(robot, pose, residuals[0], bool(converged[0]), deviations, carriers, ambiguous, covariance)
+    ambiguous = None if ambiguous is None else ambiguous.reshape(batch)
+    covariance = None if covariance is None else covariance.reshape(*batch, 6, 6)
+    pose, residuals = poses.reshape(*batch, 6), residuals.reshape(*batch, robot.m)
+    converged = converged.reshape(batch)
+    return PoseEstimate(robot, pose, residuals, converged, deviations, carriers, ambiguous, covariance)
+
+
+def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
+    """Return lengths (..., m), or raise InputError unless all are above zero."""
+    array = as_array("lengths", lengths, (robot.m,))
+    if not array.min(initial=np.inf) > 0.0:
+        raise InputError(f"lengths must be numbers > 0 [m], got {array.min():g}")
+    return array
+
+
+def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:
+    """Return standard deviations (m,) of one number or (m,), or raise InputError unless all are above zero."""
+    deviations = as_array("sigma", sigma, ())
+    if deviations.shape not in ((), (m,)):
+        raise InputError(f"sigma must be a number > 0 or of shape ({m},) [m], got {shown(deviations)}")
+    if not deviations.min() > 0.0:
+        raise InputError(f"sigma must be numbers > 0 [m], got {deviations.min():g}")
+    return np.full(m, float(deviations)) if deviations.ndim == 0 else deviations
+
+
+def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
+    """Return (N, ...) of an array whose last `core` dimensions are its own."""
+    own = array.shape[array.ndim - core :]
+    if array.shape == batch + own:
+        return np.ascontiguousarray(array.reshape(-1, *own))
+    return np.ascontiguousarray(np.broadcast_to(array, batch + own).reshape(-1, *own))
+
+
+def _start(problem: Problem, start: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
+    """Return starts (N, 6), with coordinates that cannot move at home."""
+    return np.where(problem.free > 0.0, _rows(start, batch, 1), problem.home)

@@ -1,0 +1,123 @@
+"""A robot's forward kinematics as arrays: what the kernel reads, and the calls of it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import points
+from ..robot import Robot
+from .estimate import gradient
+from .machine import run
+
+__all__ = ["Problem", "problem_of"]
+
+STEPS = 60  # most steps of a descent; from a start nearby it takes three
+SMALLEST = 2e-11  # times the platform's size: a step that is rounding
+OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, relative to the largest
+
+
+class Problem(NamedTuple):
+    """The geometry of a robot with its carriers in one place, or in one place for each pose.
+
+    Attributes
+    ----------
+    geometry
+        Anchor in {G}, attachment in the platform frame and swivel axis in {G} of each cable, (N, m, 9) or (1, m, 9).
+    radii
+        Of the pulleys, (m,) [m].
+    free
+        1 for coordinates that move, else 0, (6,).
+    home
+        Pose of the platform to start from, (6,) [m, rad].
+    scale
+        Length that makes a rotation comparable with a displacement [m].
+    open
+        Whether the lengths leave a motion open at home, as parallel cables do, so that gravity decides.
+    """
+
+    geometry: np.ndarray
+    radii: np.ndarray
+    free: np.ndarray
+    home: np.ndarray
+    scale: float
+    open: bool
+
+    @property
+    def m(self) -> int:
+        """Return the number of cables."""
+        return len(self.radii)
+
+    @property
+    def freedoms(self) -> int:
+        """Return the number of coordinates that move."""
+        return int(self.free.sum())
+
+    def of(self, rows: np.ndarray) -> Problem:
+        """Return the problem of some of the poses."""
+        return self if len(self.geometry) == 1 else self._replace(geometry=self.geometry[rows])
+
+    def descend(
+        self,
+        lengths: np.ndarray,
+        weights: np.ndarray,
+        poses: np.ndarray,
+        damping: float,
+        free: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the poses nearest to `poses` that fit measured lengths best, the errors there, and where that is so.
+
+        Parameters
+        ----------
+        lengths
+            (N, m) [m].
+        weights
+            Of each cable's error, (m,).
+        poses
+            (N, 6), from where to descend.
+        damping
+            Lambda of the first step: 0 from nearby.
+        free
+            1 for coordinates that move in this descent; default: all that the platform has.
+
+        Returns
+        -------
+        Poses (N, 6), weighted errors (N, m) [m], and whether each descent ended at a minimum, (N,).
+        """
+        count, m = len(lengths), self.m
+        moved = np.array(poses, dtype=float, order="C")  # the kernel works in place
+        errors, info = np.empty((count, m)), np.empty((count, 2))
+        each = 0 if len(self.geometry) == 1 else 9 * m
+        given = (self.geometry.reshape(-1), each, lengths.reshape(-1), weights, self.radii)
+        free = self.free if free is None else free
+        how = (free, self.scale, SMALLEST * self.scale, damping, STEPS, 0, count)
+        run(*given, *how, moved.reshape(-1), errors.reshape(-1), info.reshape(-1))
+        return moved, errors, info[:, 0] > 0.0
+
+
+def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:
+    """Return the problem of a robot with its carriers at home, or at (c, 6) or (N, c, 6)."""
+    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
+    problem = _at_home(key)
+    if carrier_pose is None:
+        return problem
+    return problem._replace(geometry=_geometry(robot, carrier_pose.reshape(-1, *robot.carrier_home.shape)))
+
+
+@lru_cache(maxsize=16)
+def _at_home(robot: Any) -> Problem:
+    geometry = _geometry(robot, robot.carrier_home[None])
+    J = gradient(robot, robot.home, None)[:, robot.dof_mask > 0.0]
+    values = np.linalg.svd(J * robot.wrench_scale[robot.dof_mask > 0.0], compute_uv=False)
+    is_open = robot.m < J.shape[1] or bool(values[-1] < OPEN * values[0])
+    return Problem(geometry, robot.pulley_radii, robot.dof_mask, robot.home, robot.length, is_open)
+
+
+def _geometry(robot: Robot, carriers: np.ndarray) -> np.ndarray:
+    """Return (N, m, 9) for carriers at (N, c, 6)."""
+    turned = points.rotations(carriers[:, robot.carrier_of_cable, 3:])
+    parts = [points.anchors(robot, carriers), robot.attachments, np.einsum("nmij,mj->nmi", turned, robot.pulley_axes)]
+    shape = (len(carriers), robot.m, 3)
+    return np.ascontiguousarray(np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=2))
