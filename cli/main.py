@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "Plan a circle of a flying cable robot, draw it and fly it: a first look.",
     "robots": "List the robots of the library, or diagnose one.",
     "tension": "Compute the cable tensions at one pose, by every method.",
+    "pose": "Estimate the pose of the platform from its cable lengths.",
     "plan": "Plan a motion that keeps every tension inside its limits.",
     "time": "Compute the fastest motion along a path.",
     "simulate": "Fly a plan: wind, slack cables, sensors, faults, a controller.",

@@ -170,18 +170,24 @@ def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.n
     return replace(reached, neutral=neutral)
 
 
-def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndarray:
+def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndarray | None:
     """Return how the CoM and a rotation vector in {G} move with the lengths at a rest, (6, m) [-, rad/m].
 
-    Carriers, (c, 6), stay. Slack cables have no effect; along neutral motions there is no answer, and here none.
+    Carriers, (c, 6), stay. Slack cables have no effect. None where a motion is neutral: the lengths do not decide it.
     """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     taut = np.setdiff1d(np.arange(robot.m), rest.slack)
     system = _newton_system(robot, dynamics, rest.pose, rest.tensions, carriers)
-    kept = np.concatenate([np.arange(len(rows)), len(rows) + taut])
+    n, kept = len(rows), np.concatenate([np.arange(len(rows)), len(rows) + taut])
+    system = system[np.ix_(kept, kept)]
+    system[:n, :n] /= max(robot.weight, 1e-300) / robot.length  # stiffness beside cosines
+    U, values, V = np.linalg.svd(system)
+    regular = values > 1e-9 * values[0]
+    if rest.neutral or np.abs(V[~regular, :n]).max(initial=0.0) > 1e-6:
+        return None
     moves = np.zeros((6, robot.m))
-    inverse = np.linalg.pinv(system[np.ix_(kept, kept)], rcond=1e-9)
-    moves[np.ix_(rows, taut)] = inverse[: len(rows), len(rows) :] * robot.wrench_scale[rows, None]
+    inverse = V[regular].T @ (U[:, regular] / values[regular]).T
+    moves[np.ix_(rows, taut)] = inverse[:n, n:] * robot.wrench_scale[rows, None]
     return moves
 
 

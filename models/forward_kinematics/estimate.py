@@ -202,6 +202,6 @@ def moved(pose: np.ndarray, step: np.ndarray) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     pose, step = np.broadcast_arrays(pose, step)
-    turn = Rotation.from_rotvec(step[..., 3:].reshape(-1, 3)).as_matrix().reshape(*pose.shape[:-1], 3, 3)
+    turn = Rotation.from_rotvec(np.array(step[..., 3:]).reshape(-1, 3)).as_matrix().reshape(*pose.shape[:-1], 3, 3)
     angles = points.angles(turn @ points.rotations(pose[..., 3:]))
     return np.concatenate([pose[..., :3] + step[..., :3], angles], axis=-1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,7 +32,8 @@ def pose_from_lengths(
     """Estimate the pose of the platform from the lengths of its cables: forward kinematics.
 
     It minimises the squared errors of the lengths by Levenberg and Marquardt's method, with rotations as increments on
-    SO(3). Where the lengths leave a motion open, as with parallel cables or few of them, the estimate is the pose in which the platform rests under its weight, see `models.statics`.
+    SO(3). Where the lengths leave a motion open, as with parallel cables or few of them, the estimate
+    is the pose in which the platform rests under its weight, see `models.statics`.
 
     Parameters
     ----------
@@ -101,12 +103,22 @@ def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
 
 def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:
     """Return standard deviations (m,) of one number or (m,), or raise InputError unless all are above zero."""
+    if isinstance(sigma, float) and 0.0 < sigma < np.inf:
+        return _equal(sigma, m)
     deviations = as_array("sigma", sigma, ())
     if deviations.shape not in ((), (m,)):
         raise InputError(f"sigma must be a number > 0 or of shape ({m},) [m], got {shown(deviations)}")
     if not deviations.min() > 0.0:
         raise InputError(f"sigma must be numbers > 0 [m], got {deviations.min():g}")
-    return np.full(m, float(deviations)) if deviations.ndim == 0 else deviations
+    return np.broadcast_to(deviations, (m,)).copy()
+
+
+@lru_cache(maxsize=16)
+def _equal(sigma: float, m: int) -> np.ndarray:
+    """Return the same standard deviation for all cables, kept for the next call of a stream."""
+    deviations = np.full(m, sigma)
+    deviations.flags.writeable = False
+    return deviations
 
 
 def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:

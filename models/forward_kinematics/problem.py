@@ -14,8 +14,9 @@ from .machine import run
 
 __all__ = ["Problem", "problem_of"]
 
-STEPS = 60  # most steps of a descent; from a start nearby it takes three
-SMALLEST = 2e-11  # times the platform's size: a step that is rounding
+FEW, STEPS = 6, 60  # most steps of a descent; from a start nearby it takes three
+ROUNDING = 1e-11  # times the platform's size: a step that is rounding
+NEGLIGIBLE = 1e-8  # times the platform's size and the least sigma [m]: a step that is nothing beside the noise
 OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, relative to the largest
 
 
@@ -86,15 +87,40 @@ class Problem(NamedTuple):
         -------
         Poses (N, 6), weighted errors (N, m) [m], and whether each descent ended at a minimum, (N,).
         """
-        count, m = len(lengths), self.m
         moved = np.array(poses, dtype=float, order="C")  # the kernel works in place
-        errors, info = np.empty((count, m)), np.empty((count, 2))
-        each = 0 if len(self.geometry) == 1 else 9 * m
-        given = (self.geometry.reshape(-1), each, lengths.reshape(-1), weights, self.radii)
+        errors, info = np.empty((len(lengths), self.m)), np.empty((len(lengths), 2))
         free = self.free if free is None else free
-        how = (free, self.scale, SMALLEST * self.scale, damping, STEPS, 0, count)
-        run(*given, *how, moved.reshape(-1), errors.reshape(-1), info.reshape(-1))
+        smallest = max(ROUNDING, NEGLIGIBLE / weights.max(initial=0.0)) * self.scale
+        how = (weights, free, smallest, damping)
+        if len(lengths) == 1:
+            self._run(lengths, *how, STEPS, moved, errors, info)
+            return moved, errors, info[:, 0] > 0.0
+        self._run(lengths, *how, FEW, moved, errors, info)
+        if not info[:, 0].all():
+            # The others together: in a vector of many problems all wait for the slowest.
+            slow = np.flatnonzero(info[:, 0] == 0.0)
+            rest = moved[slow], errors[slow], info[slow]
+            self.of(slow)._run(lengths[slow], *how, STEPS, *rest)
+            moved[slow], errors[slow], info[slow] = rest
         return moved, errors, info[:, 0] > 0.0
+
+    def _run(
+        self,
+        lengths: np.ndarray,
+        weights: np.ndarray,
+        free: np.ndarray,
+        smallest: float,
+        damping: float,
+        steps: int,
+        poses: np.ndarray,
+        errors: np.ndarray,
+        info: np.ndarray,
+    ) -> None:
+        """Call the kernel, which works in place of poses, errors and info."""
+        each = 0 if len(self.geometry) == 1 else 9 * self.m
+        given = (self.geometry.reshape(-1), each, lengths.reshape(-1), weights, self.radii, free)
+        how = (self.scale, smallest, damping, steps, 0, len(lengths))
+        run(*given, *how, poses.reshape(-1), errors.reshape(-1), info.reshape(-1))
 
 
 def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:

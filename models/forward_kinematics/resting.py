@@ -58,16 +58,17 @@ def resting(
             errors[row] = dynamics_of(robot).cable_lengths(near[row], carriers[row]) - own
             continue
         poses[row], converged[row] = rest.pose, True
-        errors[row] = np.where(rest.tensions > 0.0, rest.lengths - own, 0.0)
+        errors[row] = rest.lengths - own
+        errors[row, rest.slack] = 0.0
         covariance[row] = _covariance(robot, rest, carriers[row], sigma)
     return poses, errors, converged, covariance
 
 
 def _covariance(robot: Robot, rest: Equilibrium, carriers: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Return the covariance of the platform frame and a small rotation, (6, 6), infinite where a motion is neutral."""
-    if rest.neutral:
-        return np.full((6, 6), np.inf)
     moves = per_length(robot, rest, carriers)
+    if moves is None:
+        return np.full((6, 6), np.inf)
     arm = points.rotations(rest.pose[3:]) @ np.array(robot.platform.com)
     moves[:3] += np.cross(arm, moves[3:], axis=0)  # of the CoM before
     return (moves * sigma**2) @ moves.T

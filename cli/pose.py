@@ -1,0 +1,98 @@
+"""`towline pose`: the pose of the platform from the lengths of its cables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import JsonOption, RobotArgument, numbers, print_json, print_table
+
+if TYPE_CHECKING:
+    from ..models import PoseEstimate, Robot
+
+SIX = "x y z roll pitch yaw"
+
+
+def pose(
+    robot: RobotArgument,
+    lengths: Annotated[
+        str, typer.Option(metavar="'one number for each cable'", help="Measured lengths of the cables [m].")
+    ],
+    start: Annotated[
+        str | None,
+        typer.Option(metavar=f"'{SIX}'", help="Pose to start from [m, rad]; default: a search that needs none."),
+    ] = None,
+    carrier_pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'six numbers; ...'",
+            help="Pose of each carrier in {G} [m, rad], separated by ';'; default: their homes.",
+        ),
+    ] = None,
+    sigma: Annotated[
+        str, typer.Option(metavar="S", help="Standard deviation of the lengths [m], one or one for each cable.")
+    ] = "0.001",
+    as_json: JsonOption = False,
+) -> None:
+    """Estimate the pose of the platform from its cable lengths, and list other poses that fit them.
+
+    Where the lengths leave a motion open, it is the pose in which the platform rests. The exit code is 1 if no pose
+    fits the lengths.
+    """
+    from ..models import branches, load, pose_from_lengths
+
+    loaded = load(robot)
+    measured = numbers("--lengths", lengths, loaded.m)
+    near = None if start is None else numbers("--start", start, 6)
+    carriers = None if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=len(loaded.carriers))
+    deviations = numbers("--sigma", sigma, loaded.m if len(sigma.replace(",", " ").split()) > 1 else 1)
+    deviations = deviations[0] if len(deviations) == 1 else deviations
+    estimate = pose_from_lengths(loaded, measured, near, carriers, deviations)
+    others = [other for other in branches(loaded, measured, carriers, deviations) if not _same(loaded, other, estimate)]
+    if as_json:
+        poses = [other.pose.tolist() for other in others]
+        print_json({"robot": loaded.name, **estimate.to_dict(), "others": poses})
+    else:
+        _show(loaded, estimate, others)
+    if not estimate.consistent:
+        raise typer.Exit(1)
+
+
+def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
+    import numpy as np
+
+    turned = (one.pose[3:] - other.pose[3:] + np.pi) % (2 * np.pi) - np.pi
+    return bool(np.abs(one.pose[:3] - other.pose[:3]).max() < 0.01 * robot.length and np.abs(turned).max() < 0.01)
+
+
+def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
+    import numpy as np
+
+    from ..text import quantity, quantity_row
+
+    verdict = "a pose fits the lengths," if estimate.consistent else "NO POSE FITS THE LENGTHS, the nearest one has"
+    if estimate.by_gravity and not estimate.converged:
+        verdict = "NO REST WITH THESE LENGTHS, the nearest pose has"
+    typer.echo(f"{robot.name}: {verdict} residuals of {quantity(1e3 * estimate.residual, 'mm', 3)}")
+    scale = np.repeat([1e3, 180.0 / np.pi], 3)
+    rows = []
+    for i, name in enumerate(SIX.split()):
+        unit, small = ("m", "mm") if i < 3 else ("rad", "deg")
+        deviation = scale[i] * estimate.sigmas[i]
+        spread = quantity(deviation, small, 3) if np.isfinite(deviation) else "undetermined"
+        rows.append((name, quantity(round(estimate.pose[i], 9), unit, 7), spread if robot.dof_mask[i] else "fixed"))
+    print_table(["", "estimate", "sigma"], rows, "lrr")
+    typer.echo("The angles' sigmas are of small rotations about the axes of {G}.")
+    if estimate.by_gravity and estimate.converged:
+        typer.echo("The lengths leave motions open: this is where the platform rests under its weight.")
+    if not estimate.determined and estimate.converged:
+        typer.echo("Undetermined: some motion changes none of these lengths.")
+    elif not estimate.conditioned:
+        typer.echo("Nearly singular: the lengths are not linear within the sigmas, which are then only a rough measure.")
+    if not estimate.consistent and not estimate.by_gravity:
+        off = int(np.argmax(estimate.suspects()))
+        typer.echo(f"The least credible length is that of cable {off + 1}.")
+    for other in others:
+        held = "" if other.taut else ", which cables cannot hold at rest"
+        typer.echo(f"Also fits: ({quantity_row(np.round(other.pose, 6))}) [m, rad]{held}")

@@ -1,0 +1,332 @@
+"""Forward kinematics: the pose comes back from its cable lengths, and its covariance is what noise makes of it."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2, ncx2
+
+from towline import InputError, Robot, load, solve_batch
+from towline.models import PoseTracker, branches, points, pose_from_lengths
+from towline.models.dynamics import dynamics_of
+from towline.models.forward_kinematics import descent, machine
+from towline.models.forward_kinematics.estimate import gradient, moved
+from towline.models.forward_kinematics.trigonometry import angle, cosine_and_sine
+from towline.models.statics import equilibria
+
+FIVE = ["ipanema-1", "cogiro", "wang-flying", "caroca-pulleys", "nist-robocrane"]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def compiled():
+    machine.load()
+
+
+def poses_of_workspace(robot, count, seed=0, tilt=20.0):
+    """Return poses at which tensions inside the limits balance the weight, tilted by up to `tilt` degrees an axis."""
+    rng, dynamics = np.random.default_rng(seed), dynamics_of(robot)
+    low, high = robot.home_anchors.min(axis=0), robot.home_anchors.max(axis=0)
+    if high[2] - low[2] < 0.2 * (high - low).max():
+        low[2] = 2 * robot.home[2] - high[2]
+    kept = []
+    while sum(map(len, kept)) < count:
+        poses = np.hstack([rng.uniform(low, high, (4000, 3)), np.radians(tilt) * rng.uniform(-1, 1, (4000, 3))])
+        poses = np.where(robot.dof_mask > 0, poses + [0, 0, 0, *robot.home[3:]], robot.home)
+        poses = poses[np.isfinite(dynamics.cable_lengths(poses)).all(axis=1)]
+        mask = robot.dof_mask
+        A = dynamics.wrench_matrix(poses) * mask[:, None]
+        w = dynamics.required_wrench(poses, np.zeros(6), np.zeros(6)) * mask
+        limits = np.tile(robot.t_min, (len(poses), 1)), np.tile(robot.t_max, (len(poses), 1))
+        kept.append(poses[solve_batch(A, w, *limits, length=robot.length).feasible])
+    return np.concatenate(kept)[:count]
+
+
+def errors_of(estimate, poses):
+    """Return displacements and rotation vectors in {G} from true poses to estimated ones, (N, 6)."""
+    R, true = points.rotations(estimate.pose[:, 3:]), points.rotations(poses[:, 3:])
+    turned = Rotation.from_matrix(R @ np.swapaxes(true, 1, 2)).as_rotvec()
+    return np.hstack([estimate.pose[:, :3] - poses[:, :3], turned])
+
+
+@pytest.mark.parametrize("name", FIVE)
+def test_exact_lengths_give_the_pose_to_a_nanometre(name):
+    robot = load(name)
+    poses = poses_of_workspace(robot, 1000)
+    lengths = dynamics_of(robot).cable_lengths(poses)
+    near = poses + np.random.default_rng(1).normal(0, 2e-3, poses.shape)
+    warm = pose_from_lengths(robot, lengths, near)
+    # At a singular pose an error of 1e-8 m in x changes the lengths by its square, which is below rounding.
+    regular = warm.sigmas.max(axis=1) < 1
+    assert regular.mean() > 0.99
+    assert np.abs(errors_of(warm, poses))[regular].max() < 1e-9
+    cold = pose_from_lengths(robot, lengths)
+    assert cold.converged.all()
+    assert cold.residual.max() < 1e-9
+    assert np.mean(np.abs(errors_of(cold, poses)).max(axis=1) < 1e-8) >= 0.995
+
+
+def test_a_pose_that_another_one_hides_is_among_its_branches():
+    """Of nist-robocrane, poses beyond its workspace: most have several poses with the same lengths."""
+    robot = load("nist-robocrane")
+    rng = np.random.default_rng(5)
+    for _ in range(8):
+        pose = robot.home + rng.uniform(-1, 1, 6) * [0.4, 0.4, 0.3, 0.6, 0.6, 0.6]
+        lengths = dynamics_of(robot).cable_lengths(pose)
+        listed = branches(robot, lengths)
+        assert any(np.abs(errors_of(PoseRow(one.pose), pose[None])).max() < 1e-7 for one in listed)
+        assert all(np.abs(dynamics_of(robot).cable_lengths(one.pose) - lengths).max() < 1e-8 for one in listed)
+        held = [one.taut for one in listed]
+        assert held == sorted(held, reverse=True)
+
+
+class PoseRow:
+    def __init__(self, pose):
+        self.pose = pose[None]
+
+
+@pytest.mark.parametrize(("name", "sigma"), [("cogiro", 1e-3), ("cogiro", 5e-3), ("ipanema-1", 1e-3), ("fast", 1e-3)])
+def test_ninety_five_percent_ellipsoids_hold_as_many_poses(name, sigma):
+    robot = load(name)
+    poses = np.tile(poses_of_workspace(robot, 100, seed=2), (20, 1))
+    noise = np.random.default_rng(3).normal(0, sigma, (len(poses), robot.m))
+    estimate = pose_from_lengths(robot, dynamics_of(robot).cable_lengths(poses) + noise, poses, sigma=sigma)
+    small = (estimate.sigmas[:, :3].max(axis=1) < 0.01) & (estimate.sigmas[:, 3:].max(axis=1) < np.radians(3))
+    small &= estimate.conditioned
+    assert small.mean() > 0.5
+    errors = errors_of(estimate, poses)[small]
+    distances = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(estimate.covariance[small]), errors)
+    assert 0.93 <= np.mean(distances <= chi2.ppf(0.95, 6)) <= 0.97
+    assert not (estimate.converged & estimate.consistent)[small][distances > chi2.ppf(1 - 1e-9, 6)].any()
+
+
+def test_a_length_that_is_off_is_noticed_as_often_as_theory_predicts():
+    """The test's power follows from the share of an error that no pose explains: a noncentral chi-square."""
+    robot, sigma, off = load("ipanema-2"), 1e-3, 0.02
+    poses = poses_of_workspace(robot, 2000, seed=4)
+    rng = np.random.default_rng(5)
+    lengths = dynamics_of(robot).cable_lengths(poses) + rng.normal(0, sigma, (len(poses), robot.m))
+    sound = pose_from_lengths(robot, lengths, poses, sigma=sigma)
+    assert 0.98 <= sound.consistent.mean() <= 1.0
+    cable = rng.integers(0, robot.m, len(poses))
+    lengths[np.arange(len(poses)), cable] += off
+    estimate = pose_from_lengths(robot, lengths, poses, sigma=sigma)
+    assert np.mean(~estimate.consistent) >= 0.99
+    J = gradient(robot, poses, None)
+    free = 1.0 - np.einsum("nij,njk,nik->ni", J, np.linalg.inv(np.swapaxes(J, 1, 2) @ J), J)
+    unexplained = free[np.arange(len(poses)), cable] * (off / sigma) ** 2
+    power = 1.0 - ncx2.cdf(chi2.ppf(0.99, robot.m - 6), robot.m - 6, unexplained)
+    assert np.mean(~estimate.consistent) == pytest.approx(power.mean(), abs=0.005)
+    certain = free[np.arange(len(poses)), cable] > 0.3
+    assert np.mean(estimate.suspects().argmax(axis=1)[certain] == cable[certain]) > 0.75
+
+
+def test_the_estimate_is_that_of_another_least_squares():
+    """scipy minimises the same errors in other coordinates, with pulleys and with unequal sigmas."""
+    robot, sigma = load("caroca-pulleys"), np.linspace(0.5e-3, 3e-3, 8)
+    dynamics, rng = dynamics_of(robot), np.random.default_rng(6)
+    for pose in poses_of_workspace(robot, 5, seed=7):
+        lengths = dynamics.cable_lengths(pose) + rng.normal(0, sigma)
+
+        def weighted(q, lengths=lengths):
+            return (dynamics.cable_lengths(q) - lengths) / sigma
+
+        expected = least_squares(weighted, pose, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        estimate = pose_from_lengths(robot, lengths, pose, sigma=sigma)
+        np.testing.assert_allclose(estimate.pose, expected.x, atol=2e-7)
+        np.testing.assert_allclose(estimate.residuals, expected.fun * sigma, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "cogiro", "planar-4"])
+def test_the_gradient_is_that_of_the_lengths(name):
+    robot = load(name)
+    dynamics = dynamics_of(robot)
+    pose = robot.home + 0.1 * np.array([1, -1, 0.5, 0.8, -0.5, 1]) * robot.dof_mask
+    steps = 1e-6 * np.eye(6) * robot.dof_mask
+    change = dynamics.cable_lengths(moved(pose, steps)) - dynamics.cable_lengths(moved(pose, -steps))
+    np.testing.assert_allclose(gradient(robot, pose, None), change.T / 2e-6, atol=1e-8)
+
+
+def test_numpy_and_machine_code_agree():
+    robot = load("caroca-pulleys")
+    poses = poses_of_workspace(robot, 50, seed=8)
+    lengths = dynamics_of(robot).cable_lengths(poses).ravel()
+    from towline.models.forward_kinematics.problem import problem_of
+
+    problem = problem_of(robot)
+    results = []
+    for kernel in (machine.load(), descent.descend_rows):
+        moved_poses, errors, info = (poses + 0.05).ravel(), np.empty(50 * 8), np.empty(100)
+        how = (problem.free, problem.scale, 1e-11, 1e-3, 50, 0, 50)
+        kernel(problem.geometry.ravel(), 0, lengths, np.ones(8), problem.radii, *how, moved_poses, errors, info)
+        results.append(np.concatenate([moved_poses, errors, info]))
+    np.testing.assert_allclose(*results, atol=1e-12)
+
+
+@given(st.floats(-50, 50), st.floats(1e-6, 1e6))
+def test_angles_of_the_kernel_are_those_of_numpy(turn, size):
+    cosine, sine = cosine_and_sine(np.float64(turn))
+    assert cosine == pytest.approx(np.cos(turn), abs=2e-14)
+    assert sine == pytest.approx(np.sin(turn), abs=2e-14)
+    y, x = np.float64(size * np.sin(turn)), np.float64(size * np.cos(turn))
+    assert angle(y, x) == pytest.approx(np.arctan2(y, x), abs=1e-15)
+
+
+@given(st.lists(st.floats(-1, 1), min_size=6, max_size=6))
+def test_a_pose_nearby_comes_back(shift):
+    robot = load("cogiro")
+    pose = robot.home + np.array(shift) * [2, 2, 1, 0.3, 0.3, 0.5]
+    start = robot.home if np.abs(shift).max() < 0.3 else pose + 0.01
+    estimate = pose_from_lengths(robot, dynamics_of(robot).cable_lengths(pose), start)
+    np.testing.assert_allclose(estimate.pose, pose, atol=1e-9)
+    assert estimate.converged
+    assert estimate.consistent
+
+
+def test_leading_dimensions_and_moved_carriers():
+    robot = load("cogiro")
+    rng = np.random.default_rng(9)
+    poses = robot.home + rng.uniform(-0.2, 0.2, (3, 4, 6))
+    carriers = rng.uniform(-0.3, 0.3, (4, 1, 6))
+    lengths = dynamics_of(robot).cable_lengths(poses, carriers)
+    estimate = pose_from_lengths(robot, lengths, robot.home, carriers)
+    np.testing.assert_allclose(estimate.pose, poses, atol=1e-9)
+    assert estimate.converged.shape == estimate.consistent.shape == estimate.conditioned.shape == (3, 4)
+    assert estimate.covariance.shape == (3, 4, 6, 6)
+    cold = pose_from_lengths(robot, lengths, carrier_pose=carriers)
+    np.testing.assert_allclose(cold.pose, poses, atol=1e-9)
+    one = pose_from_lengths(robot, lengths[1, 2], carrier_pose=carriers[2])
+    np.testing.assert_allclose(one.pose, poses[1, 2], atol=1e-9)
+    np.testing.assert_allclose(one.covariance, cold.covariance[1, 2], rtol=1e-6, atol=1e-15)
+    empty = pose_from_lengths(robot, np.empty((0, 8)))
+    assert empty.pose.shape == (0, 6)
+
+
+def test_coordinates_that_cannot_move_stay_and_have_no_spread():
+    robot = load("planar-4")
+    pose = robot.home + [0.2, 0, 0.1, 0, 0.2, 0] * robot.dof_mask
+    estimate = pose_from_lengths(robot, dynamics_of(robot).cable_lengths(pose))
+    np.testing.assert_allclose(estimate.pose, pose, atol=1e-10)
+    assert (estimate.sigmas[robot.dof_mask == 0] == 0).all()
+    assert (estimate.sigmas[robot.dof_mask == 1] > 0).all()
+
+
+def suspended(anchors, attachments, **platform):
+    """Return a platform of 2 kg under cables from a frame."""
+    body = {"mass": 2, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], **platform}
+    cables = [
+        {"carrier": "frame", "anchor": a, "attachment": b, "t_min": 0, "t_max": 500}
+        for a, b in zip(anchors, attachments, strict=True)
+    ]
+    carriers = [{"name": "frame", "kind": "ground"}]
+    return Robot.model_validate(
+        {"name": "hung", "source": "test", "platform": body, "carriers": carriers, "cables": cables}
+    )
+
+
+def test_fewer_cables_give_the_rest_and_its_spread():
+    """The covariance is that of rests whose lengths are drawn at random, and the pose that of the energy's minimum."""
+    robot = load("multi-quadrotor-4")
+    lengths = dynamics_of(robot).cable_lengths(robot.home) + [0.01, -0.02, 0.0, 0.015]
+    estimate = pose_from_lengths(robot, lengths)
+    assert estimate.by_gravity
+    assert estimate.determined
+    assert estimate.consistent
+    expected = equilibria(robot, lengths)[0]
+    np.testing.assert_allclose(estimate.pose, expected.pose, atol=1e-6)
+    draws = lengths + np.random.default_rng(1).normal(0, 1e-4, (400, robot.m))
+    rests = pose_from_lengths(robot, draws, estimate.pose, sigma=1e-4)
+    assert rests.converged.all()
+    spread = np.cov(errors_of(rests, np.tile(estimate.pose, (400, 1))).T)
+    at = pose_from_lengths(robot, lengths, sigma=1e-4).covariance
+    np.testing.assert_allclose(np.sqrt(np.diag(at)), np.sqrt(np.diag(spread)), rtol=0.12)
+
+
+def test_what_the_lengths_leave_open_is_undetermined():
+    """One cable lets the platform turn about the vertical: the rest is one of a family."""
+    robot = suspended([[0, 0, 3]], [[0, 0, 0.2]], home=[0, 0, 1.5, 0, 0, 0])
+    estimate = pose_from_lengths(robot, [1.0])
+    np.testing.assert_allclose(estimate.pose[:3], [0, 0, 1.8], atol=1e-7)
+    assert estimate.converged
+    assert not estimate.determined
+    assert not estimate.conditioned
+    with pytest.raises(InputError, match="gravity must not be zero where the lengths leave a motion open"):
+        pose_from_lengths(robot.model_copy(update={"gravity": (0.0, 0.0, 0.0)}), [1.0])
+
+
+def test_parallel_cables_leave_it_to_gravity():
+    """Six vertical cables fix no horizontal motion to first order; a shorter one tilts the platform."""
+    robot = load("wang-ctmrts-6")
+    lengths = np.full(6, 1.2)
+    estimate = pose_from_lengths(robot, lengths)
+    assert estimate.by_gravity
+    assert estimate.determined
+    np.testing.assert_allclose(estimate.pose[:2], robot.home_anchors[:, :2].mean(axis=0), atol=1e-6)
+    assert not pose_from_lengths(robot, np.full(6, 0.1)).converged
+
+
+def test_a_nearly_singular_geometry_is_reported():
+    """A platform of 5 cm under cables of 10 m turns by degrees for millimetres, and its lengths are not linear then."""
+    robot = load("cogiro")
+    cables = [c.model_copy(update={"attachment": tuple(0.05 * np.array(c.attachment))}) for c in robot.cables]
+    robot = robot.model_copy(update={"cables": tuple(cables)})
+    poses = np.tile(robot.home, (1000, 1))
+    lengths, rng = dynamics_of(robot).cable_lengths(robot.home), np.random.default_rng(11)
+    held = {}
+    for sigma in (1e-4, 2e-2):
+        noise = rng.normal(0, sigma, (len(poses), robot.m))
+        estimate = pose_from_lengths(robot, lengths + noise, poses, sigma=sigma)
+        exact = pose_from_lengths(robot, lengths, robot.home, sigma=sigma)
+        errors = errors_of(estimate, poses)
+        distances = np.einsum("ni,ij,nj->n", errors, np.linalg.inv(exact.covariance), errors)
+        held[sigma] = np.mean(distances <= chi2.ppf(0.95, 6))
+        assert exact.conditioned == (sigma == 1e-4)
+    assert 0.93 <= held[1e-4] <= 0.97
+    assert held[2e-2] < 0.9
+
+
+def test_a_tracker_follows_and_recovers():
+    robot = load("cogiro")
+    t = np.linspace(0, 4, 800)
+    poses = np.stack([np.sin(t), np.cos(t), 2 + 0.3 * np.sin(2 * t), *(0.2 * np.sin(t + k) for k in range(3))], axis=1)
+    poses[400:] += [3, -2, 0.5, 0, 0, 0.3]  # it was off for a while
+    lengths = dynamics_of(robot).cable_lengths(poses)
+    tracker = PoseTracker(robot)
+    np.testing.assert_allclose(tracker.follow(lengths), poses, atol=1e-9)
+    assert tracker.searches <= 2
+    wrong = tracker.update(lengths[-1] + [0.3, 0, 0, 0, 0, 0, 0, 0])
+    assert not wrong.consistent
+    np.testing.assert_allclose(tracker.pose, poses[-1], atol=1e-9)
+
+
+def test_a_single_estimate_takes_microseconds():
+    """Loosely, against what a slow machine does; `benchmarks.forward_kinematics` has the ratios."""
+    robot = load("cogiro")
+    lengths, start = dynamics_of(robot).cable_lengths(robot.home), robot.home + 1e-3
+    pose_from_lengths(robot, lengths, start)
+    begin = time.perf_counter()
+    for _ in range(200):
+        pose_from_lengths(robot, lengths, start)
+    assert time.perf_counter() - begin < 0.2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"lengths": [1, 2, 3]}, r"lengths must have the shape \(..., 8\)"),
+        ({"lengths": np.full(8, -1.0)}, "lengths must be numbers > 0"),
+        ({"lengths": np.full(8, np.nan)}, "lengths must be finite"),
+        ({"start": np.zeros(5)}, "start must have the shape"),
+        ({"sigma": 0}, "sigma must be numbers > 0"),
+        ({"sigma": [1e-3, 1e-3]}, r"sigma must be a number > 0 or of shape \(8,\)"),
+        ({"start": np.zeros((2, 6)), "lengths": np.full((3, 8), 8.0)}, "leading dimensions"),
+    ],
+)
+def test_wrong_input_is_one_line(change, message):
+    arguments = {"lengths": np.full(8, 8.0), **change}
+    with pytest.raises(InputError, match=message) as error:
+        pose_from_lengths("cogiro", **arguments)
+    assert "\n" not in str(error.value)
