@@ -89,7 +89,9 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
     if not estimate.determined and estimate.converged:
         typer.echo("Undetermined: some motion changes none of these lengths.")
     elif not estimate.conditioned:
-        typer.echo("Nearly singular: the lengths are not linear within the sigmas, which are then only a rough measure.")
+        typer.echo(
+            "Nearly singular: the lengths are not linear within the sigmas, which are then only a rough measure."
+        )
     if not estimate.consistent and not estimate.by_gravity:
         off = int(np.argmax(estimate.suspects()))
         typer.echo(f"The least credible length is that of cable {off + 1}.")

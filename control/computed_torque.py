@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from math import isfinite
 from numbers import Real
 from typing import Any
 
@@ -29,6 +28,7 @@ from .state import State
 
 __all__ = ["ComputedTorque", "positive", "reach_of"]
 
+LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 
 
@@ -213,7 +213,7 @@ class ComputedTorque(Controller):
             raise InputError(f"state must be a State, got {shown(state)}")
         if not isinstance(reference, Reference):
             raise InputError(f"reference must be a Reference, got {shown(reference)}")
-        if not isinstance(time, Real) or not isfinite(time):
+        if not isinstance(time, Real) or not abs(time) <= LATEST:
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
         rows = 1 if np.ndim(state.pose) == 1 else len(state.pose)
         if rows != len(self._wanted):

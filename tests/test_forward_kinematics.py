@@ -35,7 +35,7 @@ def poses_of_workspace(robot, count, seed=0, tilt=20.0):
     kept = []
     while sum(map(len, kept)) < count:
         poses = np.hstack([rng.uniform(low, high, (4000, 3)), np.radians(tilt) * rng.uniform(-1, 1, (4000, 3))])
-        poses = np.where(robot.dof_mask > 0, poses + [0, 0, 0, *robot.home[3:]], robot.home)
+        poses = np.where(robot.dof_mask > 0, poses + robot.home * (np.arange(6) > 2), robot.home)
         poses = poses[np.isfinite(dynamics.cable_lengths(poses)).all(axis=1)]
         mask = robot.dof_mask
         A = dynamics.wrench_matrix(poses) * mask[:, None]
@@ -125,7 +125,7 @@ def test_a_length_that_is_off_is_noticed_as_often_as_theory_predicts():
 
 
 def test_the_estimate_is_that_of_another_least_squares():
-    """scipy minimises the same errors in other coordinates, with pulleys and with unequal sigmas."""
+    """Minimise, with scipy, the same errors in other coordinates, with pulleys and unequal sigmas."""
     robot, sigma = load("caroca-pulleys"), np.linspace(0.5e-3, 3e-3, 8)
     dynamics, rng = dynamics_of(robot), np.random.default_rng(6)
     for pose in poses_of_workspace(robot, 5, seed=7):
@@ -230,7 +230,7 @@ def suspended(anchors, attachments, **platform):
 def test_fewer_cables_give_the_rest_and_its_spread():
     """The covariance is that of rests whose lengths are drawn at random, and the pose that of the energy's minimum."""
     robot = load("multi-quadrotor-4")
-    lengths = dynamics_of(robot).cable_lengths(robot.home) + [0.01, -0.02, 0.0, 0.015]
+    lengths = dynamics_of(robot).cable_lengths(robot.home) + np.array([0.01, -0.02, 0.0, 0.015])
     estimate = pose_from_lengths(robot, lengths)
     assert estimate.by_gravity
     assert estimate.determined

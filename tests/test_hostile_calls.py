@@ -57,6 +57,7 @@ NOT_CALLED = {
     "Residuals",
     "solvers.Margin",
     "Plan",
+    "PoseEstimate",
     "Flight",
     "ANSWERS",
     "Command",  # what an author of a controller gets and writes
@@ -178,6 +179,9 @@ VALID: dict[str, Callable[[], Any]] = {
     "t_max": lambda: 10.0,
     "t_ref": lambda: 1.0,
     "weights": lambda: 1.0,
+    "lengths": lambda: dynamics().cable_lengths(robot().home),
+    "sigma": lambda: 1e-3,
+    "starts": lambda: 16,
     "length": lambda: 1.0,
     "rho": lambda: 1.0,
     "threads": lambda: 1,

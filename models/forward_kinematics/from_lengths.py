@@ -81,7 +81,7 @@ def pose_from_lengths(
             poses, errors, converged, ambiguous = best.poses, best.errors, best.ended, best.ambiguous
         else:
             poses, errors, converged = problem.descend(rows, 1.0 / deviations, starts, 0.0)
-        residuals = errors * deviations
+        residuals = np.multiply(errors, deviations, out=errors)
     if not batch:
         pose, ambiguous = poses[0], None if ambiguous is None else bool(ambiguous[0])
         covariance = None if covariance is None else covariance[0]
@@ -131,4 +131,5 @@ def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
 
 def _start(problem: Problem, start: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
     """Return starts (N, 6), with coordinates that cannot move at home."""
-    return np.where(problem.free > 0.0, _rows(start, batch, 1), problem.home)
+    rows = _rows(start, batch, 1)
+    return rows if problem.freedoms == 6 else np.where(problem.free > 0.0, rows, problem.home)

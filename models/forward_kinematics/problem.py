@@ -35,6 +35,8 @@ class Problem(NamedTuple):
         Pose of the platform to start from, (6,) [m, rad].
     scale
         Length that makes a rotation comparable with a displacement [m].
+    freedoms
+        How many coordinates move.
     open
         Whether the lengths leave a motion open at home, as parallel cables do, so that gravity decides.
     """
@@ -44,17 +46,13 @@ class Problem(NamedTuple):
     free: np.ndarray
     home: np.ndarray
     scale: float
+    freedoms: int
     open: bool
 
     @property
     def m(self) -> int:
         """Return the number of cables."""
         return len(self.radii)
-
-    @property
-    def freedoms(self) -> int:
-        """Return the number of coordinates that move."""
-        return int(self.free.sum())
 
     def of(self, rows: np.ndarray) -> Problem:
         """Return the problem of some of the poses."""
@@ -138,7 +136,7 @@ def _at_home(robot: Any) -> Problem:
     J = gradient(robot, robot.home, None)[:, robot.dof_mask > 0.0]
     values = np.linalg.svd(J * robot.wrench_scale[robot.dof_mask > 0.0], compute_uv=False)
     is_open = robot.m < J.shape[1] or bool(values[-1] < OPEN * values[0])
-    return Problem(geometry, robot.pulley_radii, robot.dof_mask, robot.home, robot.length, is_open)
+    return Problem(geometry, robot.pulley_radii, robot.dof_mask, robot.home, robot.length, J.shape[1], is_open)
 
 
 def _geometry(robot: Robot, carriers: np.ndarray) -> np.ndarray:
