@@ -330,3 +330,35 @@ def test_wrong_input_is_one_line(change, message):
     with pytest.raises(InputError, match=message) as error:
         pose_from_lengths("cogiro", **arguments)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "cogiro", "planar-4"])
+def test_the_curvature_is_that_of_the_lengths(name):
+    """The kernel's second derivative, against differences of the gradient over small turns and displacements."""
+    from towline.models.forward_kinematics import curvature, lengths
+    from towline.models.forward_kinematics.problem import problem_of
+
+    robot, rng = load(name), np.random.default_rng(12)
+    pose = robot.home + 0.1 * rng.uniform(-1, 1, 6) * robot.dof_mask
+    errors, weights = rng.normal(0, 1, robot.m), rng.uniform(1, 2, robot.m)
+    problem, m = problem_of(robot), robot.m
+    W = [np.float64(0.0)] * lengths.rows_of(m)
+    W[:3], W[3:12] = list(pose[:3]), list(points.rotations(pose[3:]).ravel())
+    for i in range(m):
+        first = lengths.CABLES + lengths.CABLE * i
+        W[first : first + 9] = list(problem.geometry[0, i])
+        W[lengths.bank(0, m) + lengths.BANK * i + 6] = errors[i]
+    curvature.add_curvature(lengths.bank(0, m), m, problem.radii, weights, problem.free, W)
+    H = np.zeros((6, 6))
+    H[np.tril_indices(6)] = W[lengths.SYSTEM : lengths.SYSTEM + 21]
+    H = H + np.tril(H, -1).T
+
+    def weighted(step):
+        return (errors * weights) @ dynamics_of(robot).cable_lengths(moved(pose, step))
+
+    h, expected = 1e-4, np.zeros((6, 6))
+    for j in range(6):
+        for k in range(6):
+            a, b = h * np.eye(6)[j] * robot.dof_mask, h * np.eye(6)[k] * robot.dof_mask
+            expected[j, k] = weighted(a + b) - weighted(a - b) - weighted(b - a) + weighted(-a - b)
+    np.testing.assert_allclose(H, expected / (4 * h * h), atol=2e-6 * max(np.abs(H).max(), 1))

@@ -7,7 +7,9 @@ solves
 
 and moves the pose by x + dx and Q(dphi) R, with Cayley's rotation Q = (1 - S/2)^-1 (1 + S/2) of the cross product S
 with dphi, which agrees with the exponential to second order, needs no trigonometry and never leaves SO(3). A step that
-lowers the sum is taken and lambda divided by ten; otherwise lambda grows. What a step leaves to do is about its length
+lowers the sum is taken and lambda divided by ten; otherwise lambda grows. Where steps get
+shorter slowly, since errors are large for the curvature of the lengths, the matrix gets the second derivatives
+(`curvature`) and the steps are Newton's. What a step leaves to do is about its length
 times the ratio of its length to that of the step before: where that is rounding the problem ends, with the errors that
 are linear in the last step.
 """
@@ -32,6 +34,7 @@ from ...simd import (
     vectors,
     where,
 )
+from .curvature import add_curvature
 from .lengths import BANK, CABLE, CABLES, POSE, STEP, SYSTEM, TRIAL, bank, lengths_at, rows_of
 from .trigonometry import angle, cosine_and_sine
 
@@ -40,11 +43,12 @@ __all__ = ["descend_rows"]
 _LEAST, _MOST = 1e-6, 1e8  # of lambda, once a step did not help
 _PIVOT = 1e-15  # of the elimination, relative to the diagonal
 _NEAR = 0.005  # times the scale: after a step shorter than that the factor serves for the next one too
+_SLOW = 0.03  # ratio of a step to the one before: near a minimum large errors make Gauss and Newton's steps converge so
 _NEGLIGIBLE = 100.0  # times the smallest step: one that does not help ends a problem whose rounding is coarser
 
 
-def factor(damping, now, m, free, W):
-    """Write J^T J + lambda diag(J^T J) as Cholesky's factor, and return where it is positive definite."""
+def factor(damping, curved, now, m, radii, weights, free, W):
+    """Write the matrix as Cholesky's factor, and return where it is positive definite; `curved` for Newton's method."""
     good = damping >= 0.0
     for j in range(6):
         row = SYSTEM + j * (j + 1) // 2
@@ -55,6 +59,8 @@ def factor(damping, now, m, free, W):
             store(W, row + k, total)
         if free[j] == 0.0:  # its row and column are zero
             store(W, row + j, splat(1.0))
+    if curved:
+        add_curvature(now, m, radii, weights, free, W)
     for j in range(6):
         row = SYSTEM + j * (j + 1) // 2
         for k in range(j):
@@ -130,10 +136,10 @@ def descend(m, radii, weights, free, scale, smallest, first, steps, W):
     zero, one = splat(0.0), splat(1.0)
     damping, before, taken, ended = splat(first), zero, zero, zero
     going = sound = cost >= 0.0
-    fresh = True
+    fresh, curved = True, False
     for _ in range(steps):
         if fresh:
-            sound = factor(damping, now, m, free, W)
+            sound = factor(damping, curved, now, m, radii, weights, free, W)
         set_step(now, m, W)
         good = going & sound
         moved, turned = zero, zero
@@ -167,7 +173,9 @@ def descend(m, radii, weights, free, scale, smallest, first, steps, W):
         going = (rejected | better) & (damping <= _MOST)
         if not any_of(going):
             break
-        fresh = any_of(going & ((damping > 0.0) | (size > _NEAR * scale)))
+        slow = going & (ratio > _SLOW) & (size <= _NEAR * scale)
+        fresh = any_of(going & ((damping > 0.0) | (size > _NEAR * scale) | slow))
+        curved = any_of(slow) or curved
     end_with(zero > 0.0, ended <= 0.0, now, m, W)
     return ended, taken
 

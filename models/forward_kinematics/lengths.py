@@ -21,7 +21,7 @@ import math
 from ...simd import load, maximum, splat, sqrt, store, where
 from .trigonometry import angle
 
-__all__ = ["BANK", "CABLE", "CABLES", "POSE", "STEP", "SYSTEM", "TRIAL", "bank", "lengths_at", "rows_of"]
+__all__ = ["BANK", "CABLE", "CABLES", "POSE", "STEP", "SYSTEM", "TRIAL", "bank", "lengths_at", "over_sheave", "rows_of"]
 
 POSE, TRIAL, SYSTEM, STEP, CABLES = 0, 12, 24, 45, 51
 CABLE, BANK = 10, 7  # rows for each cable
@@ -35,6 +35,20 @@ def bank(which, m):
 def rows_of(m):
     """Return how many rows the work array has; the last m are the errors of what has ended."""
     return bank(2, m) + m
+
+
+def over_sheave(dx, dy, dz, kx, ky, kz, radius):
+    """Return e (three), sine and cosine of the wrap, the free part's length, and the distance from the swivel axis."""
+    up = dx * kx + dy * ky + dz * kz
+    ex, ey, ez = dx - up * kx, dy - up * ky, dz - up * kz
+    distance = maximum(sqrt(ex * ex + ey * ey + ez * ez), splat(1e-12))
+    inverse, out = 1.0 / distance, distance - radius
+    # Inside the sheave there is no tangent; then the free part has no length.
+    straight = sqrt(maximum(distance * distance - 2.0 * radius * distance + up * up, splat(1e-18)))
+    inverse_square = 1.0 / (out * out + up * up)
+    sine = (straight * out + radius * up) * inverse_square
+    cosine = (straight * up - radius * out) * inverse_square
+    return ex * inverse, ey * inverse, ez * inverse, sine, cosine, straight, distance
 
 
 def lengths_at(place, into, m, radii, weights, free, W):
@@ -54,21 +68,11 @@ def lengths_at(place, into, m, radii, weights, free, W):
             inverse = 1.0 / maximum(length, splat(1e-12))
             nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
         else:
-            radius = radii[i]
             kx, ky, kz = load(W, cable + 6), load(W, cable + 7), load(W, cable + 8)
-            up = dx * kx + dy * ky + dz * kz
-            ex, ey, ez = dx - up * kx, dy - up * ky, dz - up * kz
-            distance = maximum(sqrt(ex * ex + ey * ey + ez * ez), splat(1e-12))
-            out = distance - radius
-            # Inside the sheave there is no tangent; then the free part has no length.
-            straight = sqrt(maximum(distance * distance - 2.0 * radius * distance + up * up, splat(1e-18)))
-            square = out * out + up * up
-            sine = (straight * out + radius * up) / square
-            cosine = (straight * up - radius * out) / square
+            ex, ey, ez, sine, cosine, straight, _ = over_sheave(dx, dy, dz, kx, ky, kz, radii[i])
             wrap = angle(sine, cosine)
-            length = straight + radius * where(wrap < 0.0, wrap + 2.0 * math.pi, wrap)
-            across = sine / distance
-            nx, ny, nz = across * ex + cosine * kx, across * ey + cosine * ky, across * ez + cosine * kz
+            length = straight + radii[i] * where(wrap < 0.0, wrap + 2.0 * math.pi, wrap)
+            nx, ny, nz = sine * ex + cosine * kx, sine * ey + cosine * ky, sine * ez + cosine * kz
         weight = weights[i]
         store(W, row, nx * (weight * free[0]))
         store(W, row + 1, ny * (weight * free[1]))

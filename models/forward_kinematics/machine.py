@@ -18,7 +18,7 @@ from . import descent
 __all__ = ["compiled", "run"]
 
 _FOLDER = Path(__file__).parent
-_MODULES = ("trigonometry", "lengths", "descent")
+_MODULES = ("trigonometry", "lengths", "curvature", "descent")
 _PATIENCE = 0.5  # seconds of NumPy after which machine code is loaded, or compiled
 
 _GIVEN, _RESULT = "Array(float64, 1, 'C', readonly=True)", "Array(float64, 1, 'C')"
