@@ -219,6 +219,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "time_along.task": lambda: {"path": LINE},
     "start": lambda: None,
     "initial": lambda: None,
+    "robust": lambda: None,
     "progress": lambda: None,
     "grid": lambda: 10,
     "times": lambda: np.zeros(2),
