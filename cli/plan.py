@@ -49,6 +49,15 @@ def plan(
     ] = None,
     speed: Annotated[float, typer.Option(help="Speed of the film; 1 is real time.")] = 1.0,
     fps: Annotated[float, typer.Option(help="Frames per second of the film.")] = 20.0,
+    robust: Annotated[
+        float | None,
+        typer.Option(
+            "--robust",
+            metavar="SHARE",
+            help="Share of the robots of the robot file's uncertainty, such as 0.95, whose tensions must stay inside "
+            "their limits; default: that of the task.",
+        ),
+    ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -80,9 +89,10 @@ def plan(
     With --vary it plans many, one for each combination of some values, and writes a table.
     """
     if vary:
-        for name, value in (("--report", report), ("--animate", animate)):
+        for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
-                raise InputError(f"{name} must be left out with --vary, got {value}; --keep saves the plans")
+                instead = "the task's key robust serves all plans" if name == "--robust" else "--keep saves the plans"
+                raise InputError(f"{name} must be left out with --vary, got {value}; {instead}")
         sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep), out, figures, as_json)
         return
     own = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
@@ -104,7 +114,7 @@ def plan(
         if file is not None:
             check_writable(file)
     with watching(f"planning {read.name}", quiet=as_json) as watch:
-        planned = plan_motion(loaded, read, watch)
+        planned = plan_motion(loaded, read, watch, robust=robust)
         written = {"file": planned.save(target)}
         if not planned.feasible:
             watch.now("searching for feasible tasks near this one")

@@ -39,6 +39,15 @@ def workspace(
         list[Path] | None,
         typer.Option(metavar="FILE.py", help="Python file with conditions of your own, to use by their kinds."),
     ] = None,
+    robust: Annotated[
+        float | None,
+        typer.Option(
+            "--robust",
+            metavar="SHARE",
+            help="Share of the robots of the robot file's uncertainty, such as 0.95, for which the conditions about "
+            "tension limits must hold, at all accepted poses at once. Default: the robot counts as exact.",
+        ),
+    ] = None,
     box: Annotated[
         str | None,
         typer.Option(
@@ -101,12 +110,13 @@ def workspace(
     from ..figures.workspace import reached
     from ..models import load
     from ..workspace import sample, save
+    from ..workspace.condition import for_robots
     from ..writing import check_writable
 
     for file in define or []:
         _import(file)
     loaded = load(robot)
-    required = _condition(condition)
+    required = for_robots(_condition(condition), robust)
     region = _region(box, attitude, carriers, lengths)
     target = out if out is not None else Path(f"{loaded.name}-workspace.nc")
     stored = checkpoint_of(checkpoint, resume)

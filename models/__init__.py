@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .forward_kinematics.tracker import PoseTracker
     from .relative_dynamics import RelativeDynamics
     from .robot import Robot
+    from .uncertainty import Uncertainty
 
 __all__ = [
     "Dynamics",
@@ -24,6 +25,7 @@ __all__ = [
     "PoseTracker",
     "RelativeDynamics",
     "Robot",
+    "Uncertainty",
     "available",
     "branches",
     "load",
@@ -36,6 +38,7 @@ _HOME = {
     "PoseTracker": "forward_kinematics.tracker",
     "RelativeDynamics": "relative_dynamics",
     "Robot": "robot",
+    "Uncertainty": "uncertainty",
     "branches": "forward_kinematics.branches",
     "load": "files",
     "pose_from_lengths": "forward_kinematics.from_lengths",

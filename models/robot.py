@@ -7,12 +7,17 @@ pitch, yaw) with R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from . import points
+from ..errors import InputError
+from ..inputs import file_path, whole_number
+from . import parameters, points
 from .carriers import AnyCarrier
 from .part import (
     COORDINATES,
@@ -26,6 +31,7 @@ from .part import (
     Vector3,
     inertia_matrix,
 )
+from .uncertainty import Uncertainty
 
 # Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
 # or with fewer axes, the reactions of what is locked would enter them.
@@ -170,6 +176,9 @@ class Robot(Part):
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
     cables: tuple[Cable, ...] = Field(min_length=1)
+    uncertainty: Uncertainty | None = Field(
+        default=None, description="how well numbers of the cables are known; default: they count as exact"
+    )
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
@@ -196,6 +205,11 @@ class Robot(Part):
             )
         if self.pulley_radii.any():
             self._check_pulleys()
+        for index, name in enumerate(self.uncertainty.parameters if self.uncertainty else ()):
+            try:
+                parameters.locate(name, self.cables)
+            except ValueError as error:
+                raise ValueError(f"uncertainty.parameters[{index}] {error}") from None
         return self
 
     def _check_pulleys(self) -> None:
@@ -210,6 +224,66 @@ class Robot(Part):
                 f"cables[{index}].attachment must lie off the swivel axis and outside the sheave of its pulley at "
                 f"home, got {self.cables[index].attachment}"
             )
+
+    def parameter_values(self, names: Iterable[str]) -> np.ndarray:
+        """Return numbers of the cables by name, as `cables[2].anchor.x` or `cables[2].pulley.radius`, (p,) [m].
+
+        Raises
+        ------
+        InputError
+            If `names` is no list of names, or the robot has no such number.
+        """
+        return parameters.values(self, names)  # (p,)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Robot:
+        """Return the robot with other numbers of its cables [m], by the names of `parameter_values`.
+
+        Raises
+        ------
+        InputError
+            If `values` is no mapping, the robot has no such number, or a value is not possible.
+        """
+        return Robot.model_validate(parameters.changed(self, values))
+
+    def drawn(self, count: int, seed: int = 0) -> tuple[Robot, ...]:
+        """Draw robots whose numbers differ from the file's as its `uncertainty` states; each one is known exactly.
+
+        Parameters
+        ----------
+        count
+            How many.
+        seed
+            Of the random numbers: the first robots are the same ones whatever the count.
+
+        Raises
+        ------
+        InputError
+            If the robot has no uncertainty, an argument is wrong, or so large an error is drawn that no robot has it.
+        """
+        whole_number("count", count, 1, 1_000_000)
+        whole_number("seed", seed, 0, 2**63 - 1)
+        if self.uncertainty is None:
+            raise InputError("robot.uncertainty must be given to draw robots from it, got none")
+        names = self.uncertainty.parameters
+        exact = self.model_copy(update={"uncertainty": None})
+        numbers = self.parameter_values(names) + self.uncertainty.errors(count, seed)
+        return tuple(exact.with_parameters(dict(zip(names, row.tolist(), strict=True))) for row in numbers)
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the robot as a robot file, whole or not at all; `load` reads an equal robot from it.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from ..writing import whole_file
+        from .parsing import to_yaml
+
+        path = file_path("file", file)
+        with whole_file(path) as temporary:
+            temporary.write_text(to_yaml(self), encoding="utf-8")
+        return path
 
     @property
     def m(self) -> int:

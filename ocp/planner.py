@@ -21,9 +21,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from ..errors import InputError
+from ..inputs import number
 from ..models import Robot
 from ..models.files import as_robot
 from ..text import quantity
@@ -31,17 +30,16 @@ from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
 from .blocked import blocked
 from .cost import cost
 from .durations import Durations, durations
-from .global_path.global_path import find_global_path
-from .global_path.need import guess_exceeds, is_open
 from .global_path.space import Space
+from .global_path.start import motion_past
 from .homotopy import from_easier
-from .nlp.guess import formation_guess, usual_guess
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
 from .refinement import refine
 from .relaxations import near_fixed_motion, near_motion
 from .replanning import Replanner
 from .result import Plan
+from .robots import for_robots, judged
 from .search import Search
 from .start import deviation_from
 from .status import MotionStatus
@@ -57,7 +55,7 @@ from .time_law import BOUND, fastest
 from .timing.timing import Timing
 from .violation import relative_violation
 
-GLOBAL_SHARE = 0.2  # of the time limit
+LEAST_SHARE = 1e-9  # of robots that must keep their limits, or that need not
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
 
 
@@ -67,6 +65,7 @@ def plan(
     progress: Progress | None = None,
     start: Plan | Timing | AnyPath | dict[str, Any] | None = None,
     initial: Initial | Measured | dict[str, Any] | None = None,
+    robust: float | None = None,
 ) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
@@ -91,6 +90,10 @@ def plan(
     initial
         The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a mapping with
         its keys, or a `control.State`.
+    robust
+        Share of the robots of the robot's `uncertainty`, such as 0.95, instead of the task's: to first order, this
+        share has tensions inside their limits at all times of the plan. It takes a few plans, each with limits
+        tightened by what tensions differ in the one before.
 
     Returns
     -------
@@ -106,6 +109,8 @@ def plan(
         If the task or the start is not valid or does not fit the robot; one line naming the field and the value.
     """
     read = read_task(task)
+    if robust is not None:
+        read = read.model_copy(update={"robust": number("robust", robust, LEAST_SHARE, 1 - LEAST_SHARE)})
     if initial is not None:
         scenario = lay_out(as_robot(robot), read.model_copy(update={"initial": None}))
         read = read.model_copy(update={"initial": initial_of(scenario, initial)})
@@ -129,7 +134,11 @@ class Planner:
     """
 
     def __init__(self, robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str]):
-        self.scenario = lay_out(as_robot(robot), read_task(task))
+        read = read_task(task)
+        self.scenario = lay_out(as_robot(robot), read)
+        self._share = read.robust
+        if read.robust is not None:  # the first plan counts the robot as exact
+            self.scenario = lay_out(self.scenario.robot, read.model_copy(update={"robust": None}))
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
@@ -144,7 +153,10 @@ class Planner:
         """
         search = self._search
         plan = None if search is None else search.best_of_interrupted()
-        return plan if search is None or plan is None else replace(plan, stages=tuple(search.stages))
+        if search is None or plan is None:
+            return plan
+        plan = replace(plan, stages=tuple(search.stages))
+        return plan if self._share is None else judged(plan, self.scenario.robot, self._share)
 
     def plan(
         self, progress: Progress | None = None, start: Plan | Timing | AnyPath | dict[str, Any] | None = None
@@ -160,11 +172,18 @@ class Planner:
         self._search = search = Search(self.scenario, self._solvers, progress)
         guess = None if start is None else deviation_from(self.scenario, start)
         plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))
-        self._search = None
         if plan.feasible and plan.deviation is not None and search.mesh is not None:
             self._last = search.mesh, plan.deviation
+        if self._share is not None:
+            plan = for_robots(plan, self._share, partial(self._plan_again, search))
+        self._search = None
         self._flown = plan if plan.feasible else None
         return plan
+
+    def _plan_again(self, first: Search, scenario: Scenario, start: Deviation | None) -> Plan:
+        """Plan another scenario in the time that is left of the first search."""
+        self._search = search = Search(scenario, {}, first.progress, first.seconds_left)
+        return replace(_climb(search, start, None), stages=tuple(search.stages))
 
     def replan(
         self,
@@ -327,31 +346,6 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
-def _global_path(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
-    """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
-
-    With `balance` a place without tensions at rest counts as a collision.
-    """
-    scenario = search.scenario
-    if scenario.count == 0 or not is_open(scenario):
-        return None, False
-    with search.stage("global path") as stage:
-        exceeded = guess_exceeds(scenario, partial(usual_guess, scenario), balance)
-        if not exceeded:
-            return None, False
-        nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
-        formation = formation_guess(scenario) if search.seconds_left > 0 else None
-        if formation is not None and not guess_exceeds(scenario, formation, balance):
-            stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
-            return formation(nodes), True
-        seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
-        path, message = find_global_path(scenario, seconds)
-        stage.message = f"the direct motion exceeds {exceeded}: {message}"
-        if path is not None:
-            return path.guess(scenario), True
-        return None if formation is None else formation(nodes), True
-
-
 def _free_motion(search: Search, start: Deviation | None) -> Plan:
     """Solve, audit and refine; if the program has no solution, search for the closest motion first."""
     scenario = search.scenario
@@ -361,10 +355,10 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     team = bool(Space(scenario).loose)
     collides = False
     if guessed:
-        start, collides = _global_path(search, balance=team)
+        start, collides = motion_past(search, balance=team)
     outcome = from_easier(search, mesh, start, guessed)
     if not outcome.success and guessed and not (team or collides) and search.seconds_left > 0:
-        path, _ = _global_path(search, balance=True)
+        path, _ = motion_past(search, balance=True)
         if path is not None:
             start, outcome = path, search.solve("nonlinear program", mesh, path)
     if not outcome.success and search.seconds_left > 0:

@@ -108,6 +108,8 @@ def _check(scenario: Scenario) -> None:
     where = f"task {task.name!r}"
     if scenario.phases.all:
         raise InputError(f"{where}: phases must be left out to plan again on the way, got {len(scenario.phases.all)}")
+    if task.robust is not None:
+        raise InputError(f"{where}: robust must be left out to plan again on the way, got {task.robust:g}")
     if scenario.relative:
         raise InputError(f"{where}: path.frame must be world to plan again on the way, got {scenario.path.frame!r}")
     if task.tube.waypoints == "exact":

@@ -21,13 +21,19 @@ from .phase_summary import PhaseSummary, summaries
 from .stage import Stage
 from .status import MotionStatus
 from .tasks.deviation import Deviation
+from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from ..robust import RobotShare
+    from .robots import RobustMargin
+
 __all__ = ["Plan", "Relaxed"]
+
+DRAWN_AT = 200  # times at which drawn robots are checked
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,8 @@ class Plan:
         The steps of the planner, in order, with their messages and times.
     objective
         Value of the objective that the solver reached, where it solved a program; a plan without one has None.
+    robust
+        How the tensions differ between the robots of the uncertainty; None unless the task requires it.
     offers
         Computes `relaxations`.
     """
@@ -73,6 +81,7 @@ class Plan:
     iterates: tuple[tuple[int, float, float], ...] = ()
     stages: tuple[Stage, ...] = ()
     objective: float | None = None
+    robust: RobustMargin | None = None
     offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -139,6 +148,32 @@ class Plan:
         """Return name, times, load, tensions and ground reaction of each phase; empty for a task without phases."""
         return summaries(self.scenario, self.audit)
 
+    def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
+        """Draw robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
+
+        Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
+        own wrench matrices, and the exact solver decides.
+
+        Parameters
+        ----------
+        count
+            How many robots.
+        seed
+            Of the random numbers.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the robot has no uncertainty.
+        """
+        from ..robust import share_of_robots
+
+        audit, scenario = self.audit, self.scenario
+        rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))
+        motion, carriers = (Motion(*(part[rows] for part in each)) for each in (audit.motion, audit.carriers))
+        w = scenario.required_wrench(audit.times[rows], motion, carriers, scenario.wind)
+        return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
+
     def to_dict(self) -> dict[str, Any]:
         """Return what `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""
         return {
@@ -154,6 +189,7 @@ class Plan:
             "iterations": self.iterations,
             "solver_message": self.message,
             "audit": self.audit.to_dict(),
+            "robust": None if self.robust is None else self.robust.to_dict(),
             "certificate": None if self.certificate is None else self.certificate.to_dict(),
             "infeasible_spans": [certificate.to_dict() for certificate in self.infeasible_spans],
             "relaxations": [relaxed.to_dict() for relaxed in self.relaxations],

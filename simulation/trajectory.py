@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..inputs import file_path, number, shown
+from ..inputs import file_path, number, real_array, shown
 from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
@@ -65,8 +65,8 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
     if callable(getattr(reference, "at", None)):
         return _of_path(robot, reference, duration)
     try:
-        pose = np.asarray(reference, dtype=float)
-    except (TypeError, ValueError, OverflowError):
+        pose = real_array("reference", reference).astype(float)
+    except InputError:
         pose = np.empty(0)
     if pose.shape != (6,) or not (np.abs(pose) <= LARGEST).all():
         raise InputError(f"reference must be {ACCEPTED}, got {shown(reference)}")

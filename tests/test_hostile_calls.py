@@ -23,6 +23,7 @@ from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan,
 from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.inputs import printable
 from towline.models import RelativeDynamics
+from towline.models.uncertainty import Uncertainty
 from towline.solvers import Horizon, StageProblem, solve_horizon
 from towline.workspace import Places, Region, StaticEquilibrium, sample
 
@@ -114,7 +115,8 @@ LINE = {"kind": "line", "start": [0, 0, -1, 0, 0, 0], "end": [0.1, 0, -1, 0, 0, 
 
 @cache
 def robot() -> towline.Robot:
-    return load(ROBOT)
+    known = {"parameters": ["cables[0].anchor.x"], "covariance": [[1e-4]]}
+    return load(ROBOT).model_copy(update={"uncertainty": Uncertainty.model_validate(known)})
 
 
 @cache
@@ -217,6 +219,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "time_along.task": lambda: {"path": LINE},
     "start": lambda: None,
     "initial": lambda: None,
+    "robust": lambda: None,
     "progress": lambda: None,
     "grid": lambda: 10,
     "times": lambda: np.zeros(2),
@@ -307,6 +310,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "Horizon.rows": lambda: 0,
     "shifted": lambda: False,
     "warm": lambda: False,
+    "Robot.parameter_values.names": lambda: ["cables[0].anchor.x"],
+    "Robot.with_parameters.values": lambda: {"cables[0].anchor.x": 0.5},
     "result": lambda: sample(robot(), StaticEquilibrium(), samples=20),
 }
 
@@ -323,6 +328,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "Robot": robot().model_dump(mode="json"),
     "Task": TASK,
     "Region": {},
+    "Uncertainty": {"parameters": ["cables[0].anchor.x"], "covariance": [[1e-4]]},
     "AllOf": {"conditions": [REST]},
     "AnyOf": {"conditions": [REST]},
     "Dynamic": {"accelerations": [[0, 0, 1, 0, 0, 0]]},
@@ -418,7 +424,9 @@ def subjects() -> dict[str, Subject]:
     workspace = import_module("towline.workspace")
     objects = {name: make() for name, make in OBJECTS.items()}
     objects |= {
-        name: getattr(workspace, name)(**MODELS[name]) for name in MODELS if name not in objects and name != "Noise"
+        name: getattr(workspace, name)(**MODELS[name])
+        for name in MODELS
+        if name not in objects and name not in {"Noise", "Uncertainty"}
     }
     for name, value in objects.items():
         for method, bound in public_methods(value):

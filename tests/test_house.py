@@ -11,7 +11,7 @@ ROOT = Path(__file__).parent.parent
 # From the ground up: a room may import the rooms below its floor, and itself. Rooms of one floor stand apart.
 FLOORS = [
     {"models", "solvers", "figures"},
-    {"distribution"},
+    {"distribution", "robust"},
     {"control", "workspace", "ocp", "embedded"},
     {"simulation"},
     {"studies"},
@@ -39,8 +39,8 @@ CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
 def rooms():
-    """Folders at the top that are packages, and `distribution.py`, which has a floor of its own."""
-    return {path.parent.name for path in ROOT.glob("*/__init__.py")} | {"distribution"}
+    """Folders at the top that are packages, and the modules there that join models and solvers."""
+    return {path.parent.name for path in ROOT.glob("*/__init__.py")} | {"distribution", "robust"}
 
 
 def files_of(room):

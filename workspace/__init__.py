@@ -6,7 +6,7 @@ hold, `hints` takes a first look.
 
 from . import conditions
 from .boundary_mesh import boundary
-from .condition import AllOf, AnyOf, Condition, condition_from
+from .condition import AllOf, AnyOf, Condition, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
 from .dataset import save
 from .feasibility import load_kernels
@@ -21,6 +21,7 @@ __all__ = [
     "Condition",
     "Places",
     "Region",
+    "TensionCondition",
     "boundary",
     "condition_from",
     "hints",

@@ -13,13 +13,16 @@ import numpy as np
 from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from ..errors import InputError
-from ..inputs import required, shown
+from ..inputs import number, required, shown
 from ..models import Robot
-from ..models.part import Part
+from ..models.part import Part, Share
 from .feasibility import too_few_cables
 from .places import Places, check_places
 
-__all__ = ["AllOf", "AnyOf", "Condition", "condition_from"]
+__all__ = ["AllOf", "AnyOf", "Condition", "TensionCondition", "condition_from", "for_robots"]
+
+
+LEAST_SHARE = 1e-9  # of robots that must fulfil a condition, or that need not
 
 
 class Condition(Part, ABC):
@@ -80,6 +83,17 @@ class Condition(Part, ABC):
         """Return why the condition holds nowhere, or at isolated poses only, whatever the region; None if it may."""
         return too_few_cables(robot) if self.takes_every_row else None
 
+    def for_robots(self, robust: float) -> Condition:
+        """Return the condition for a share `robust` of the robots of an uncertainty; without such a key it is the same.
+
+        Raises
+        ------
+        InputError
+            If `robust` is no number between 0 and 1.
+        """
+        share = number("robust", robust, LEAST_SHARE, 1 - LEAST_SHARE)
+        return self.model_copy(update={"robust": share}) if "robust" in type(self).model_fields else self
+
     def __and__(self, other: Condition) -> AllOf:
         """Return the condition that both hold."""
         return AllOf(kind="all", conditions=(*_parts(self, AllOf), *_parts(other, AllOf)))
@@ -107,7 +121,33 @@ def condition_from(data: Any) -> Condition:
     return Condition.kinds[data["kind"]](**{str(name): value for name, value in data.items()})
 
 
+def for_robots(condition: Condition, share: float | None) -> Condition:
+    """Return a condition for a share of the robots of an uncertainty, or as it is if `share` is None.
+
+    Raises
+    ------
+    InputError
+        If `share` is no number between 0 and 1, or no part of the condition is about tension limits.
+    """
+    if share is None:
+        return condition
+    changed = condition.for_robots(share)
+    if changed == condition == condition.for_robots(share / 2):
+        raise InputError(f"robust must be None for a condition without tension limits, got {shown(share)}")
+    return changed
+
+
 AnyCondition = Annotated[SerializeAsAny[Condition], BeforeValidator(condition_from)]
+
+
+class TensionCondition(Condition, ABC):
+    """A condition about tensions inside their limits, which can be required of the robots of an uncertainty."""
+
+    robust: Share | None = Field(
+        default=None,
+        description="share of the robots of the robot's `uncertainty` for which the condition must hold, to first "
+        "order, at all accepted places at once, such as 0.95; default: the robot counts as exact",
+    )
 
 
 class AllOf(Condition):
@@ -119,6 +159,10 @@ class AllOf(Condition):
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         """Return where all hold, (n,) of bool."""
         return _one_by_one(self.conditions, robot, places, undecided=True)
+
+    def for_robots(self, robust: float) -> Condition:
+        """Return all conditions for a share `robust` of the robots."""
+        return AllOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the sum of the shortfalls x, each as a share of 1: x / (1 + x)."""
@@ -138,6 +182,10 @@ class AnyOf(Condition):
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         """Return where one of them holds, (n,) of bool."""
         return _one_by_one(self.conditions, robot, places, undecided=False)
+
+    def for_robots(self, robust: float) -> Condition:
+        """Return the alternatives for a share `robust` of the robots."""
+        return AnyOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the smallest of the shortfalls x, as a share of 1: x / (1 + x)."""

@@ -17,6 +17,7 @@ from ..models.dynamics import dynamics_of
 from ..solvers import compiled as solver_kernels
 from ..solvers import solve_batch
 from .places import Places, check_places
+from .tightened import Tightened
 
 __all__ = [
     "feasible",
@@ -30,6 +31,7 @@ __all__ = [
 ]
 
 PLACES_AT_ONCE = 8192
+ONLY_EXACT = 0.01  # of the force scale
 
 
 def load_kernels(robot: Robot) -> None:
@@ -71,7 +73,13 @@ def wrench_matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[
         yield part, A
 
 
-def feasible(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+def feasible(
+    robot: Robot,
+    places: Places,
+    wrenches: np.ndarray,
+    rows: np.ndarray | None = None,
+    robust: float | None = None,
+) -> np.ndarray:
     """Return where tensions inside their limits give every one of some wrenches, (n,) of bool.
 
     Parameters
@@ -80,13 +88,19 @@ def feasible(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarra
         (k, 6) for all places or (k, n, 6), about the CoM in {G} [N, N m].
     rows
         Wrench rows to give; default: those of the coordinates that can move.
+    robust
+        Share of the robots of an uncertainty whose tensions must exist; default: the robot counts as exact.
     """
     rows = wrench_rows(robot) if rows is None else rows
+    tightened = None if robust is None else Tightened(robot, robust, rows)
     to_give = scaled(robot, wrenches, rows)
     shared = to_give.ndim == 2
     held = np.zeros(len(places), dtype=bool)
     for part, A in wrench_matrices(robot, places, rows):
         left = np.arange(len(A))
+        if tightened is not None:
+            held[part] = tightened.feasible(places.only(part), A, to_give if shared else to_give[:, part])
+            continue
         for w in to_give if shared else to_give[:, part]:
             some = A if left.size == len(A) else A[left]
             left = left[solve_batch(some, w if shared else w[left], robot.t_min, robot.t_max, threads=1).feasible]
@@ -96,10 +110,17 @@ def feasible(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarra
     return held
 
 
-def shortfall(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+def shortfall(
+    robot: Robot,
+    places: Places,
+    wrenches: np.ndarray,
+    rows: np.ndarray | None = None,
+    robust: float | None = None,
+) -> np.ndarray:
     """Return a lower bound of the distance of wrenches (k, 6) from the available wrench set, the largest, (n,) [N].
 
-    It is the shortfall of the batch solver's certificates: zero exactly where `feasible` is true.
+    It is the shortfall of the batch solver's certificates: zero exactly where `feasible` is true. Where only the robots
+    of an uncertainty have no tensions, of which there must be a share `robust`, it is 1 % of the force scale.
     """
     check_places(robot, places)
     rows = wrench_rows(robot) if rows is None else rows
@@ -109,6 +130,10 @@ def shortfall(robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarr
             solved = solve_batch(A, w, robot.t_min, robot.t_max, threads=1)
             short = np.where(solved.feasible, 0.0, np.nan_to_num(solved.shortfall, nan=np.inf))
             largest[part] = np.maximum(largest[part], short)
+    if robust is not None:
+        exact = np.flatnonzero(largest == 0)
+        held = feasible(robot, places.only(exact), wrenches, rows, robust)
+        largest[exact[~held]] = ONLY_EXACT * robot.force_scale
     return largest
 
 

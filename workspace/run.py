@@ -18,7 +18,7 @@ from ..execution import Workers, check_workers, start_workers
 from ..inputs import file_path, flag, one_of, required, shown, whole_number
 from ..models import Robot
 from .checkpoint import ChunkCheckpoint, open_chunks
-from .condition import Condition, condition_from
+from .condition import Condition, condition_from, for_robots
 from .counting import Counter, Shared, count
 from .counts import Counts
 from .dataset import dataset
@@ -53,6 +53,7 @@ def sample(
     progress: Progress | None = None,
     keep: str = "accepted",
     points_max: int = 1_000_000,
+    robust: float | None = None,
 ) -> xr.Dataset:
     """Sample the places where a condition holds.
 
@@ -90,6 +91,10 @@ def sample(
         Which samples the dataset contains: accepted, all or none.
     points_max
         Maximum number of samples that it contains, the first ones in the order of the samples.
+    robust
+        Share of the robots of the robot's `uncertainty`, such as 0.95: with that probability the robot that was built
+        fulfils the conditions about tension limits at all accepted places, to first order. It is the same as `robust`
+        in each of these conditions; others are not affected.
 
     Returns
     -------
@@ -123,6 +128,7 @@ def sample(
     start = time.perf_counter()
     required("robot", robot, Robot)
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
+    condition = for_robots(condition, robust)
     region = Region.model_validate({} if region is None else region)
     check_sampling(method, samples, seed)
     check_workers(workers, scheduler)

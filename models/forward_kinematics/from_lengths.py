@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...inputs import shown
 from ..batch import as_array, leading
 from ..files import as_robot
+from ..part import LARGEST
 from ..robot import Robot
 from .estimate import PoseEstimate
 from .problem import Problem, problem_of
@@ -94,10 +95,12 @@ def pose_from_lengths(
 
 
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
-    """Return lengths (..., m), or raise InputError unless all are above zero."""
+    """Return lengths (..., m), or raise InputError unless all are above zero and of a size that can be squared."""
     array = as_array("lengths", lengths, (robot.m,))
     if not array.min(initial=np.inf) > 0.0:
         raise InputError(f"lengths must be numbers > 0 [m], got {array.min():g}")
+    if not array.max(initial=0.0) <= LARGEST:
+        raise InputError(f"lengths must be numbers up to {LARGEST:g} [m], got {array.max():g}")
     return array
 
 

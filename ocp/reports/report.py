@@ -55,6 +55,7 @@ def sections(plan: Plan) -> list[Section]:
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
+        Section("Robots of the uncertainty", _robots(plan)),
         Section("Motion", _motion(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
@@ -244,6 +245,26 @@ def _tensions(plan: Plan) -> list[Fact]:
     slack = "; at least 0 N where cables may be slack" if relaxed else ""
     more = f", and {len(pairs) - 1} more (by cable)" * (len(pairs) > 1)
     return [*facts, ("limits", f"{pairs[0]}{more}{slack}"), *_jumps(plan)]
+
+
+def _robots(plan: Plan) -> list[Fact]:
+    """Return what tensions differ by between the robots of the uncertainty, and how many drawn ones keep the limits."""
+    margin = plan.robust
+    if margin is None:
+        return []
+    row, cable = np.unravel_index(int(margin.reach.argmax()), margin.reach.shape)
+    share = f"{quantity(100 * margin.share, '%')} of the robots"
+    at = f"in cable {cable + 1} at t = {plan.audit.times[row]:.3f} s"
+    kept = "to first order, tensions inside their limits at all times" if margin.holds else "not all tensions inside"
+    drawn = plan.share_of_robots().holds
+    return [
+        (share, kept),
+        (
+            "tensions differ",
+            f"by up to {quantity(margin.reach.max(), 'N')} {at}, {margin.factor:.3g} standard deviations",
+        ),
+        ("drawn at random", f"{int(drawn.sum())} of {len(drawn)} robots have tensions inside their limits throughout"),
+    ]
 
 
 def _jumps(plan: Plan) -> list[Fact]:

@@ -51,6 +51,8 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
         raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
     if isinstance(task.wind, WindBox):
         _feels_no_tensions(robot, where)
+    if task.robust is not None:
+        _check_robust(robot, task, where)
     check_ends(robot, task.initial, task.final, task.path.frame, where)
     limits = limit_list(robot, task)
     _fit_limits(robot, task, limits, where)
@@ -95,6 +97,23 @@ def _feels_no_tensions(robot: Robot, where: str) -> None:
                 f"{where}: wind must be one wind, (x, y, z) [m/s], got a box: carrier {carrier.name!r} of kind "
                 f"{carrier.kind} moves with the pull of its cables, so that no motion is the same in every wind"
             )
+
+
+def _check_robust(robot: Robot, task: Task, where: str) -> None:
+    """Refuse what the differences between robots are not known for."""
+    missing = "must be left out for a robot without an uncertainty in its file"
+    if robot.uncertainty is None:
+        raise InputError(f"{where}: robust {missing}, as {robot.name!r} is, got {task.robust:g}")
+    if robot.m < len(robot.platform.dof):
+        raise InputError(
+            f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, since each such "
+            f"robot moves otherwise, got {task.robust:g} for {robot.name!r}"
+        )
+    if isinstance(task.wind, WindBox):
+        raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with robust, got a box")
+    for phase in task.phases or ():
+        if phase.ground is not None:
+            raise InputError(f"{where}: robust must be left out with phases on the ground, got phase {phase.name!r}")
 
 
 def check_margin(robot: Robot, task: Task) -> None:

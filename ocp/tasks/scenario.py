@@ -47,6 +47,8 @@ class Scenario:
         (carrier, coordinate) pairs that the planner chooses.
     phases
         Those of the task, if it has some.
+    tightened
+        By how much the tension limits are tightened for the robots of an uncertainty, (m,) [N]; default: not.
     """
 
     robot: Robot
@@ -60,6 +62,7 @@ class Scenario:
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it open: where the planner starts, then what it chose
     phases: Phases = field(default_factory=Phases, repr=False)
+    tightened: np.ndarray | None = None
 
     @property
     def scheme(self) -> Scheme:
@@ -130,8 +133,14 @@ class Scenario:
         return max(round(self.duration * self.task.output_rate), 1)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the tension limits less the task's margin if that is hard, (m,) each [N]."""
-        return self.robot.t_min + self.hard_margin, self.robot.t_max - self.hard_margin
+        """Return the tension limits less the task's margin if that is hard, and tightened, (m,) each [N]."""
+        inside = self.hard_margin + self.tightened_by
+        return self.robot.t_min + inside, self.robot.t_max - inside
+
+    @property
+    def tightened_by(self) -> np.ndarray:
+        """Return by how much the tension limits are tightened, (m,) [N]."""
+        return np.zeros(self.robot.m) if self.tightened is None else self.tightened
 
     def bounds_in(self, phase: LaidPhase | None) -> tuple[np.ndarray, np.ndarray]:
         """Return the tension limits in a phase, less the margin: of cables that may be slack the lower one is 0."""

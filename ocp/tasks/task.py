@@ -12,7 +12,7 @@ from typing_extensions import override
 from ...errors import InputError
 from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3
 from ...models.ranges import PositiveRange
 from .initial import Final, Initial
 from .paths import AnyPath
@@ -162,6 +162,11 @@ class Task(Part):
     )
     final: Final | None = Field(default=None, description="state in which the motion ends; default: as `ends` require")
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
+    robust: Share | None = Field(
+        default=None,
+        description="share of the robots of the robot's `uncertainty` whose tensions must stay inside their limits "
+        "less the margin, to first order, such as 0.95; default: the robot counts as exact",
+    )
     wind: Vector3 | WindBox | None = Field(
         default=None,
         description="wind on the platform, constant, in {G} [m/s], or a range {min, max}: tensions exist for every "

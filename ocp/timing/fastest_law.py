@@ -125,6 +125,8 @@ def _check(robot: Robot, task: Task) -> None:
             )
     if task.limits.soft:
         raise InputError(f"{where}: limits.soft must be left out to time a path, whose limits are all hard")
+    if task.robust is not None:
+        raise InputError(f"{where}: robust must be left out to time a path, got {task.robust:g}; plan the task instead")
     if isinstance(task.wind, WindBox) or (task.wind is not None and any(task.wind)):
         raise InputError(f"{where}: wind must be [0, 0, 0], still air, or left out to time a path")
     if task.wind is not None and robot.platform.aero is None:

@@ -10,14 +10,14 @@ from pydantic import Field
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import Finite
-from ..condition import Condition
+from ..condition import TensionCondition
 from ..feasibility import feasible
 from ..places import Places
 
 __all__ = ["Dynamic"]
 
 
-class Dynamic(Condition):
+class Dynamic(TensionCondition):
     """Tensions inside the limits give a platform at rest each of some accelerations.
 
     At a given pose the required wrench is linear in the acceleration, so tensions give every acceleration of their
@@ -34,4 +34,4 @@ class Dynamic(Condition):
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         accelerations = np.array(self.accelerations) * robot.dof_mask
         wrenches = dynamics_of(robot).required_wrench(places.pose, np.zeros(6), accelerations[:, None])
-        return feasible(robot, places, wrenches)
+        return feasible(robot, places, wrenches, robust=self.robust)

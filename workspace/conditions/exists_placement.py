@@ -67,6 +67,10 @@ class ExistsPlacement(Condition):
             held[searched] = self._search(robot, mobile, places.only(searched))
         return held
 
+    def for_robots(self, robust: float) -> Condition:
+        """Return the condition with the one that must hold for a share `robust` of the robots."""
+        return self.model_copy(update={"condition": self.condition.for_robots(robust)})
+
     def why_nowhere(self, robot: Robot) -> str | None:
         """Return the reason of the condition."""
         return self.condition.why_nowhere(robot)

@@ -11,21 +11,23 @@ from typing import Literal
 import numpy as np
 
 from ...models import Robot
-from ..condition import Condition
+from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall, wrench_rows
 from ..places import Places
 
 __all__ = ["ForceBalance"]
 
 
-class ForceBalance(Condition):
+class ForceBalance(TensionCondition):
     """Tensions inside the limits balance the weight as a force; moments are ignored."""
 
     kind: Literal["force-balance"] = "force-balance"
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        return feasible(robot, places, rest_wrench(robot)[None], wrench_rows(robot, forces_only=True))
+        rows = wrench_rows(robot, forces_only=True)
+        return feasible(robot, places, rest_wrench(robot)[None], rows, self.robust)
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the distance from the required force to the available ones, (n,) [N]."""
-        return shortfall(robot, places, rest_wrench(robot)[None], wrench_rows(robot, forces_only=True))
+        rows = wrench_rows(robot, forces_only=True)
+        return shortfall(robot, places, rest_wrench(robot)[None], rows, self.robust)

@@ -7,14 +7,14 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ...models import Robot
-from ..condition import Condition
+from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
 
 __all__ = ["StaticEquilibrium"]
 
 
-class StaticEquilibrium(Condition):
+class StaticEquilibrium(TensionCondition):
     """Tensions inside the limits balance the platform's weight."""
 
     takes_every_row: ClassVar[bool] = True
@@ -22,8 +22,8 @@ class StaticEquilibrium(Condition):
     kind: Literal["static-equilibrium"] = "static-equilibrium"
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        return feasible(robot, places, rest_wrench(robot)[None])
+        return feasible(robot, places, rest_wrench(robot)[None], robust=self.robust)
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the distance from the required wrench to the available ones, moments over length, (n,) [N]."""
-        return shortfall(robot, places, rest_wrench(robot)[None])
+        return shortfall(robot, places, rest_wrench(robot)[None], robust=self.robust)

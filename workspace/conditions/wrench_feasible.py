@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from ...models import Robot
 from ...models.part import Finite
-from ..condition import Condition
+from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
 
@@ -23,7 +23,7 @@ __all__ = ["WrenchFeasible"]
 Wrench = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 
-class WrenchFeasible(Condition):
+class WrenchFeasible(TensionCondition):
     """Tensions inside the limits balance the weight and every wrench of a box or of a polytope."""
 
     takes_every_row: ClassVar[bool] = True
@@ -58,11 +58,11 @@ class WrenchFeasible(Condition):
         return np.array(list(product(*[sorted({low, high}) for low, high in zip(*self.box, strict=True)])))
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        return feasible(robot, places, self._wrenches(robot))
+        return feasible(robot, places, self._wrenches(robot), robust=self.robust)
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return the largest distance of a required wrench from the available ones, moments over length, (n,) [N]."""
-        return shortfall(robot, places, self._wrenches(robot))
+        return shortfall(robot, places, self._wrenches(robot), robust=self.robust)
 
     def _wrenches(self, robot: Robot) -> np.ndarray:
         weight = rest_wrench(robot)

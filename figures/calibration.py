@@ -1,0 +1,131 @@
+"""Draw a calibration: residuals before and after, ellipsoids of the anchors, and how well each parameter is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WITHIN_95 = 2.795  # standard deviations: the root of the 95 % quantile of chi-square with three degrees of freedom
+MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files grow
+
+
+def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = None) -> Figure:
+    """Draw the residuals of each cable's length with the parameters of the file, and with those found.
+
+    Parameters
+    ----------
+    before, after
+        (N, m) [m].
+    times
+        Of the samples, (N,) [s]; default: they are counted.
+    """
+    canvas = style.figure(6.2, 5.0)
+    along = "sample" if times is None else "time [s]"
+    top, bottom = style.panels_below(canvas, along, ("residual, file [mm]", "calibrated [mm]"))
+    at = np.arange(len(before)) if times is None else times
+    step = -(-len(before) // MOST_SAMPLES)
+    for ax, values in ((top, before), (bottom, after)):
+        for cable in range(values.shape[1]):
+            ax.plot(
+                at[::step],
+                1e3 * values[::step, cable],
+                ".",
+                markersize=2.5,
+                color=style.colour(cable),
+                label=f"cable {cable + 1}",
+                rasterized=True,
+            )
+        rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
+        ax.set_title(f"root mean square {rms:.3g} mm", fontsize=9, loc="left")
+    style.legend_below(canvas, top)
+    return canvas
+
+
+def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: np.ndarray | None = None) -> Figure:
+    """Draw where each anchor was found relative to the file, with the ellipsoid that holds it with 95 %.
+
+    There is a panel for each cable, all at the same scale: y against x, and z against x.
+
+    Parameters
+    ----------
+    file, found
+        Anchors of the file and those found, (m, 3) each [m].
+    covariances
+        Of those found, (m, 3, 3) [m^2].
+    true
+        Where the anchors are, if that is known, as in a simulation, (m, 3) [m].
+    """
+    from matplotlib.patches import Ellipse
+
+    columns = min(len(file), 4)
+    rows = -(-len(file) // columns)
+    canvas = style.figure(0.9 + 1.7 * columns, 0.9 + 1.7 * rows)
+    moved = 1e3 * (found - file)
+    spans = 1e3 * WITHIN_95 * np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
+    reach = 1.15 * max(float((np.abs(moved) + spans).max()), 1e-3)
+    for cable, (place, covariance) in enumerate(zip(moved, covariances, strict=True)):
+        last, first = cable + columns >= len(file), cable % columns == 0
+        labels = "x [mm]" if last else "", "y and z [mm]" if first else ""
+        ax = style.axes(canvas, *labels, (rows, columns, cable + 1))
+        for index, up in enumerate((1, 2)):
+            flat = np.array([0, up])
+            values, vectors = np.linalg.eigh(covariance[np.ix_(flat, flat)])
+            sizes = 2e3 * WITHIN_95 * np.sqrt(np.maximum(values, 0.0))
+            angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
+            shade, centre = style.colour(index), (float(place[0]), float(place[up]))
+            label = f"found, {'xyz'[up]} against x, with 95 %"
+            ax.plot(*centre, ".", color=shade, markersize=4, label=label)
+            ax.add_patch(Ellipse(centre, sizes[1], sizes[0], angle=angle, facecolor=shade, alpha=0.35))
+            if true is not None:
+                there = 1e3 * (true - file)[cable]
+                ax.plot(there[0], there[up], "x", color=shade, markersize=5, label=f"true, {'xyz'[up]} against x")
+        ax.plot(0, 0, "+", color="#000000", markersize=7, label="file")
+        ax.set_xlim(-reach, reach)
+        ax.set_ylim(-reach, reach)
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_title(f"anchor {cable + 1}", fontsize=8)
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(style.few_ticks())
+    style.legend_below(canvas, canvas.axes[0])
+    return canvas
+
+
+def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
+    """Draw the standard deviations of the parameters by cable, one series for each kind of parameter.
+
+    Parameters
+    ----------
+    sigmas
+        (m,) [m] by kind, such as "anchor x"; inf where the measurements leave a parameter open, nan where it is fixed.
+    """
+    canvas = style.figure(6.4, 4.0)
+    ax = style.axes(canvas, "cable", "standard deviation [mm]")
+    every = np.concatenate([np.asarray(values, dtype=float) for values in sigmas.values()])
+    finite = 1e3 * every[np.isfinite(every) & (every > 0)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 10.0)
+    beyond, opened = 4.0 * high, bool(np.isinf(every).any())
+    shifts = np.linspace(-0.32, 0.32, len(sigmas)) if len(sigmas) > 1 else np.zeros(1)
+    for index, ((kind, values), shift) in enumerate(zip(sigmas.items(), shifts, strict=True)):
+        at = np.arange(1, len(values) + 1) + shift
+        known = np.isfinite(values)
+        style_of: dict[str, Any] = {"color": style.colour(index), "linestyle": "none", "marker": "os^vDP*X"[index % 8]}
+        ax.plot(at[known], 1e3 * values[known], markersize=5, label=kind, **style_of)
+        ax.plot(
+            at[np.isinf(values)], np.full(np.isinf(values).sum(), beyond), markersize=5, fillstyle="none", **style_of
+        )
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.set_ylim(low / 2, (2 * beyond) if opened else 2 * high)
+    if opened:
+        style.limit_line(ax, beyond / 1.6, "above this line: not determined", above=True)
+    cables = max(len(values) for values in sigmas.values())
+    ax.set_xticks(range(1, cables + 1))
+    style.legend_below(canvas, ax)
+    return canvas

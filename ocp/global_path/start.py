@@ -1,0 +1,42 @@
+"""Where a program starts: at a motion past what the usual guess collides with."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ..nlp.guess import formation_guess, usual_guess
+from ..search import Search
+from ..tasks.deviation import Deviation
+from .global_path import find_global_path
+from .need import guess_exceeds, is_open
+
+__all__ = ["motion_past"]
+
+GLOBAL_SHARE = 0.2  # of the time limit
+
+
+def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
+    """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
+
+    With `balance` a place without tensions at rest counts as a collision.
+    """
+    scenario = search.scenario
+    if scenario.count == 0 or not is_open(scenario):
+        return None, False
+    with search.stage("global path") as stage:
+        exceeded = guess_exceeds(scenario, partial(usual_guess, scenario), balance)
+        if not exceeded:
+            return None, False
+        nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
+        formation = formation_guess(scenario) if search.seconds_left > 0 else None
+        if formation is not None and not guess_exceeds(scenario, formation, balance):
+            stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
+            return formation(nodes), True
+        seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
+        path, message = find_global_path(scenario, seconds)
+        stage.message = f"the direct motion exceeds {exceeded}: {message}"
+        if path is not None:
+            return path.guess(scenario), True
+        return None if formation is None else formation(nodes), True

@@ -1,0 +1,52 @@
+"""Figures of a calibration: what is drawn is what was given, in millimetres."""
+
+import numpy as np
+import pytest
+from matplotlib.patches import Ellipse
+
+from towline.figures.calibration import WITHIN_95, anchors, observability, residuals
+
+RNG = np.random.default_rng(0)
+
+
+def test_residuals_before_and_after():
+    before, after = RNG.normal(0.03, 0.002, (5000, 4)), RNG.normal(0, 0.001, (5000, 4))
+    top, bottom = residuals(before, after, np.arange(5000) / 100).axes
+    assert top.get_title(loc="left") == "root mean square 30.1 mm"
+    assert bottom.get_title(loc="left").startswith("root mean square 1")
+    assert bottom.get_xlabel() == "time [s]"
+    (first, *_) = top.lines
+    assert len(top.lines) == 4
+    assert 1000 < len(first.get_xdata()) <= 2000
+    np.testing.assert_allclose(first.get_ydata()[0], 1e3 * before[0, 0])
+
+
+def test_anchors_have_the_ellipses_of_their_covariances():
+    """The border of an ellipse is where the Mahalanobis distance of its plane is the quantile, whatever its turn."""
+    file, moved = RNG.normal(size=(6, 3)), RNG.normal(size=(6, 3)) * 0.02
+    roots = RNG.normal(size=(6, 3, 3)) * 0.002
+    covariances = roots @ roots.swapaxes(1, 2)
+    panels = anchors(file, file + moved, covariances, file).axes
+    assert [ax.get_title() for ax in panels] == [f"anchor {i}" for i in range(1, 7)]
+    for ax, shift, covariance in zip(panels, moved, covariances, strict=True):
+        ellipses = [patch for patch in ax.patches if isinstance(patch, Ellipse)]
+        for ellipse, plane in zip(ellipses, ([0, 1], [0, 2]), strict=True):
+            border = ellipse.get_patch_transform().transform(ellipse.get_path().vertices)
+            off = border / 1e3 - shift[plane]
+            distance = np.sqrt(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance[np.ix_(plane, plane)]), off))
+            on = np.arange(len(off)) % 3 == 0  # the others steer the curve
+            np.testing.assert_allclose(distance[on], WITHIN_95, rtol=2e-3)
+
+
+def test_what_is_not_determined_is_drawn_apart():
+    sigmas = {"anchor x": np.array([1e-3, np.inf, 2e-3]), "offset": np.array([5e-4, 5e-4, np.nan])}
+    (ax,) = observability(sigmas).axes
+    full = np.concatenate(
+        [line.get_ydata() for line in ax.lines if line.get_fillstyle() == "full" and line.get_label()[0] != "_"]
+    )
+    np.testing.assert_allclose(np.sort(full), [0.5, 0.5, 1, 2])
+    (opened,) = [line for line in ax.lines if line.get_fillstyle() == "none" and len(line.get_xdata())]
+    assert opened.get_ydata()[0] > 4
+    assert opened.get_xdata()[0] == pytest.approx(2, abs=0.4)
+    (ax,) = observability({"offset": np.full(3, np.inf)}).axes
+    assert any(len(line.get_xdata()) == 3 for line in ax.lines)

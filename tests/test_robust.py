@@ -1,0 +1,227 @@
+"""Margins for the robots of an uncertainty: derivatives, spread, factors, plans, and robots drawn to check these."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from towline import Dynamics, Planner, Robot, load, plan, time_along
+from towline.errors import InputError
+from towline.models import Uncertainty
+from towline.models.sensitivity import derivatives, wrench_matrices
+from towline.robust import ellipsoid_factor, motion_factor, share_of_robots, spread
+
+from .warm import towline
+
+RNG = np.random.default_rng(5)
+
+
+def known(name, sigma, **limits):
+    """Return a robot whose anchors and attachments are known to `sigma` [m], each coordinate on its own."""
+    data = load(name).model_dump(mode="json")
+    for cable in data["cables"]:
+        cable.update(limits)
+    names = [
+        f"cables[{i}].{part}.{a}"
+        for i in range(len(data["cables"]))
+        for part in ("anchor", "attachment")
+        for a in "xyz"
+    ]
+    block = {"parameters": names, "covariance": np.diag([sigma**2] * len(names)).tolist()}
+    return Robot.model_validate(data | {"uncertainty": block})
+
+
+def places(robot, n=4):
+    pose = robot.home + RNG.normal(size=(n, 6)) * 0.1
+    return pose, robot.carrier_home + RNG.normal(size=(n, len(robot.carriers), 6)) * 0.1
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "wang-flying", "planar-4"])
+def test_derivatives_are_those_of_the_dynamics(name):
+    """Against differences of the CasADi model, with tilted platforms, carriers and, where it has some, pulleys."""
+    robot = load(name)
+    pose, carriers = places(robot)
+    np.testing.assert_allclose(
+        wrench_matrices(robot, pose, carriers), Dynamics(robot).wrench_matrix(pose, carriers), atol=1e-12
+    )
+    names = [f"cables[1].{part}.{axis}" for part in ("anchor", "attachment") for axis in "xyz"]
+    names += ["cables[1].pulley.radius"] * (robot.cables[1].pulley is not None)
+    found, cables = derivatives(robot, pose, carriers, names)
+    assert (cables == 1).all()
+    for column, name_ in enumerate(names):
+        (value,) = robot.parameter_values([name_])
+        ends = [
+            Dynamics(robot.with_parameters({name_: value + h})).wrench_matrix(pose, carriers) for h in (1e-5, -1e-5)
+        ]
+        difference = (ends[0] - ends[1]) / 2e-5
+        np.testing.assert_allclose(found[:, :, column], difference[:, :, 1], atol=1e-8)
+        assert not np.delete(difference, 1, axis=2).any()
+
+
+def test_spread_is_that_of_drawn_robots():
+    """The standard deviation of the tensions of least change with which 4000 drawn robots hold the platform, to 4 %."""
+    robot = known("cogiro", 1e-3)
+    pose = robot.home[None] + [0.5, 0.3, 0.2, 0.05, 0, 0.1]
+    tensions = np.full((1, 8), 400.0) + 30 * np.arange(8)
+    at_home = robot.carrier_home[None]
+    w = wrench_matrices(robot, pose, at_home)[0] @ tensions[0]
+    changed = []
+    for one in robot.drawn(4000, seed=2):
+        A = wrench_matrices(one, pose, at_home)[0]
+        changed.append(np.linalg.lstsq(A, w - A @ tensions[0], rcond=None)[0])
+    np.testing.assert_allclose(np.std(changed, axis=0), spread(robot, pose, tensions)[0], rtol=0.04)
+
+
+def test_an_anchor_that_errs_along_its_cable_changes_nothing():
+    robot = load("nist-robocrane")
+    pose = robot.home[None]
+    along = Dynamics(robot).wrench_matrix(robot.home)[:3, 0]
+    names = [f"cables[0].anchor.{axis}" for axis in "xyz"]
+    block = Uncertainty(parameters=names, covariance=(1e-4 * np.outer(along, along)).tolist())
+    sigmas = spread(robot.model_copy(update={"uncertainty": block}), pose, np.full((1, 6), 100.0))
+    assert sigmas.max() < 1e-9
+    across = np.cross(along, [1.0, 0, 0])
+    block = Uncertainty(parameters=names, covariance=(1e-4 * np.outer(across, across)).tolist())
+    assert spread(robot.model_copy(update={"uncertainty": block}), pose, np.full((1, 6), 100.0)).max() > 0.01
+
+
+def test_factors_of_known_cases():
+    """One cable at rest: a normal variable; two alike: the same; a turn in the plane: the length of a vector of two."""
+    still = np.tile([[[2.0, 0, 0]]], (50, 1, 1))
+    assert motion_factor(still, 0.95) == pytest.approx(1.959964, abs=1e-6)
+    both = np.tile(np.diag([3.0, 1.0])[None], (50, 1, 1))  # two cables, on their own
+    assert motion_factor(both, 0.95) == pytest.approx(2.241403, abs=1e-6)  # of 97.5 %, both sides
+    angles = np.linspace(0, np.pi, 200)
+    turn = np.stack([np.cos(angles), np.sin(angles)], axis=1)[:, None]
+    assert motion_factor(turn, 0.95) == pytest.approx(np.sqrt(-2 * np.log(0.05)), abs=1e-9)
+    assert motion_factor(np.zeros((50, 2, 3)), 0.95) == 0.0
+    names = [f"cables[0].anchor.{axis}" for axis in "xy"]
+    plane = Uncertainty(parameters=names, covariance=[[1, 0.5], [0.5, 1]])
+    assert ellipsoid_factor(plane, 0.95) == pytest.approx(np.sqrt(-2 * np.log(0.05)), abs=1e-9)
+
+
+def test_the_factor_of_a_motion_holds_for_its_share():
+    """Along smooth random curves of eight cables in 48 directions: never less than the share, and not much more."""
+    times = np.linspace(0, 1, 400)[:, None, None]
+    changes = sum(
+        RNG.normal(size=(8, 48)) * np.cos(2 * np.pi * k * times + RNG.uniform(0, 6, (8, 48))) / 2**k for k in range(3)
+    )
+    units = (changes / np.linalg.norm(changes, axis=2, keepdims=True)).reshape(-1, 48)
+    largest = np.concatenate([np.abs(units @ RNG.normal(size=(48, 1000))).max(axis=0) for _ in range(4)])
+    for share in (0.8, 0.95):
+        kept = (largest <= motion_factor(changes, share)).mean()
+        assert share - 3 * np.sqrt(share * (1 - share) / largest.size) < kept < share + 0.6 * (1 - share)
+
+
+NEAR_LIMIT = {
+    "name": "high",
+    "path": {"kind": "line", "start": [-1, 0.5, 2.65, 0, 0, 0], "end": [1, 0.5, 2.65, 0, 0, 0]},
+    "duration": 3,
+    "steps": 12,
+    "tube": {"position": 0.5, "ends": "free"},
+}
+
+
+@cache
+def high(sigma):
+    """Plan cogiro as high as its cables can hold it with 500 N, for one robot and for 95 % of the robots."""
+    robot = known("cogiro", sigma, t_max=500.0)
+    return plan(robot, NEAR_LIMIT), plan(robot, NEAR_LIMIT, robust=0.95)
+
+
+@pytest.mark.parametrize("sigma", [0.005, 0.02])
+def test_a_plan_near_a_limit_holds_for_the_share_and_only_with_robust(sigma):
+    exact, robust = high(sigma)
+    assert exact.feasible
+    assert exact.robust is None
+    assert exact.share_of_robots(seed=7).share < 0.7
+    assert robust.feasible, robust.reason
+    assert robust.share_of_robots(count=400, seed=7).share >= 0.95
+    margin = robust.robust
+    assert margin.holds
+    low = robust.scenario.robot.t_min + margin.reach
+    assert (robust.audit.tensions >= low).all()
+    assert (robust.audit.tensions <= robust.scenario.robot.t_max - margin.reach).all()
+    assert robust.tension_max < exact.tension_max
+    assert robust.scenario.robot == exact.scenario.robot
+
+
+def test_larger_errors_take_larger_margins():
+    """To first order the reach is proportional to the errors, for about the same tensions."""
+    small, large = (high(sigma)[1].robust for sigma in (0.005, 0.02))
+    assert large.reach.max() / small.reach.max() == pytest.approx(4, rel=0.1)
+    assert small.factor == pytest.approx(large.factor, rel=0.1)
+    assert 2.5 < small.factor < ellipsoid_factor(high(0.005)[0].scenario.robot.uncertainty, 0.95) / 2
+
+
+HOVER = {
+    "name": "aside",
+    "path": {"kind": "line", "start": [0, 0, -1, 0, 0, 0], "end": [0.13, 0.13, -0.87, 0, 0, 0]},
+    "duration": 6,
+}
+
+
+def test_no_plan_is_an_answer(tmp_path):
+    """Six cables have one solution: where the robots' tensions leave the limits, only another motion would do."""
+    robot = known("wang-flying", 0.01)
+    assert plan(robot, HOVER).feasible
+    found = plan(robot, HOVER | {"robust": 0.95})
+    assert found.status.value == "not-found"
+    assert "no motion was found with limits tightened by up to" in found.reason
+    (excess,) = found.audit.excess
+    assert excess.limit == "tension"
+    assert excess.value - excess.bound == pytest.approx(-found.robust.violation.max())
+    assert found.share_of_robots(seed=7).share < 0.9
+    report = found.report()
+    assert "95 % of the robots  not all tensions inside" in " ".join(report.split("\n"))
+    assert found.to_dict()["robust"]["worst_violation"] > 0.1
+    saved = found.save(tmp_path / "plan.nc")
+    assert saved.exists()
+    turned = plan(
+        robot.model_copy(update={"uncertainty": known("wang-flying", 0.003).uncertainty}),
+        HOVER | {"robust": 0.95, "tube": {"attitude": 0.3}, "steps": 50},
+    )
+    assert turned.feasible
+    assert turned.share_of_robots(seed=7).share >= 0.95
+
+
+def test_the_command_plans_for_robots(tmp_path):
+    known("cogiro", 0.01).save(tmp_path / "mine.yaml")
+    task = {"path": {"kind": "rest", "pose": [0, 0, 2, 0, 0, 0]}, "duration": 0.5}
+    (tmp_path / "rest.yaml").write_text(json.dumps(task))
+    done = towline("plan", "mine.yaml", "rest.yaml", "--robust", "0.9", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
+    assert printed["feasible"]
+    assert printed["robust"]["share"] == 0.9
+    assert len(printed["robust"]["reach"]) == 8
+    done = towline("plan", "cogiro", "rest.yaml", "--robust", "0.9", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "robust must be left out for a robot without an uncertainty in its file" in done.stderr
+
+
+def test_what_robust_does_not_go_with():
+    rest = {"path": {"kind": "rest", "pose": [0, 0, -1, 0, 0, 0]}, "duration": 0.5, "robust": 0.95}
+    robot = known("wang-flying", 0.01)
+    box = {"min": [-1, 0, 0], "max": [1, 0, 0]}
+    for name, task, message in (
+        ("wang-flying", rest | {"wind": box}, "wind must be one wind"),
+        ("point-mass-3", rest | {"robust": 1.0}, r"robust must be less than 1, got 1\.0"),
+        ("wang-ctmrts", rest, "robust must be left out for a robot with fewer cables than degrees of freedom"),
+    ):
+        with pytest.raises(InputError, match=message):
+            plan(known(name, 0.01), task)
+    for share in (1.5, 0, float("nan"), "0.95", True):
+        with pytest.raises(InputError, match="robust must be a number from 1e-09 to 1"):
+            plan(robot, HOVER, robust=share)
+    with pytest.raises(InputError, match="robust must be left out to time a path"):
+        time_along(robot, HOVER | {"robust": 0.95})
+    planner = Planner(known("wang-flying", 1e-5), rest)
+    assert planner.plan().feasible
+    with pytest.raises(InputError, match="robust must be left out to plan again on the way"):
+        planner.replan({}, 0.1)
+    with pytest.raises(InputError, match="robust must be left out if the robot's file has no uncertainty"):
+        spread(load("cogiro"), np.zeros((1, 6)), np.ones((1, 8)))
+    with pytest.raises(InputError, match=r"wrench must be an array of shape \(1, 6\) of finite numbers"):
+        share_of_robots(robot, robot.home[None], np.zeros(6))

@@ -1,0 +1,97 @@
+"""Tensions for the robots of an uncertainty: limits tightened, place by place, by what these robots' tensions differ.
+
+The differences depend on the tensions. So the tensions of the robot of the file come first, then those inside limits
+that are tightened by their differences, and so on. A place is accepted if the tensions of one of these rounds stay
+inside the limits with their own differences: then a solution is known, however it came about. For a robot with more
+cables than needed the rounds may miss a solution, which makes the result smaller, never too large.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..models import Robot
+from ..robust import Spread, check_share, ellipsoid_factor, uncertainty_of
+from ..solvers import solve_batch
+from .places import Places
+
+__all__ = ["Tightened"]
+
+ROUNDS = 4
+GROWTH = 1.02  # of the differences: those of the next tensions may be larger
+PLACES_AT_ONCE = 1024  # a place takes some 3000 numbers for a robot of which 48 are uncertain
+ROUNDING = 1e-12  # of the largest limit
+
+
+class Tightened:
+    """Decide where a share of the robots has tensions inside their limits, all these robots at all places.
+
+    Parameters
+    ----------
+    robot
+        With an uncertainty.
+    share
+        Of the robots, above 0 and below 1.
+    rows
+        Wrench rows that the cables give.
+
+    Raises
+    ------
+    InputError
+        If the robot has no uncertainty, or the share is none.
+    """
+
+    def __init__(self, robot: Robot, share: float, rows: np.ndarray):
+        check_share(robot, share)
+        self._robot, self._rows = robot, rows
+        self._factor = ellipsoid_factor(uncertainty_of(robot), share)
+
+    def feasible(self, places: Places, A: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
+        """Return where the robots have tensions for every one of some wrenches, (n,) of bool.
+
+        Parameters
+        ----------
+        places
+            The n places.
+        A
+            Their scaled wrench matrices, (n, rows, m) [N per N].
+        wrenches
+            (k, rows) for all places or (k, n, rows), scaled [N].
+        """
+        held = np.zeros(len(places), dtype=bool)
+        wrenches = np.broadcast_to(wrenches if wrenches.ndim == 3 else wrenches[:, None], (len(wrenches), *A.shape[:2]))
+        for start in range(0, len(places), PLACES_AT_ONCE):
+            part = np.arange(start, min(start + PLACES_AT_ONCE, len(places)))
+            for w in wrenches:
+                exact = solve_batch(A[part], w[part], self._robot.t_min, self._robot.t_max, threads=1)
+                part = part[exact.feasible]
+            if not part.size:
+                continue
+            some = places.only(part)
+            spread = Spread(self._robot, some.pose, some.carriers, self._rows)
+            left = np.arange(part.size)
+            for w in wrenches:
+                left = left[self._holds(spread.only(left), A[part[left]], w[part[left]])]
+            held[part[left]] = True
+        return held
+
+    def _holds(self, spread: Spread, A: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Return where tensions are found that stay inside the limits with what they differ by, (n,) of bool."""
+        low, high = self._robot.t_min, self._robot.t_max
+        rounding = ROUNDING * float(high.max())
+        held = np.zeros(len(A), dtype=bool)
+        tensions = solve_batch(A, w, low, high, threads=1).tensions
+        left = np.arange(len(A))
+        for _ in range(ROUNDS):
+            reach = self._factor * spread.only(left).sigmas(tensions)
+            outside = np.maximum(low + reach - tensions, tensions + reach - high).max(axis=1)
+            inside = outside <= rounding
+            held[left[inside]] = True
+            reach, tensions, left = GROWTH * reach[~inside], tensions[~inside], left[~inside]
+            wide = (low + reach <= high - reach).all(axis=1)
+            reach, tensions, left = reach[wide], tensions[wide], left[wide]
+            if not left.size:
+                break
+            solved = solve_batch(A[left], w[left], low + reach, high - reach, tensions, threads=1)
+            tensions, left = solved.tensions[solved.feasible], left[solved.feasible]
+        return held
