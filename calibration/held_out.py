@@ -7,7 +7,7 @@ estimated again where they were not measured; then the halves change places.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,12 +17,16 @@ from .measurements import Measurements
 from .model import Model, State
 from .parameters import Parameters
 
+if TYPE_CHECKING:
+    from .run import Solved
+
 __all__ = ["Compared", "HeldOut", "compare", "poses_fitted", "select"]
 
 BLOCKS = 10  # of the record
 SHORTEST = 4  # samples of a block; of fewer, every other sample is left out
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
+CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
 NESTED: tuple[tuple[str, ...], ...] = (
     ("offsets",),
     ("anchors",),
@@ -120,10 +124,18 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     first = [one for one in sets if set(one) <= CLEANED and _enough(robot, measurements, one)][-1]
     solved = solve(robot, measurements, first, {}, outliers)
     clock = float(solved.fit.state.x[solved.model.parameters.clock])
-    best = _compare(robot, *cleaned(solved), sets, {}, clock).best
-    if "clock" not in best:
-        return best
-    return _compare(robot, *cleaned(solved), [best[:-1], best], {}, clock).best
+    if "clock" in first and abs(clock) < CERTAIN * _clock_sigma(solved):
+        # Poses between samples have less noise than at them: a clock offset seems to help where there is none.
+        sets, clock = [one[:-1] for one in sets], 0.0
+    return _compare(robot, *cleaned(solved), sets, {}, clock).best
+
+
+def _clock_sigma(solved: Solved) -> float:
+    """Return the standard deviation of the clock offset [s]."""
+    from .result import Calibration
+
+    parameters = Calibration(solved, solved.model.parameters.groups, {}).parameters
+    return next(one.sigma for one in parameters if one.name == "clock")
 
 
 def _enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:

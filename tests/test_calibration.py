@@ -239,12 +239,10 @@ def test_the_schur_complement_finds_what_a_sparse_solver_finds():
             pattern[i * count + k, p + 6 * k : p + 6 * k + 6] = 1
     pattern[8 * count :, :p] = np.eye(p, dtype=int)
     start = time.perf_counter()
-    other = least_squares(
-        residuals, np.zeros(p + 6 * count), jac_sparsity=pattern, x_scale="jac", xtol=1e-14, ftol=1e-12
-    )
+    other = least_squares(residuals, np.zeros(p + 6 * count), jac_sparsity=pattern, x_scale="jac", ftol=1e-10)
     theirs = time.perf_counter() - start
-    assert 2 * other.cost == pytest.approx(result._solved.fit.cost, rel=1e-6)
-    np.testing.assert_allclose([one.correction for one in result.parameters], other.x[:p], atol=2e-5)
+    assert 2 * other.cost == pytest.approx(result._solved.fit.cost, rel=1e-5)
+    np.testing.assert_allclose([one.correction for one in result.parameters], other.x[:p], atol=5e-4)
     assert theirs > 5 * own
 
 
