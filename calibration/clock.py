@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .fit import held
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 
@@ -13,12 +14,15 @@ __all__ = ["CLOCK_RANGE", "begin_with_clock"]
 
 CLOCK_RANGE = 1.0  # [s] to each side
 SHARE = 0.25  # of the record, to which the range is limited
-MOST_SAMPLES = 1000
+MOST_SAMPLES = 400
 TRIED = 81
 
 
-def begin_with_clock(model: Model) -> State:
-    """Return the state to begin with: at each clock offset tried, the other parameters are fitted in one step."""
+def begin_with_clock(model: Model, length: float) -> State:
+    """Return the state to begin with: at each clock offset tried, the other parameters are fitted in one step.
+
+    The length is that of the cables [m].
+    """
     times = model.measurements.times
     assert times is not None
     few = _thinned(model)
@@ -27,16 +31,16 @@ def begin_with_clock(model: Model) -> State:
         few, parameters=replace(few.parameters, groups=tuple(g for g in few.parameters.groups if g != "clock"))
     )
     clocks = np.linspace(-most, most, TRIED)
-    costs = [_cost_at(without, clock) for clock in clocks]
+    costs = [_cost_at(without, clock, length) for clock in clocks]
     at = int(np.argmin(costs))
     finer = np.linspace(clocks[max(at - 1, 0)], clocks[min(at + 1, TRIED - 1)], 17)
-    best = finer[int(np.argmin([_cost_at(without, clock) for clock in finer]))]
+    best = finer[int(np.argmin([_cost_at(without, clock, length) for clock in finer]))]
     state = model.begin()
     state.x[model.parameters.clock] = best
     return state
 
 
-def _cost_at(model: Model, clock: float) -> float:
+def _cost_at(model: Model, clock: float, length: float) -> float:
     """Return the mean square of the readings' residuals after one step of the parameters."""
     state = model.begin()
     state.x[model.parameters.clock] = clock
@@ -46,10 +50,7 @@ def _cost_at(model: Model, clock: float) -> float:
     of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
     gained = 0.0
     if equations.b.size:
-        values, vectors = np.linalg.eigh(equations.S)
-        fixed = values > 1e-10 * values[-1]
-        right = vectors[:, fixed].T @ equations.b
-        gained = float(right @ (right / values[fixed]))
+        gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
     return (residuals.cost - of_poses - gained) / max(inside, 1)
 
 

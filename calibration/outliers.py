@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .fit import fit, unobservable_below
+from .fit import fit, held
 from .measurements import Measurements
 from .model import Derivatives, Model, State
 from .normal_equations import NormalEquations, metric
@@ -82,7 +82,7 @@ def _project(model: Model, state: State) -> _Projected:
     return _Projected(residuals.readings, redundancy, derivatives, scale, equations, root)
 
 
-def alike(model: Model, state: State, length: float, excess: float) -> float:
+def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
     """Return how many times larger variances of parameters are since neighbouring residuals are alike; at least 1.
 
     With g_b the sum of J'e over block b of the record, the parameters have the covariance S^-1 (sum g_b g_b') S^-1,
@@ -91,18 +91,15 @@ def alike(model: Model, state: State, length: float, excess: float) -> float:
     """
     found = _project(model, state)
     count = found.residuals.shape[1]
-    values, vectors = np.linalg.eigh(found.equations.S)
-    fixed = values > unobservable_below(values, length)
-    if count < BLOCKS * SHORTEST_BLOCK or not fixed.any():
+    if count < BLOCKS * SHORTEST_BLOCK or not rank:
         return 1.0
     edges = np.arange(BLOCKS) * count // BLOCKS
-    whitened = vectors[:, fixed] / np.sqrt(values[fixed])
-    total = np.zeros((BLOCKS, int(fixed.sum())))
+    total = np.zeros((BLOCKS, len(covariance)))
     for i, row in enumerate(found.residuals):
         scores = _without_poses(model, found, i) * row[:, None]
-        total += np.add.reduceat(scores, edges, axis=0) @ whitened
+        total += np.add.reduceat(scores, edges, axis=0)
     # The sums add up to 0 in a minimum, which takes one of them away.
-    ratio = float((total**2).sum()) / (fixed.sum() * (1 - 1 / BLOCKS) * excess**2)
+    ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
     return ratio if ratio > 1 + BY_CHANCE else 1.0
 
 
@@ -172,12 +169,11 @@ def find_slip(model: Model, state: State, length: float) -> Slip | None:
     spread = 1.4826 * float(np.median(np.abs(normalised[seen])))
     limit = _threshold(m * count) * max(1.0, spread)
     candidates: list[tuple[float, int, int, float, float]] = []
-    values, vectors = np.linalg.eigh(found.equations.S)
-    fixed = values > unobservable_below(values, length)
+    inverse = np.linalg.inv(held(found.equations.S, length))
     for i in range(m):
         rows = _without_poses(model, found, i)  # (N, p)
         after = np.cumsum(rows[::-1], axis=0)[::-1]
-        absorbed = (onto(after, vectors[:, fixed]) ** 2 / values[fixed]).sum(axis=1)
+        absorbed = (onto(after, inverse) * after).sum(axis=1)
         total = np.cumsum(found.redundancy[i, ::-1])[::-1]
         information = np.maximum(total - absorbed, 1e-9 * max(float(total[0]), 1e-9))
         sums = np.cumsum(found.residuals[i, ::-1])[::-1]

@@ -98,7 +98,7 @@ def solve(
     """Fit, leave wrong readings out and model slips, until there are no more; arguments are checked."""
     model = model_of(robot, measurements, groups, prior)
     length = length_of(robot)
-    state = begin_with_clock(model) if "clock" in groups else model.begin()
+    state = begin_with_clock(model, length) if "clock" in groups else model.begin()
     result = fit(model, state, length)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
@@ -144,7 +144,7 @@ def model_of(
         assert measurements.times is not None
         rows = np.all(known[:, robot.dof_mask > 0], axis=1)
         model = replace(model, track=PoseTrack(measurements.times, position, rotation, rows))
-    elif not np.isfinite(model.pose_sigmas).all():
+    elif np.isinf(model.pose_sigmas[:, :3]).any():
         model = replace(model, start=_starts(robot, measurements, groups) if start is None else start)
     return model
 
@@ -211,7 +211,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     if redundancy <= 0:
         return np.nan, 1.0, redundancy
     excess = float(np.sqrt(solved.fit.cost / redundancy))
-    return excess, alike(model, state, length_of(model.robot), excess), redundancy
+    return excess, alike(model, state, solved.observability.covariance, found, excess), redundancy
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
