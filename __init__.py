@@ -3,14 +3,16 @@
 `import towline` costs nothing: each name below loads its package when it is first used (PEP 562). Packages, from the
 ground up: `towline.models` (robots and their mechanics), `towline.solvers` (tension distribution on plain arrays),
 `towline.figures` (matplotlib), `towline.distribution` (one instant of a robot as a tension problem),
-`towline.workspace` (reachable poses), `towline.control` (one step of a controller), `towline.simulation` (flights),
-`towline.embedded` (a control step as C), `towline.ocp` (planning), `towline.studies` (the papers), `towline.cli`.
+`towline.workspace` (reachable poses), `towline.calibration` (the robot as built), `towline.control` (one step of a
+controller), `towline.simulation` (flights), `towline.embedded` (a control step as C), `towline.ocp` (planning),
+`towline.studies` (the papers), `towline.cli`.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .calibration import Calibration, Measurements, calibrate, read_measurements
     from .control import Controller
     from .distribution import tensions
     from .embedded import export_step
@@ -29,6 +31,7 @@ _HOMES = {
     "distribution": ("tensions",),
     "ocp": ("Plan", "Planner", "Sweep", "Task", "Timing", "plan", "read_task", "sweep", "time_along"),
     "workspace": ("sample",),
+    "calibration": ("Calibration", "Measurements", "calibrate", "read_measurements"),
     "control": ("Controller",),
     "simulation": ("Flight", "simulate"),
     "embedded": ("export_step",),
@@ -37,11 +40,13 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Calibration",
     "Certificate",
     "Controller",
     "Dynamics",
     "Flight",
     "InputError",
+    "Measurements",
     "Plan",
     "Planner",
     "Robot",
@@ -53,10 +58,12 @@ __all__ = [
     "Timing",
     "TowlineError",
     "available",
+    "calibrate",
     "export_step",
     "load",
     "methods",
     "plan",
+    "read_measurements",
     "read_task",
     "sample",
     "simulate",

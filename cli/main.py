@@ -31,6 +31,7 @@ COMMANDS = {
     "time": "Compute the fastest motion along a path.",
     "simulate": "Fly a plan: wind, slack cables, sensors, faults, a controller.",
     "workspace": "Sample the poses that a robot can reach.",
+    "calibrate": "Find a robot's anchors, offsets and more from measured cable lengths.",
     "view": "Show robots, plans, flights and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",
     "reproduce": "Compute a paper's results again, claim by claim.",

@@ -23,6 +23,7 @@ from .part import (
     COORDINATES,
     BodyInertia,
     Coordinate,
+    Finite,
     Name,
     NonNegative,
     Part,
@@ -136,6 +137,20 @@ class Winch(Part):
     force_max: Positive = Field(description="largest force of the motor on the cable [N]")
 
 
+class Encoder(Part):
+    """The reading of a winch: the length from anchor to attachment is offset + scale * reading."""
+
+    offset: Finite = Field(default=0.0, description="length of the cable where the reading is 0 [m]")
+    scale: Finite = Field(default=1.0, description="length for each unit of the reading [m], not 0")
+
+    @field_validator("scale")
+    @classmethod
+    def _changes_with_the_reading(cls, scale: float) -> float:
+        if scale == 0:
+            raise ValueError("must be a number other than 0")
+        return scale
+
+
 class Cable(Part):
     """One cable, from its anchor on a carrier to its attachment on the platform. It pulls and never pushes."""
 
@@ -150,6 +165,9 @@ class Cable(Part):
     pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
     winch: Winch | None = Field(
         default=None, description="what moves the cable, for simulation; default: its length follows commands exactly"
+    )
+    encoder: Encoder | None = Field(
+        default=None, description="what the winch reports, for calibration; default: the length itself [m]"
     )
 
     @model_validator(mode="after")

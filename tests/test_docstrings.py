@@ -11,7 +11,18 @@ import pytest
 
 from towline.solvers import methods
 
-ROOMS = ["models", "solvers", "workspace", "control", "simulation", "ocp", "figures", "studies", "viewer"]
+ROOMS = [
+    "models",
+    "solvers",
+    "workspace",
+    "calibration",
+    "control",
+    "simulation",
+    "ocp",
+    "figures",
+    "studies",
+    "viewer",
+]
 # Types that say all about a parameter, whatever its name.
 TELLING = ("Robot", "Places", "TensionProblem", "Dynamics", "Condition", "PathLike", "Progress")
 ARRAYS = re.compile(r"\b(ndarray|ArrayLike|Array|NDArray\[np.float64\])\b")

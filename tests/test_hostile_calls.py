@@ -20,6 +20,7 @@ from pydantic import BaseModel
 
 import towline
 from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along
+from towline.calibration import Calibration, Measurements, calibrate
 from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.inputs import printable
 from towline.models import RelativeDynamics
@@ -32,6 +33,7 @@ PACKAGES = (
     "towline.models",
     "towline.solvers",
     "towline.workspace",
+    "towline.calibration",
     "towline.ocp",
     "towline.control",
     "towline.simulation",
@@ -60,6 +62,13 @@ NOT_CALLED = {
     "Plan",
     "PoseEstimate",
     "Flight",
+    "Calibration",
+    "Compared",
+    "HeldOut",
+    "Outlier",
+    "Parameter",
+    "Sigma",
+    "Slip",
     "ANSWERS",
     "Command",  # what an author of a controller gets and writes
     "Reference",
@@ -171,6 +180,17 @@ def a_sweep() -> towline.Sweep:
 @cache
 def time_law() -> towline.Timing:
     return time_along(ROBOT, {"path": LINE}, grid=10)
+
+
+@cache
+def measurements() -> Measurements:
+    poses = robot().home + np.random.default_rng(0).uniform(-0.2, 0.2, (9, 6))
+    return Measurements(dynamics().cable_lengths(poses), poses, times=np.arange(9.0))
+
+
+@cache
+def a_calibration() -> Calibration:
+    return calibrate(ROBOT, measurements())
 
 
 # Valid values by parameter name. Of functions that mean something else by a name: by "function.name".
@@ -312,6 +332,21 @@ VALID: dict[str, Callable[[], Any]] = {
     "warm": lambda: False,
     "Robot.parameter_values.names": lambda: ["cables[0].anchor.x"],
     "Robot.with_parameters.values": lambda: {"cables[0].anchor.x": 0.5},
+    "measurements": measurements,
+    "readings": lambda: measurements().lengths,
+    "Measurements.lengths": lambda: measurements().lengths,
+    "poses": lambda: measurements().poses,
+    "orientations": lambda: None,
+    "Measurements.tensions": lambda: None,
+    "Measurements.times": lambda: np.arange(9.0),
+    "free": lambda: ("offsets",),
+    "prior": lambda: None,
+    "outliers": lambda: True,
+    "candidates": lambda: measurements().poses,
+    "measured": lambda: True,
+    "read_measurements.path": lambda: measurements().save("log.nc"),
+    "Measurements.save.path": lambda: "other.nc",
+    "Calibration.save.path": lambda: "other.yaml",
     "result": lambda: sample(robot(), StaticEquilibrium(), samples=20),
 }
 
@@ -319,6 +354,7 @@ VALID: dict[str, Callable[[], Any]] = {
 ALSO = {
     "data": ("condition",),
     "load.name": ("robot",),
+    "read_measurements.path": ("log",),
     "nonsense": ("options",),
 }
 
@@ -364,6 +400,8 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Horizon": lambda: Horizon(1, 6, 2),
     "BatchSolution": lambda: solve_batch(np.eye(6, 7)[None], np.ones((2, 6)), 0.0, 10.0),
     "Places": places,
+    "Measurements": measurements,
+    "Calibration": a_calibration,
     "Robot": robot,
     "Task": lambda: towline.read_task(TASK),
     "Region": Region,

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = [
     {"models", "solvers", "figures"},
     {"distribution", "robust"},
-    {"control", "workspace", "ocp", "embedded"},
+    {"calibration", "control", "workspace", "ocp", "embedded"},
     {"simulation"},
     {"studies"},
     {"benchmarks"},

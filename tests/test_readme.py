@@ -189,7 +189,7 @@ def test_errata_are_current(study):
 
 
 @pytest.mark.parametrize(
-    "package", ["models", "solvers", "workspace", "ocp", "control", "simulation", "viewer", "errors"]
+    "package", ["models", "solvers", "workspace", "calibration", "ocp", "control", "simulation", "viewer", "errors"]
 )
 def test_every_public_name_is_in_the_reference(package):
     page = PAGES[f"docs/api/{package}.md"]

@@ -1,0 +1,23 @@
+"""The robot as built: which parameters explain the measured lengths of its cables, and how certain they are."""
+
+from .design import next_poses
+from .held_out import Compared, HeldOut
+from .log import read_measurements
+from .measurements import Measurements, Sigma
+from .outliers import Outlier, Slip
+from .result import Calibration, Parameter
+from .run import calibrate
+
+__all__ = [
+    "Calibration",
+    "Compared",
+    "HeldOut",
+    "Measurements",
+    "Outlier",
+    "Parameter",
+    "Sigma",
+    "Slip",
+    "calibrate",
+    "next_poses",
+    "read_measurements",
+]

@@ -1,0 +1,77 @@
+"""`PoseTrack`: measured poses as a smooth motion, read at times that a clock offset shifts."""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+
+from .rotations import from_quaternions, quaternions_of
+
+__all__ = ["PoseTrack"]
+
+
+WIDEST = 5.0  # median times between measured poses; the motion inside a longer gap is not known
+
+
+class PoseTrack:
+    """Interpolate poses over time by cubic splines of position and quaternion.
+
+    Parameters
+    ----------
+    times
+        Rising, (N,) [s].
+    position, rotation
+        (N, 3) [m], (N, 3, 3).
+    known
+        Samples at which the pose was measured, (N,) of bool; at least four.
+    """
+
+    def __init__(self, times: np.ndarray, position: np.ndarray, rotation: np.ndarray, known: np.ndarray):
+        from scipy.interpolate import CubicSpline
+
+        self._times, self._measured = times, times[known]
+        measured = self._measured
+        self._widest = WIDEST * float(np.median(np.diff(measured)))
+        self._span = measured[0], measured[-1]
+        quaternions = quaternions_of(rotation[known])
+        # q and -q are the same rotation: neighbours get the same sign.
+        signs = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
+        quaternions[1:] *= np.cumprod(signs)[:, None]
+        self._curve = CubicSpline(measured, np.hstack([position[known], quaternions]))
+        self._last: tuple[float, tuple[np.ndarray, ...]] | None = None
+
+    def at_samples(self, rows: np.ndarray) -> PoseTrack:
+        """Return the same motion, read at the times of some samples (k,)."""
+        other = copy(self)
+        other._times, other._last = self._times[rows], None
+        return other
+
+    def inside(self, clock: float) -> np.ndarray:
+        """Return which samples lie between measured poses near enough, after the shift, (N,) of bool."""
+        shifted = self._times + clock
+        after = np.clip(np.searchsorted(self._measured, shifted), 1, len(self._measured) - 1)
+        near = self._measured[after] - self._measured[after - 1] <= self._widest
+        return (shifted >= self._span[0]) & (shifted <= self._span[1]) & near
+
+    def at(self, clock: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return position (N, 3) [m], rotation (N, 3, 3), velocity (N, 3) [m/s] and rate (N, 3) in {G} [rad/s].
+
+        Parameters
+        ----------
+        clock
+            By which the times of the poses are ahead of those of the lengths [s].
+        """
+        if self._last is None or self._last[0] != clock:
+            self._last = clock, self._at(np.clip(self._times + clock, *self._span))
+        position, rotation, velocity, rate = self._last[1]
+        return position, rotation, velocity, rate
+
+    def _at(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
+        values, slopes = self._curve(times), self._curve(times, 1)
+        q, dq = values[:, 3:], slopes[:, 3:]
+        length = np.linalg.norm(q, axis=1, keepdims=True)
+        q, dq = q / length, dq / length
+        v, w, dv, dw = q[:, :3], q[:, 3:], dq[:, :3], dq[:, 3:]
+        rate = 2 * (w * dv - dw * v + np.cross(v, dv))  # the vector part of 2 dq q*, for rates in {G}
+        return values[:, :3], from_quaternions(q), slopes[:, :3], rate

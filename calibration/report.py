@@ -1,0 +1,110 @@
+"""The result of a calibration as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..text import quantity
+
+if TYPE_CHECKING:
+    from .result import Calibration, Parameter
+
+__all__ = ["report"]
+
+MOST_LISTED = 12
+HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
+
+
+def report(result: Calibration) -> str:
+    """Return the result for people: how well lengths fit, the parameters, and what the measurements leave open."""
+    state = "" if result.converged else ", NOT CONVERGED"
+    lines = [
+        f"{result.robot.name}: {', '.join(result.free)} from {len(result.residuals)} samples{state}",
+        f"  residual of the lengths {_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)",
+        *_of_held_out(result),
+        *_of_noise(result),
+        *_of_parameters(result),
+        *_of_exceptions(result),
+        *_of_open(result),
+    ]
+    return "\n".join(lines)
+
+
+def _mm(length: float) -> str:
+    return quantity(1e3 * length, "mm", digits=3)
+
+
+def _of_held_out(result: Calibration) -> list[str]:
+    held_out = result.held_out
+    if not np.isfinite(held_out.after):
+        return ["  too few samples: half of them do not determine these parameters, so nothing confirms the result"]
+    lines = [f"  on samples left out {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
+    fitted = held_out.sets[-1].fitted
+    if set(held_out.best) < set(result.free):
+        lines.append(
+            f"  {', '.join(held_out.best)} alone predict samples left out as well: the other parameters do not help"
+        )
+    elif held_out.after > held_out.before:
+        lines.append("  samples left out fit worse than with the file's robot: do not use this result")
+    elif held_out.after > 1.5 * fitted:
+        lines.append(f"  fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
+    return lines
+
+
+def _of_noise(result: Calibration) -> list[str]:
+    stated = result.stated_sigma
+    lines = []
+    if np.isfinite(result.noise) and result.noise > 1.05 * stated:
+        lines.append(
+            f"  lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the sigmas below are larger "
+            f"by {quantity(result.noise / stated, digits=3)}"
+        )
+    if result.alike > 1:
+        lines.append(
+            "  residuals of neighbouring samples are alike, since the model is not complete: the sigmas below are "
+            f"larger by {quantity(result.alike**0.5, digits=2)}"
+        )
+    return lines
+
+
+def _of_parameters(result: Calibration) -> list[str]:
+    lines = ["  found, with standard deviations, and change from the file:"]
+    by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (1e3 if one.unit == "m" else 1))
+    shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
+    lines += [f"    {_one(one)}" for one in result.parameters if one.name in shown]
+    if len(result.parameters) > len(shown):
+        lines.append(f"    and {len(result.parameters) - len(shown)} with smaller changes")
+    return lines
+
+
+def _one(one: Parameter) -> str:
+    factor, unit = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm")}[one.unit]
+    sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
+    change = quantity(factor * one.correction, unit, digits=4)
+    return f"{one.name:26} {one.value:12.6f} {one.unit:2} +- {sigma:14} change {change}"
+
+
+def _of_exceptions(result: Calibration) -> list[str]:
+    lines = [
+        f"  winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(slip.size)} longer than its "
+        f"reading (+- {_mm(slip.sigma)})"
+        for slip in result.slips
+    ]
+    wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
+    lines += [
+        f"  left out: cable {one.cable + 1} at sample {one.sample}, off by {_mm(one.error)}"
+        for one in wrong[:MOST_LISTED]
+    ]
+    if len(wrong) > MOST_LISTED:
+        lines.append(f"  and {len(wrong) - MOST_LISTED} more readings left out")
+    return lines
+
+
+def _of_open(result: Calibration) -> list[str]:
+    texts = result.not_identifiable
+    if not texts:
+        return ["  the measurements determine all of these parameters"]
+    lines = [f"  the measurements leave {len(texts)} directions open, along which the file's values are kept:"]
+    return lines + [f"    {text}" for text in texts]

@@ -1,0 +1,121 @@
+"""`towline calibrate`: the robot as built, from a log of its cable lengths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from .options import JsonOption, RobotArgument, print_json, print_written
+
+if TYPE_CHECKING:
+    from ..calibration import Calibration
+
+SIGMA_KEYS = "lengths, position, rotation"
+
+
+def calibrate(
+    robot: RobotArgument,
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="Lengths, and poses, tensions and times where known: NetCDF, or CSV with a header such as "
+            "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
+        ),
+    ],
+    free: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="What to find, separated by commas: anchors, attachments, offsets, scales, radii, clock; or auto.",
+        ),
+    ] = "anchors,offsets",
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=SIGMA,...",
+            help="Standard deviations about the file's values [m], of scales [1], of the clock [s], as "
+            "'anchors=0.02,offsets=0.05'; default: what the log leaves open changes least.",
+        ),
+    ] = None,
+    sigma: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIGMA|NAME=SIGMA,...",
+            help="Standard deviation of the lengths [m], or of lengths [m], position [m] and rotation [rad], as "
+            "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
+        ),
+    ] = None,
+    outliers: Annotated[
+        bool, typer.Option("--outliers/--no-outliers", help="Look for wrong readings and slipped winches.")
+    ] = True,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.yaml", help="Default: ROBOT-calibrated.yaml here.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Find a robot's anchors, offsets and more from measured cable lengths, and write it as a robot file.
+
+    The file has the uncertainty of its new numbers. Carriers are at home. The exit code is 1 if the values did not
+    converge.
+    """
+    from ..calibration import calibrate as find
+    from ..calibration import read_measurements
+    from ..models import load
+    from ..writing import check_writable
+
+    groups = [name.strip() for name in free.split(",")]
+    stated = None if sigma is None else _sigma(sigma)
+    known = None if prior is None else _by_name("--prior", prior)
+    loaded = load(robot)
+    target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
+    if check_writable(target) == log.resolve():
+        raise InputError(f"--out must be another file than the log, got {target}")
+    measurements = read_measurements(log, stated)
+    result = find(loaded, measurements, "auto" if groups == ["auto"] else groups, known, outliers)
+    file = result.save(target)
+    _show(result, file, as_json)
+    if not result.converged:
+        raise typer.Exit(1)
+
+
+def _show(result: Calibration, file: Path, as_json: bool) -> None:
+    if as_json:
+        print_json({**result.to_dict(), "file": file})
+        return
+    typer.echo(result.report())
+    print_written([file])
+
+
+def _sigma(text: str) -> Any:
+    if "=" in text:
+        return _by_name("--sigma", text)
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--sigma must be a number [m], or NAME=NUMBER of {SIGMA_KEYS}, got {text!r}") from None
+
+
+def _by_name(option: str, text: str) -> dict[str, float]:
+    """Read "anchors=0.02,offsets=0.05" as a mapping.
+
+    Raises
+    ------
+    InputError
+        If the text is anything else.
+    """
+    result: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, value = part.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            equals = ""
+            number = 0.0
+        if not equals or name.strip() in result:
+            raise InputError(f"{option} must be NAME=NUMBER, separated by commas, each name once, got {text!r}")
+        result[name.strip()] = number
+    return result

@@ -1,0 +1,463 @@
+"""The robot as built: parameters from lengths and poses, their uncertainty, and what is left open."""
+
+import time
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.sparse import lil_matrix
+
+from towline.calibration import Measurements, calibrate, next_poses
+from towline.calibration.model import Model, State
+from towline.calibration.parameters import OF_CABLE, Parameters
+from towline.calibration.rotations import from_vectors
+from towline.errors import InputError
+from towline.models import Dynamics, Robot, load, points
+from towline.models.cables.pulley import exit_points
+from towline.models.rotation import rotation
+
+from .robots_as_built import NOISE, as_built, random_poses, rigidly_aligned
+
+ANCHORS = ("anchors",)
+BOTH = ("anchors", "attachments")
+ALL_THREE = ("anchors", "attachments", "offsets")
+
+
+def poses_of(robot, lengths, starts):
+    """Poses by another solver and the robot's own kinematics, pose by pose."""
+    dynamics = Dynamics(robot)
+    return np.array(
+        [
+            least_squares(lambda q, own=own: dynamics.cable_lengths(q) - own, start, x_scale=0.1).x
+            for own, start in zip(lengths, starts, strict=True)
+        ]
+    )
+
+
+def position_error(calibration, built, draw, aligned=False):
+    """Root mean square error of positions [m] that the calibrated robot computes from lengths never measured before."""
+    poses = random_poses(built.robot, 15, draw)
+    readings = Dynamics(built.robot).cable_lengths(poses) - built.offsets
+    found = poses_of(calibration.robot, calibration.lengths(readings), poses)[:, :3]
+    if aligned:
+        found = rigidly_aligned(found, poses[:, :3])
+    return np.sqrt(((found - poses[:, :3]) ** 2).sum(axis=1).mean())
+
+
+@pytest.mark.parametrize("name", ["cogiro", "caroca-pulleys", "planar-4", "point-mass-3"])
+def test_derivatives_are_those_of_casadi(name):
+    """By anchors, attachments and poses exactly; by radii, scales and slips against differences."""
+    robot, draw = load(name), np.random.default_rng(1)
+    pose = random_poses(robot, 1, draw, 0.2)
+    readings = Dynamics(robot).cable_lengths(pose) + draw.normal(0, 0.1, (1, robot.m))
+    groups = ("anchors", "attachments", "offsets", "scales", "radii")
+    model = Model(Parameters(robot, groups, ((1, 0),)), Measurements(readings), {}, np.ones((robot.m, 1)), pose)
+    state = model.begin()
+    _, derivatives = model.linearised(state)
+    A, B = ca.SX.sym("A", 3, robot.m), ca.SX.sym("B", 3, robot.m)
+    shift, turn = ca.SX.sym("shift", 3), ca.SX.sym("turn", 3)
+    placed = pose[0, :3] + shift + (ca.DM.eye(3) + ca.skew(turn)) @ rotation(ca.DM(pose[0, 3:])) @ B
+    lengths = exit_points(A, ca.DM(robot.pulley_axes.T), robot.pulley_radii, placed).lengths
+    of = [ca.vec(A), ca.vec(B), ca.vertcat(shift, turn)]
+    jacobian = ca.Function("j", of, [ca.jacobian(lengths, each) for each in of])
+    by_anchor, by_attachment, by_pose = (
+        NOISE * np.array(part) for part in jacobian(robot.anchors.ravel(), robot.attachments.ravel(), np.zeros(6))
+    )
+    for i in range(robot.m):
+        own = slice(3 * i, 3 * i + 3)
+        np.testing.assert_allclose(NOISE**2 * derivatives.cables[i, 0, :3], by_anchor[i, own], atol=1e-12)
+        np.testing.assert_allclose(NOISE**2 * derivatives.cables[i, 0, 3:6], by_attachment[i, own], atol=1e-12)
+        np.testing.assert_allclose(NOISE**2 * derivatives.poses[i, 0], by_pose[i], atol=1e-12)
+    for column in range(model.parameters.count):
+        if column == model.parameters.clock or (column % OF_CABLE == 8 and not robot.pulley_radii.any()):
+            continue
+        steps = [state._replace(x=state.x + sign * 1e-6 * np.eye(len(state.x))[column]) for sign in (1, -1)]
+        more, less = (model.residuals(step).readings[:, 0] for step in steps)
+        expected = np.zeros(robot.m)
+        if column > model.parameters.clock:
+            expected = derivatives.others[:, 0, column - model.parameters.clock]
+        else:
+            expected[column // OF_CABLE] = derivatives.cables[column // OF_CABLE, 0, column % OF_CABLE]
+        np.testing.assert_allclose((more - less) / 2e-6, expected, atol=2e-4)
+
+
+@pytest.mark.parametrize(("count", "accuracy"), [(60, 1e-3), (200, 0.5e-3)])
+def test_known_poses_calibrate_anchors_and_offsets(count, accuracy):
+    errors = []
+    for seed in range(5):
+        built = as_built(count, seed)
+        result = calibrate("cogiro", built.measurements())
+        assert result.converged
+        assert result.residual_after < 1.05e-3 < 0.02 < result.residual_before
+        errors.append(position_error(result, built, np.random.default_rng(seed)))
+    assert np.median(errors) < accuracy
+
+
+def test_unknown_poses_are_found_with_the_parameters():
+    errors, own = [], []
+    for seed in range(5):
+        built = as_built(200, seed)
+        result = calibrate("cogiro", built.measurements(known=False), prior={"anchors": 0.02, "offsets": 0.05})
+        errors.append(position_error(result, built, np.random.default_rng(seed), aligned=True))
+        found = rigidly_aligned(result.poses[:, :3], built.poses[:, :3])
+        own.append(np.sqrt(((found - built.poses[:, :3]) ** 2).sum(axis=1).mean()))
+    assert np.median(errors) < 3e-3
+    assert np.median(own) < 4e-3
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_standard_deviations_hold(known):
+    """The squares of the errors, by the covariance, are distributed as chi^2: their mean is 1, a few per cent apart."""
+    squares, count = 0.0, 0
+    prior = None if known else {"anchors": 0.02, "offsets": 0.05}
+    for seed in range(20):
+        built = as_built(40, seed)
+        result = calibrate("cogiro", built.measurements(known), prior=prior, outliers=False)
+        true = np.hstack([built.robot.anchors, built.offsets[:, None]]).ravel()
+        error = np.array([one.value for one in result.parameters]) - true
+        squares += error @ np.linalg.solve(result.covariance, error)
+        count += len(error)
+    assert squares / count == pytest.approx(1, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("free", "known", "gauges"),
+    [
+        (ANCHORS, True, 0),
+        (BOTH, True, 0),
+        (ALL_THREE, True, 0),
+        (ANCHORS, False, 6),
+        (BOTH, False, 12),
+        (ALL_THREE, False, 12),
+    ],
+)
+def test_gauges_are_counted_and_named(free, known, gauges):
+    built = as_built(80, 0, offsets=0.05 if "offsets" in free else 0.0)
+    result = calibrate("cogiro", built.measurements(known), free)
+    assert result.converged
+    assert len(result.not_identifiable) == gauges
+    expected = [f"all anchors together {how} {axis} of {{G}}" for how in ("along", "about") for axis in "xyz"]
+    if gauges == 12:
+        expected += [
+            f"all attachments together {how} {axis} of the platform" for how in ("along", "about") for axis in "xyz"
+        ]
+    assert list(result.not_identifiable) == expected[:gauges]
+    # What is left open changes as little as possible: no part of the correction lies along a gauge.
+    if gauges:
+        moved = result.robot.anchors - load("cogiro").anchors
+        assert np.abs(moved.mean(axis=0)).max() < 1e-6
+        arms = load("cogiro").anchors - load("cogiro").anchors.mean(axis=0)
+        assert np.abs(np.cross(arms, moved).sum(axis=0)).max() < 0.05 * np.abs(np.cross(arms, moved)).sum(axis=0).max()
+        assert not any(name.startswith("cables[0].anchor") for name in result.identifiable)
+    else:
+        assert len(result.identifiable) == len(result.parameters)
+
+
+def test_pulleys_break_gauges_and_scales_add_one():
+    """Swivel axes are fixed in {G}: of the turns only that about them is left. Without a scale nothing has a size."""
+    poses = random_poses(load("caroca-pulleys"), 80, np.random.default_rng(0), 0.25)
+    built = as_built(80, 0, "caroca-pulleys", noise=1e-5, offsets=0.0, poses=poses)
+    result = calibrate("caroca-pulleys", built.measurements(known=False, sigma=1e-5), ANCHORS)
+    assert [text for text in result.not_identifiable if "about" in text] == ["all anchors together about z of {G}"]
+    assert len(result.not_identifiable) == 4
+    result = calibrate("cogiro", as_built(80, 0).measurements(known=False), (*ALL_THREE, "scales"))
+    assert len(result.not_identifiable) == 13
+    assert result.not_identifiable[-1].startswith("the size of everything")
+
+
+def test_a_point_mass_does_not_tell_anchors_from_attachments():
+    robot = load("point-mass-3")
+    poses = random_poses(robot, 50, np.random.default_rng(0), 0.7)
+    built = as_built(50, 0, "point-mass-3", poses=poses)
+    result = calibrate(robot, Measurements(built.readings, poses[:, :3]), ("anchors", "attachments", "offsets"))
+    together = [
+        f"cables[{i}].anchor and cables[{i}].attachment together along {axis}" for i in range(3) for axis in "xyz"
+    ]
+    assert list(result.not_identifiable) == together
+    assert set(result.identifiable) == {f"cables[{i}].offset" for i in range(3)}
+
+
+def test_locked_cables_leave_scale_and_offset_open():
+    """A platform that swings on cables of constant length: their readings never change."""
+    robot = Robot.model_validate(
+        {
+            "name": "swing",
+            "source": "a test",
+            "platform": {"mass": 2, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], "home": [0, 0, 0, 0, 0, 0]},
+            "carriers": [{"name": "frame", "kind": "ground"}],
+            "cables": [
+                {"carrier": "frame", "anchor": [2 * x, 2 * y, 7], "attachment": [x, y, 0.1], "t_min": 0, "t_max": 99}
+                for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+            ],
+        }
+    )
+    t = np.linspace(0, 20, 1000)
+    poses = np.zeros((1000, 6))
+    poses[:, 0], poses[:, 1] = 0.8 * np.sin(1.2 * t), 0.6 * np.sin(1.1 * t + 1)
+    poses[:, 3:] = 0.2 * np.sin(np.outer(t, [1.3, 0.9, 0.7]))
+    # No other pose has these lengths: each cable's is made constant by its own reading.
+    readings = Dynamics(robot).cable_lengths(poses) * 0 + 6.5
+    truth = Dynamics(robot).cable_lengths(poses)
+    result = calibrate(robot, Measurements(readings, poses, sigma=0.2), ("offsets", "scales"))
+    assert [text.split(" with ") for text in result.not_identifiable]
+    assert all(
+        {f"cables[{i}].offset", f"cables[{i}].scale"} == set(text.split(" with "))
+        for i, text in enumerate(sorted(result.not_identifiable))
+    )
+    np.testing.assert_allclose(result.lengths(readings[0]), truth.mean(axis=0), atol=1e-6)
+
+
+def test_the_schur_complement_finds_what_a_sparse_solver_finds():
+    """Same minimum as scipy's sparse trust region, with all poses among its unknowns, in a small part of its time."""
+    robot, count = load("cogiro"), 20
+    built = as_built(count, 0)
+    prior = {"anchors": 0.02, "offsets": 0.05}
+    measurements = built.measurements(known=False)
+    start = time.perf_counter()
+    result = calibrate(robot, measurements, prior=prior, outliers=False)
+    own = time.perf_counter() - start
+    model = replace(result._solved.model, start=built.poses + 0.01)
+    varies = model.parameters.varies
+    p = int(varies.sum())
+
+    def state(z):
+        x = model.parameters.first.copy()
+        x[varies] += z[:p]
+        q = z[p:].reshape(count, 6)
+        return State(x, q[:, :3], from_vectors(q[:, 3:]))
+
+    def residuals(z):
+        own = model.residuals(state(z))
+        return np.concatenate([own.readings.ravel(), own.parameters[varies]])
+
+    pattern = lil_matrix((8 * count + p, p + 6 * count), dtype=int)
+    for i in range(8):
+        for k in range(count):
+            pattern[i * count + k, 4 * i : 4 * i + 4] = 1
+            pattern[i * count + k, p + 6 * k : p + 6 * k + 6] = 1
+    pattern[8 * count :, :p] = np.eye(p, dtype=int)
+    start = time.perf_counter()
+    other = least_squares(residuals, np.zeros(p + 6 * count), jac_sparsity=pattern, x_scale="jac", ftol=1e-10)
+    theirs = time.perf_counter() - start
+    assert 2 * other.cost == pytest.approx(result._solved.fit.cost, rel=1e-5)
+    np.testing.assert_allclose([one.correction for one in result.parameters], other.x[:p], atol=5e-4)
+    assert theirs > 5 * own
+
+
+def test_200_poses_with_all_parameters_take_less_than_a_fifth_of_a_second():
+    robot, built = load("cogiro"), as_built(200, 0)
+    for known in (True, False):
+        times = []
+        while len(times) < 20 and min(times, default=1) > 0.2:  # other tests may use the same processors
+            start = time.perf_counter()
+            result = calibrate(robot, built.measurements(known), (*ALL_THREE, "scales"))
+            times.append(time.perf_counter() - start)
+            assert result.converged
+        assert min(times) < 0.2
+
+
+def test_measured_poses_have_errors_of_their_own():
+    """Stated as such, they do not become errors of the parameters, whose standard deviations know of them."""
+    built, draw = as_built(100, 0), np.random.default_rng(5)
+    noisy = built.poses + draw.normal(0, [[5e-3] * 3 + [5e-3] * 3], built.poses.shape)
+    stated = Measurements(built.readings, noisy, sigma={"lengths": 1e-3, "position": 5e-3, "rotation": 5e-3})
+    result = calibrate("cogiro", stated)
+    assert result.noise == pytest.approx(1e-3, rel=0.1)
+    assert np.abs(result.poses - built.poses).std() < 0.8 * np.abs(noisy - built.poses).std()
+    true = np.hstack([built.robot.anchors, built.offsets[:, None]]).ravel()
+    error = np.array([one.value for one in result.parameters]) - true
+    assert error @ np.linalg.solve(result.covariance, error) / len(error) == pytest.approx(1, abs=0.5)
+    unstated = calibrate("cogiro", Measurements(built.readings, noisy), outliers=False)
+    assert unstated.noise > 4e-3  # and the sigmas grow accordingly
+    assert "not by the 1 mm stated" in unstated.report()
+
+
+def test_some_poses_may_be_unknown():
+    built = as_built(60, 2)
+    poses = built.poses.copy()
+    poses[10:] = np.nan
+    result = calibrate("cogiro", Measurements(built.readings, poses))
+    few = calibrate("cogiro", Measurements(built.readings[:10], poses[:10]))
+    assert not result.not_identifiable
+    np.testing.assert_allclose(result.poses[10:, :3], built.poses[10:, :3], atol=0.02)
+    assert sum(one.sigma**2 for one in result.parameters) < 0.5 * sum(one.sigma**2 for one in few.parameters)
+
+
+def test_a_clock_offset_is_found():
+    robot, draw = load("cogiro"), np.random.default_rng(0)
+    times = np.arange(0, 20, 0.02) + draw.uniform(-0.003, 0.003, 1000)
+
+    def motion(t):
+        return robot.home + np.array([1, 0.8, 0.3, 0.1, 0.1, 0.15]) * np.sin(
+            np.outer(t, [2.1, 1.7, 2.7, 1.9, 2.4, 1.3])
+        )
+
+    built = as_built(1000, 3, poses=motion(times + 0.034))
+    seen = motion(times) + draw.normal(0, 5e-4, (1000, 6))
+    log = Measurements(built.readings, seen, times=times, sigma={"lengths": 1e-3, "position": 5e-4, "rotation": 5e-4})
+    result = calibrate(robot, log, ("anchors", "offsets", "clock"))
+    assert result.clock == pytest.approx(0.034, abs=1e-3)
+    assert result.residual_after < 1.5e-3
+    late = calibrate(robot, log, outliers=False)
+    assert late.residual_after > 5e-3  # without it no fit is good
+    assert calibrate(robot, log, "auto").clock == pytest.approx(0.034, abs=1e-3)
+
+
+def test_neighbours_that_are_alike_make_parameters_less_certain():
+    """An error of the model over time: the same residuals tell less than independent ones of their size."""
+    built = as_built(2000, 1, noise=1e-4)
+    drift = 5e-3 * np.sin(np.arange(2000)[:, None] * np.linspace(0.01, 0.02, 8) + np.arange(8))
+    smooth = calibrate("cogiro", Measurements(built.readings + drift, built.poses))
+    mixed = np.random.default_rng(0).permutation(2000)
+    independent = calibrate("cogiro", Measurements(built.readings + drift[mixed], built.poses))
+    assert smooth.noise == pytest.approx(independent.noise, rel=0.02)
+    assert smooth.noise > 3e-3
+    assert independent.alike == 1
+    assert not smooth.slips
+    assert not independent.slips
+
+
+def test_left_out_samples_decide_whether_parameters_help():
+    """With unknown poses and few samples many parameters fit better and predict worse."""
+    built = as_built(72, 0, offsets=0.0)
+    few = calibrate("cogiro", built.measurements(known=False), (*ALL_THREE, "scales"), outliers=False)
+    left = {one.free: one for one in few.held_out.sets}
+    most = left["anchors", "attachments", "offsets", "scales"]
+    assert most.fitted < left[ANCHORS].fitted
+    assert most.left_out > 1.5 * left[ANCHORS].left_out
+    assert set(few.held_out.best) < set(few.free)
+    assert "do not help" in few.report()
+    known = calibrate("cogiro", as_built(60, 0).measurements(), outliers=False).held_out
+    assert known.after < 1.5e-3 < 0.02 < known.before
+    assert known.best == ("anchors", "offsets")
+
+
+def test_auto_takes_what_helps():
+    assert calibrate("cogiro", as_built(100, 0).measurements(), "auto").free == ("anchors", "offsets")
+    assert calibrate("cogiro", as_built(100, 0, anchors=0.0).measurements(), "auto").free == ("offsets",)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_wrong_readings_and_slips_are_found(known):
+    built = as_built(200, 0)
+    readings = built.readings.copy()
+    readings[17, 3] += 0.4
+    readings[44, 0] -= 0.05
+    readings[120:, 5] -= 0.02
+    wrong = Measurements(readings, built.poses if known else None)
+    result = calibrate("cogiro", wrong)
+    assert {(one.cable, one.sample) for one in result.outliers} == {(3, 17), (0, 44)}
+    errors = {one.cable: one.error for one in result.outliers}
+    assert errors[3] == pytest.approx(0.4, abs=0.06)
+    assert errors[0] == pytest.approx(-0.05, abs=0.02)
+    (slip,) = result.slips
+    assert (slip.cable, slip.sample) == (5, 120)
+    assert slip.size == pytest.approx(0.02, abs=4 * slip.sigma)
+    assert slip.sigma < 1e-3
+    clean = calibrate("cogiro", built.measurements(known))
+    assert not clean.outliers
+    assert not clean.slips
+    assert result.residual_after == pytest.approx(clean.residual_after, rel=0.05)
+    kept = calibrate("cogiro", wrong, outliers=False)
+    assert kept.residual_after > 3 * result.residual_after
+    report = result.report()
+    assert "winch 6 slipped: from sample 120" in report
+    assert "cable 4 at sample 17" in report
+
+
+def test_chosen_poses_tell_more_than_random_ones():
+    robot = load("cogiro")
+    draw = np.random.default_rng(0)
+    candidates = random_poses(robot, 300, draw)
+
+    def spread(poses):
+        lengths = Dynamics(robot).cable_lengths(poses)
+        return np.linalg.slogdet(calibrate(robot, Measurements(lengths, poses)).covariance)[1]
+
+    chosen = next_poses(robot, candidates, count=15)
+    assert all((pose == candidates).all(axis=1).any() for pose in chosen)
+    random = [spread(candidates[draw.choice(300, 15, replace=False)]) for _ in range(5)]
+    assert spread(chosen) < min(random) - 5
+    first = candidates[:12]
+    so_far = calibrate(robot, Measurements(Dynamics(robot).cable_lengths(first), first))
+    more = next_poses(so_far, candidates, count=5)
+    assert spread(np.vstack([first, more])) < min(
+        spread(np.vstack([first, candidates[draw.choice(300, 5)]])) for _ in range(5)
+    )
+    default = next_poses(robot, count=3)  # poses at which the robot can rest
+    assert default.shape == (3, 6)
+
+
+def test_tensions_lengthen_cables_with_a_stiffness():
+    """Readings are of the cable without strain: with t / (E A) of 1 per mille it is 8 mm shorter than the distance."""
+    data = load("cogiro").model_dump(mode="json")
+    for cable in data["cables"]:
+        cable["stiffness"] = 1e6
+    robot = Robot.model_validate(data)
+    draw = np.random.default_rng(0)
+    poses = random_poses(robot, 40, draw)
+    tensions = draw.uniform(200, 2000, (40, 8))
+    readings = Dynamics(robot).cable_lengths(poses) / (1 + tensions / 1e6)
+    result = calibrate(robot, Measurements(readings, poses, tensions=tensions))
+    assert result.residual_after < 1e-9
+    assert max(abs(one.correction) for one in result.parameters) < 1e-9
+    assert calibrate(robot, Measurements(readings, poses)).residual_after > 1e-3
+
+
+def test_a_calibrated_robot_is_a_robot_file(tmp_path):
+    built = as_built(60, 0)
+    result = calibrate("cogiro", built.measurements())
+    robot = load(result.save(tmp_path / "as-built.yaml"))
+    assert robot == result.robot
+    np.testing.assert_allclose(robot.anchors, built.robot.anchors, atol=0.03)
+    assert [cable.encoder.offset for cable in robot.cables] == pytest.approx(built.offsets, abs=0.03)
+    known = {one.name: one.sigma for one in result.parameters if "anchor" in one.name}
+    assert robot.uncertainty.parameters == tuple(known)
+    np.testing.assert_allclose(robot.uncertainty.sigmas, list(known.values()), rtol=1e-6)
+    # Its own encoders explain the readings: nothing is left to correct.
+    again = calibrate(robot, built.measurements())
+    assert again.residual_before == pytest.approx(result.residual_after, rel=1e-6)
+    assert max(abs(one.correction) for one in again.parameters) < 1e-6
+    np.testing.assert_allclose(again.lengths(built.readings), built.readings + [c.encoder.offset for c in robot.cables])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"free": ("anchor",)}, "free must be 'auto' or some of anchors, attachments, .*, got 'anchor'"),
+        ({"free": ()}, r"free must be 'auto' or some of .*, got \(\)"),
+        ({"free": ("radii",)}, "free must not have radii for robot cogiro, which has no pulleys"),
+        ({"prior": {"scales": 0.1}}, "prior must have keys among those of free, anchors, offsets, got 'scales'"),
+        ({"prior": {"anchors": 0}}, "prior.anchors must be a number from 1e-09 to 1000, got 0"),
+        ({"free": ("clock",)}, "measurements.times must be given to find a clock offset, got none"),
+        ({"outliers": 1}, "outliers must be True or False, got 1"),
+        ({"robot": "ipanema-1"}, ".*"),
+    ],
+)
+def test_wrong_arguments(arguments, message):
+    measurements = as_built(20, 0).measurements()
+    if "robot" in arguments:
+        arguments = {"robot": "point-mass-3"}
+        message = "measurements.lengths must have a column for each of the 3 cables of point-mass-3, got 8"
+    with pytest.raises(InputError, match=message):
+        calibrate(**{"robot": "cogiro", "measurements": measurements, **arguments})
+
+
+def test_too_few_samples_are_refused():
+    with pytest.raises(InputError, match=r"as many lengths as there are parameters, 32, or a prior, got 3 samples"):
+        calibrate("cogiro", as_built(3, 0).measurements())
+    with pytest.raises(InputError, match=r"parameters beside 10 unknown poses, 32, .* which leave 20"):
+        calibrate("cogiro", as_built(10, 0).measurements(known=False))
+    assert calibrate("cogiro", as_built(3, 0).measurements(), prior={"anchors": 0.02, "offsets": 0.05}).converged
+
+
+def test_rotations_and_points_agree():
+    angles = np.random.default_rng(0).uniform(-1.5, 1.5, (50, 3))
+    R = points.rotations(angles)
+    from towline.calibration.rotations import angles_of, from_quaternions, quaternions_of, vectors_of
+
+    np.testing.assert_allclose(angles_of(R), angles, atol=1e-12)
+    np.testing.assert_allclose(from_quaternions(quaternions_of(R)), R, atol=1e-12)
+    np.testing.assert_allclose(from_vectors(vectors_of(R)), R, atol=1e-12)

@@ -1,0 +1,261 @@
+"""Logs of calibration, good and bad, and `towline calibrate` through the entry point."""
+
+import json
+
+import numpy as np
+import pytest
+
+from towline import load
+from towline.calibration import Measurements, read_measurements
+from towline.errors import InputError
+from towline.models import points
+
+from .robots_as_built import as_built
+from .warm import towline
+
+HEADER = [
+    "t [s]",
+    *(f"l{i} [m]" for i in range(8)),
+    *("x [mm]", "y [mm]", "z [cm]", "roll [deg]", "pitch [deg]", "yaw [rad]"),
+]
+
+
+def table(built):
+    poses = built.poses * [1e3, 1e3, 1e2, 180 / np.pi, 180 / np.pi, 1]
+    return np.column_stack([np.arange(len(poses)) * 0.5, built.readings, poses])
+
+
+def write(path, header, rows):
+    text = [",".join(header), *(",".join(f"{value:.12g}" for value in row) for row in rows)]
+    path.write_text("\n".join(text) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def built():
+    return as_built(60, 0)
+
+
+def test_csv_has_units(built, tmp_path):
+    log = read_measurements(write(tmp_path / "log.csv", HEADER, table(built)))
+    np.testing.assert_allclose(log.lengths, built.readings, atol=1e-10)
+    np.testing.assert_allclose(log.poses, built.poses, atol=1e-10)
+    np.testing.assert_allclose(log.times, np.arange(60) / 2)
+    assert log.sigma == (1e-3, 0, 0)
+    semicolons = (tmp_path / "log.csv").read_text().replace(",", ";")
+    (tmp_path / "other.csv").write_text("\ufeff" + semicolons.replace("\n", "\r\n"))
+    np.testing.assert_array_equal(read_measurements(tmp_path / "other.csv").lengths, log.lengths)
+
+
+def test_quaternions_and_empty_fields(built, tmp_path):
+    half = built.poses[:, 3:] / 2
+    zero = np.zeros(60)
+    about_z = np.column_stack([zero, zero, np.sin(half[:, 2]), np.cos(half[:, 2])])
+    header = [*(f"l{i} [mm]" for i in range(8)), "x [m]", "y [m]", "z [m]", "qx [1]", "qy [1]", "qz [1]", "qw [1]"]
+    path = write(tmp_path / "q.csv", header, np.hstack([1e3 * built.readings, built.poses[:, :3], about_z]))
+    log = read_measurements(path)
+    expected = points.rotations(np.column_stack([zero, zero, built.poses[:, 5]]))
+    np.testing.assert_allclose(points.rotations(log.poses[:, 3:]), expected, atol=1e-9)
+    lines = path.read_text().splitlines()
+    lines[7] = ",".join([*lines[7].split(",")[:8], *("" for _ in range(7))])
+    path.write_text("\n".join(lines))
+    log = read_measurements(path)
+    assert np.isnan(log.poses[6]).all()
+    assert np.isfinite(np.delete(log.poses, 6, axis=0)).all()
+
+
+def test_netcdf_there_and_back(built, tmp_path):
+    sigma = {"lengths": 2e-3, "position": 1e-3, "rotation": 3e-3}
+    poses = built.poses.copy()
+    poses[3] = np.nan
+    tensions = np.full((60, 8), 300.0)
+    first = Measurements(built.readings, poses, tensions=tensions, times=np.arange(60) / 9, sigma=sigma)
+    log = read_measurements(first.save(tmp_path / "log.nc"))
+    for name in ("lengths", "poses", "tensions", "times"):
+        np.testing.assert_array_equal(getattr(log, name), getattr(first, name))
+    assert log.sigma._asdict() == sigma
+    bare = Measurements(built.readings)
+    log = read_measurements(bare.save(tmp_path / "log.nc"), sigma=5e-3)
+    assert log.poses is log.tensions is log.times is None
+    assert log.sigma.lengths == 5e-3
+
+
+def test_netcdf_of_others(built, tmp_path):
+    import xarray as xr
+
+    data = {f"l{i}": ("k", 1e3 * built.readings[:, i], {"units": "mm"}) for i in range(8)}
+    data["t"] = ("k", np.arange(60.0), {"units": "ms"})
+    xr.Dataset(data).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    log = read_measurements(tmp_path / "other.nc")
+    np.testing.assert_allclose(log.lengths, built.readings, rtol=1e-12)
+    assert log.times[-1] == pytest.approx(0.059)
+    data["l3"] = ("k", built.readings[:, 3])
+    xr.Dataset(data).to_netcdf(tmp_path / "bad.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"bad\.nc: variable l3 must have the attribute units, got none"):
+        read_measurements(tmp_path / "bad.nc")
+
+
+def spoiled(what):
+    """A log of 60 samples with one fault, as text or bytes."""
+    built = as_built(60, 0)
+    header, rows = list(HEADER), table(built)
+    lines = None
+    if what == "no unit":
+        header[3] = "l2"
+    elif what == "wrong unit":
+        header[3] = "l2 [N]"
+    elif what == "unknown column":
+        header[3] = "length [m]"
+    elif what == "twice":
+        header[3] = "l1 [m]"
+    elif what == "a gap":
+        header[3] = "l9 [m]"
+    elif what == "nan":
+        rows[5, 4] = np.nan
+    elif what == "times":
+        rows[20, 0] = rows[19, 0]
+    elif what == "no lengths":
+        header, rows = HEADER[9:], rows[:, 9:]
+    elif what == "part of a position":
+        header[9:] = ["x [m]", "y [m]", "roll [deg]", "pitch [deg]", "yaw [deg]", "tension0 [N]"]
+    elif what == "half a pose":
+        rows[5, 9] = np.nan
+    if what == "empty":
+        return b""
+    if what == "header alone":
+        return (",".join(header) + "\n").encode()
+    if what == "binary":
+        return bytes(range(256)) * 10
+    if what == "damaged NetCDF":
+        return b"\x89HDF\r\n\x1a\n" + bytes(2000)
+    lines = [",".join(header), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    if what == "text":
+        lines[4] = lines[4].replace(lines[4].split(",")[2], "much")
+    if what == "truncated":
+        return "\n".join(lines).encode()[:-60]
+    return "\n".join(lines).encode()
+
+
+FAULTS = {
+    "no unit": r"the header must have a name and a unit for each column, as 'l0 \[m\]', got 'l2'",
+    "wrong unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, got 'N'",
+    "unknown column": "columns must be among l0, l1, .*, got 'length'",
+    "twice": "must have each column once, got l1 twice",
+    "a gap": "must have columns l0 to l7 without a gap, got no l2",
+    "nan": "l3 must be a finite number at sample 5, got nan",
+    "times": "times must rise from sample to sample, got 9.5 s and then 9.5 s at sample 20",
+    "no lengths": "must have columns l0, l1, ... of lengths, got x, y, z, roll, pitch, yaw",
+    "part of a position": "must have all columns x, y, z or none of them, got x, y",
+    "half a pose": "poses must have rows that are finite or nan as a whole, got both at sample 5",
+    "empty": "must be a CSV or NetCDF file, got an empty file",
+    "header alone": "must have a line for each sample below its header, got none",
+    "binary": "must be a CSV file in UTF-8, or NetCDF, got other bytes",
+    "damaged NetCDF": "must be a NetCDF 4 file, got one that cannot be read",
+    "text": "l1 must be a number at sample 3, got 'much'",
+    "truncated": "sample 59 must have 15 fields, as the header has, got",
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_bad_logs_are_refused_in_one_line(what, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(spoiled(what))
+    with pytest.raises(InputError, match=FAULTS[what]) as caught:
+        read_measurements(path)
+    assert str(caught.value).startswith(str(path))
+    assert str(caught.value).isprintable()
+
+
+def test_a_cut_netcdf_file_is_refused(built, tmp_path):
+    path = built.measurements().save(tmp_path / "log.nc")
+    content = path.read_bytes()
+    for size in (100, len(content) // 2, len(content) - 100):
+        path.write_bytes(content[:size])
+        with pytest.raises(InputError, match=r"must be a NetCDF 4 file, got one that cannot be read") as caught:
+            read_measurements(path)
+        assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"lengths": [[1, 2], [3]]}, "lengths must be an array of real numbers"),
+        ({"lengths": [1, 2]}, r"lengths must have the shape \(N, m\), got \(2,\)"),
+        ({"lengths": [[1, np.nan]]}, "lengths must be finite numbers up to 1e.09, got nan at sample 0, column 1"),
+        ({"poses": np.zeros((2, 5))}, r"poses must have the shape \(1, 6\), or \(1, 3\) of positions, got \(2, 5\)"),
+        ({"orientations": np.zeros((1, 3))}, "orientations must be None without poses"),
+        ({"poses": np.zeros((1, 3)), "orientations": [[0, 0, 0, 2]]}, "orientations must be quaternions of length 1"),
+        ({"times": [0, 1]}, r"times must have the shape \(1,\), got \(2,\)"),
+        ({"tensions": [[1]]}, r"tensions must have the shape \(1, 2\), got \(1, 1\)"),
+        ({"sigma": 0}, "sigma must be a number from 1e-09 to 100, or a mapping of .*, got 0"),
+        ({"sigma": {"length": 1}}, "sigma must have the keys lengths, position, rotation, got 'length'"),
+        ({"sigma": {"position": -1}}, "sigma.position must be a number from 0 to 100, got -1"),
+    ],
+)
+def test_wrong_measurements(arguments, message):
+    with pytest.raises(InputError, match=message):
+        Measurements(**{"lengths": [[1.0, 2.0]], **arguments})
+
+
+def test_the_command_writes_a_robot_file(built, tmp_path):
+    write(tmp_path / "log.csv", HEADER, table(built))
+    done = towline("calibrate", "cogiro", "log.csv", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["residual_after"] < 1.1e-3 < 0.02 < told["residual_before"]
+    assert told["not_identifiable"] == []
+    assert len(told["parameters"]) == 32
+    assert {"name", "value", "sigma"} <= set(told["parameters"][0])
+    assert told["file"] == "cogiro-calibrated.yaml"
+    robot = load(tmp_path / told["file"])
+    np.testing.assert_allclose(robot.anchors, built.robot.anchors, atol=0.03)
+    assert robot.uncertainty is not None
+    done = towline(
+        *("calibrate", "cogiro", "log.csv", "--free", "anchors, offsets", "--prior", "anchors=0.02,offsets=0.05"),
+        *("--sigma", "lengths=0.001,position=0.0005,rotation=0.001", "--out", "mine.yaml"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "residual of the lengths" in done.stdout
+    assert "determine all of these parameters" in done.stdout
+    assert (tmp_path / "mine.yaml").exists()
+
+
+def test_the_command_names_what_is_open(built, tmp_path):
+    write(tmp_path / "log.csv", HEADER[:9], table(built)[:, :9])
+    done = towline("calibrate", "cogiro", "log.csv", "--free", "anchors", "--json", cwd=tmp_path)
+    told = json.loads(done.stdout)
+    assert len(told["not_identifiable"]) == 6
+    assert told["parameters"][0]["sigma"] is None
+    done = towline("calibrate", "cogiro", "log.csv", "--free", "anchors", cwd=tmp_path)
+    assert "all anchors together along x of {G}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("--free", "anchor"), "free must be 'auto' or some of anchors"),
+        (("--prior", "anchors:1"), "--prior must be NAME=NUMBER, separated by commas"),
+        (("--sigma", "small"), "--sigma must be a number [m]"),
+        (("--out", "log.csv"), "--out must be another file than the log"),
+        (("--free", "clock,offsets", "--prior", "anchors=1"), "prior must have keys among those of free"),
+    ],
+)
+def test_wrong_options(built, tmp_path, options, line):
+    write(tmp_path / "log.csv", HEADER, table(built))
+    done = towline("calibrate", "cogiro", "log.csv", *options, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert line in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+@pytest.mark.parametrize("what", ["no unit", "binary", "truncated", "nan"])
+def test_the_command_refuses_bad_logs(what, tmp_path):
+    (tmp_path / "log.csv").write_bytes(spoiled(what))
+    done = towline("calibrate", "cogiro", "log.csv", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    missing = towline("calibrate", "cogiro", "none.csv", cwd=tmp_path)
+    assert (missing.returncode, missing.stderr) == (2, "towline: none.csv: no such file\n")
+    assert towline("calibrate", "point-mass-3", "log.csv", cwd=tmp_path).returncode == 2
