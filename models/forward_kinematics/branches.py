@@ -68,7 +68,8 @@ def branches(
     rows, weights = np.tile(measured, (starts, 1)), 1.0 / deviations
     spread = _spread(robot, problem, level_platform(problem, rows[:1], weights)[0], starts, seed)
     poses, errors, ended = problem.descend_from_afar(rows, weights, spread)
-    cost = np.sum(errors**2, axis=1)
+    with np.errstate(over="ignore"):  # of a descent that ran away
+        cost = np.sum(errors**2, axis=1)
     fits = np.flatnonzero(ended & (cost <= largest_cost(robot.m - problem.freedoms)))
     apart: list[int] = []
     for row in fits[np.argsort(cost[fits], kind="stable")].tolist():
