@@ -30,7 +30,10 @@ def angles(R: np.ndarray) -> np.ndarray:
     """Return (roll, pitch, yaw) of rotations (..., 3, 3), (..., 3) [rad]: pitch within a quarter turn."""
     upright = np.hypot(R[..., 2, 1], R[..., 2, 2])
     roll, pitch = np.arctan2(R[..., 2, 1], R[..., 2, 2]), np.arctan2(-R[..., 2, 0], upright)
-    return np.stack([roll, pitch, np.arctan2(R[..., 1, 0], R[..., 0, 0])], axis=-1)
+    # The yaw that belongs to this roll: at a pitch of 90 degrees both are rounding, and only together an attitude.
+    sine, cosine = np.sin(roll), np.cos(roll)
+    across, along = sine * R[..., 0, 2] - cosine * R[..., 0, 1], cosine * R[..., 1, 1] - sine * R[..., 1, 2]
+    return np.stack([roll, pitch, np.arctan2(across, along)], axis=-1)
 
 
 def placed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -214,6 +214,72 @@ def test_coordinates_that_cannot_move_stay_and_have_no_spread():
     assert (estimate.sigmas[robot.dof_mask == 1] > 0).all()
 
 
+@pytest.mark.parametrize(("name", "least"), [("fast", 12), ("multi-quadrotor-6", 10), ("point-mass-3", 2)])
+def test_branches_are_found_on_both_sides_of_level_anchors(name, least):
+    """With anchors in one plane a platform mirrored at it is far from the level one, though hardly ever held there."""
+    robot = load(name)
+    turn = np.array([0, 0, 0, 0.1, -0.2, 0.3]) * robot.dof_mask
+    pose = robot.home + turn + np.array([0.1, -0.05, 0, 0, 0, 0]) * robot.length
+    assert len(branches(robot, dynamics_of(robot).cable_lengths(pose))) >= least
+
+
+def test_an_angle_beyond_a_quarter_turn_leaves_the_others_at_home():
+    robot = load("planar-4")
+    pose = robot.home + np.array([0.1, 0, 0, 0, 2.0, 0])
+    lengths = dynamics_of(robot).cable_lengths(pose)
+    np.testing.assert_allclose(pose_from_lengths(robot, lengths, pose + 0.01).pose, pose, atol=1e-9)
+    platform = load("point-mass-3").platform.model_copy(update={"home": (0, 0, 1, 0.3, 2.0, 0.1)})
+    point = load("point-mass-3").model_copy(update={"platform": platform})
+    estimate = pose_from_lengths(point, dynamics_of(point).cable_lengths(point.home))
+    np.testing.assert_array_equal(estimate.pose[3:], point.home[3:])
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9])
+def test_upright_roll_and_yaw_are_those_of_one_attitude(pitch):
+    """Where the nose points up only their difference is known; each has errors of its own."""
+    robot = load("ipanema-2")
+    pose = np.array([0.1, 0.2, 3, 0.3, pitch, 0.7])
+    lengths = dynamics_of(robot).cable_lengths(pose)
+    estimate = pose_from_lengths(robot, lengths, pose + 1e-3)
+    np.testing.assert_allclose(dynamics_of(robot).cable_lengths(estimate.pose), lengths, atol=1e-11)
+    R = points.rotations(pose[3:])
+    np.testing.assert_allclose(points.rotations(points.angles(R)), R, atol=1e-14)
+
+
+@pytest.mark.parametrize("precise", [1, 4])
+def test_a_search_bears_sigmas_that_differ_by_a_million(precise):
+    robot = load("cogiro")
+    poses = poses_of_workspace(robot, 300, seed=13)
+    sigma = np.where(np.arange(8) < precise, 1e-9, 1e-3)
+    estimate = pose_from_lengths(robot, dynamics_of(robot).cable_lengths(poses), sigma=sigma)
+    assert estimate.consistent.mean() > 0.99
+    assert np.mean(np.abs(errors_of(estimate, poses)).max(axis=1) < 1e-6) > 0.99
+
+
+def test_a_pose_that_hardly_fits_still_makes_another_one_ambiguous():
+    """One true pose in a hundred is refused by the test at 1 %; another that fits is then not the only one."""
+    robot, sigma = load("caroca"), 5e-3
+    poses = poses_of_workspace(robot, 10_000, seed=14)
+    noise = np.random.default_rng(15).normal(0, sigma, (len(poses), robot.m))
+    lengths = dynamics_of(robot).cable_lengths(poses) + noise
+    found, true = pose_from_lengths(robot, lengths, sigma=sigma), pose_from_lengths(robot, lengths, poses, sigma=sigma)
+    other = np.abs(errors_of(found, true.pose)).max(axis=1) > 0.02
+    assert other.sum() > 10
+    assert np.sum(other & found.consistent & ~found.ambiguous) <= 1
+
+
+def test_six_cables_at_random_hardly_hide_a_pose():
+    """The estimate is the true pose, or it is ambiguous: the search met others that fit."""
+    rng, angle = np.random.default_rng(10), 2 * np.pi * np.arange(6) / 6
+    high = np.array([3, 1, 3, 0, 3, 2])
+    anchors = np.stack([4 * np.cos(angle), 4 * np.sin(angle), high], axis=1) + rng.uniform(-0.5, 0.5, (6, 3))
+    robot = suspended(anchors.tolist(), (rng.uniform(-1, 1, (6, 3)) * [0.6, 0.6, 0.4]).tolist(), home=[0] * 6)
+    poses = poses_of_workspace(robot, 1000, seed=16)
+    estimate = pose_from_lengths(robot, dynamics_of(robot).cable_lengths(poses))
+    wrong = np.abs(errors_of(estimate, poses)).max(axis=1) > 1e-6
+    assert np.mean(wrong & ~estimate.ambiguous) < 0.002
+
+
 def suspended(anchors, attachments, **platform):
     """Return a platform of 2 kg under cables from a frame."""
     body = {"mass": 2, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], **platform}
@@ -300,6 +366,36 @@ def test_a_tracker_follows_and_recovers():
     wrong = tracker.update(lengths[-1] + [0.3, 0, 0, 0, 0, 0, 0, 0])
     assert not wrong.consistent
     np.testing.assert_allclose(tracker.pose, poses[-1], atol=1e-9)
+
+
+def test_a_tracker_keeps_its_own_pose():
+    robot = load("cogiro")
+    start, lengths = robot.home.copy(), dynamics_of(robot).cable_lengths(robot.home)
+    tracker = PoseTracker(robot, start)
+    start[:] = 1e5
+    tracker.update(lengths).pose[:] = 1e5
+    np.testing.assert_allclose(tracker.pose, robot.home, atol=1e-9)
+    assert tracker.follow(np.empty((0, 8))).shape == (0, 6)
+    moved_frame = np.array([[0.1, 0, 0, 0, 0, 0]])
+    np.testing.assert_allclose(tracker.follow([lengths, lengths], moved_frame)[:, 0], robot.home[0] + 0.1, atol=1e-9)
+    assert tracker.searches == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda tracker: tracker.update(np.full((2, 8), 8.0)), r"lengths must have the shape \(8,\)"),
+        (lambda tracker: tracker.update(np.full(8, 8.0), np.zeros((1, 1, 6))), r"shape \(1, 6\), got \(1, 1, 6\)"),
+        (lambda tracker: tracker.follow(3.0), r"lengths must have the shape \(\.\.\., 8\)"),
+        (lambda tracker: tracker.follow([[1, 2], [3]]), "lengths must be numbers of shape"),
+        (lambda tracker: tracker.follow(np.full(8, 8.0)), r"lengths must have the shape \(N, 8\)"),
+        (lambda tracker: tracker.follow(np.full((2, 8), 8.0), np.zeros((3, 1, 6))), r"\(1, 6\) or \(2, 1, 6\), got"),
+        (lambda tracker: PoseTracker(tracker.robot, sigma=-1), "sigma must be numbers > 0"),
+    ],
+)
+def test_wrong_input_of_a_tracker_is_one_line(call, message):
+    with pytest.raises(InputError, match=message):
+        call(PoseTracker("cogiro"))
 
 
 def test_a_single_estimate_takes_microseconds():

@@ -2,7 +2,7 @@
 
 Six cables of a six-coordinate platform have up to 40 such poses, those of nist-robocrane most often eight; with more
 cables one remains, and others whose lengths differ by less than the noise. There is no method that lists them all in
-milliseconds: descents from attitudes spread evenly over SO(3) list those that many starts lead to.
+milliseconds: descents from attitudes spread evenly over SO(3) list those that many starts lead to, which are most.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ import os
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError
-from ...inputs import shown, whole_number
+from ...inputs import whole_number
 from .. import points
-from ..batch import as_array
 from ..files import as_robot
 from ..robot import Robot
 from ..statics import equilibria
 from .estimate import PoseEstimate, largest_cost
-from .from_lengths import SIGMA, checked_lengths, checked_sigma
+from .from_lengths import SIGMA, checked_sigma, one_pose
 from .problem import Problem, problem_of
-from .search import APART, DAMPING, level_platform
+from .search import APART, level_platform
 from .taut import taut
 
 __all__ = ["branches"]
@@ -46,7 +44,8 @@ def branches(
     lengths, carrier_pose, sigma
         As in `pose_from_lengths`, for one pose.
     starts
-        Number of poses to start from.
+        Number of poses to start from. Some of the poses may be missed, fewer the more starts there are. Where gravity
+        decides, the poses are rests, which have starts of their own.
     seed
         Of the starts.
 
@@ -58,14 +57,8 @@ def branches(
     robot = as_robot(robot)
     starts = whole_number("starts", starts, 1, 1_000_000)
     seed = whole_number("seed", seed, 0, 2**63 - 1)
-    measured = checked_lengths(lengths, robot)
-    if measured.ndim != 1:
-        raise InputError(f"lengths must have the shape ({robot.m},), those of one pose, got {shown(measured)}")
-    deviations, carriers = checked_sigma(sigma, robot.m), None
-    if carrier_pose is not None:
-        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
-        if carriers.ndim != 2:
-            raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {carriers.shape}")
+    measured, carriers = one_pose(lengths, carrier_pose, robot)
+    deviations = checked_sigma(sigma, robot.m)
     problem = problem_of(robot, carriers)
     if problem.open:
         from .from_lengths import pose_from_lengths
@@ -74,8 +67,9 @@ def branches(
         return [pose_from_lengths(robot, measured, rest.pose, carriers, deviations) for rest in rests]
     rows, weights = np.tile(measured, (starts, 1)), 1.0 / deviations
     spread = _spread(robot, problem, level_platform(problem, rows[:1], weights)[0], starts, seed)
-    poses, errors, ended = problem.descend(rows, weights, spread, DAMPING)
-    cost = np.sum(errors**2, axis=1)
+    poses, errors, ended = problem.descend_from_afar(rows, weights, spread)
+    with np.errstate(over="ignore"):  # of a descent that ran away
+        cost = np.sum(errors**2, axis=1)
     fits = np.flatnonzero(ended & (cost <= largest_cost(robot.m - problem.freedoms)))
     apart: list[int] = []
     for row in fits[np.argsort(cost[fits], kind="stable")].tolist():
@@ -90,11 +84,11 @@ def branches(
 
 
 def _spread(robot: Robot, problem: Problem, level: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """Return starts (N, 6): the level platform and home, then any attitude, near the level platform."""
+    """Return starts (N, 6): the level platform and home, then any attitude, about the level platform."""
     from scipy.spatial.transform import Rotation
 
     rng = np.random.default_rng(seed)
-    reach = robot.length + 0.3 * np.ptp(problem.geometry[0, :, :3], axis=0)
+    reach = 2.0 * robot.length + 0.5 * np.ptp(problem.geometry[0, :, :3], axis=0).max()
     poses = np.tile(level, (count, 1))
     poses[:, :3] += rng.uniform(-1.0, 1.0, (count, 3)) * reach
     turning = problem.free[3:] > 0.0

@@ -24,6 +24,7 @@ from ...simd import (
     any_of,
     gather,
     load,
+    magnitude,
     maximum,
     minimum,
     places,
@@ -205,7 +206,11 @@ def get_pose(of_pose, poses, W):
     r7, r8 = load(W, POSE + 10), load(W, POSE + 11)
     scatter(poses, of_pose, 3, angle(r7, r8))
     scatter(poses, of_pose, 4, angle(-load(W, POSE + 9), sqrt(r7 * r7 + r8 * r8)))
-    scatter(poses, of_pose, 5, angle(load(W, POSE + 6), load(W, POSE + 3)))
+    # The yaw that belongs to this roll: at a pitch of 90 degrees both are rounding, and only together an attitude.
+    known = magnitude(r7) + magnitude(r8) > 1e-200
+    sine, cosine = where(known, r7, splat(0.0)), where(known, r8, splat(1.0))
+    across = sine * load(W, POSE + 5) - cosine * load(W, POSE + 4)
+    scatter(poses, of_pose, 5, angle(across, cosine * load(W, POSE + 7) - sine * load(W, POSE + 8)))
 
 
 def descend_rows(

@@ -38,7 +38,8 @@ class PoseEstimate:
     carrier_pose
         Of the carriers, (c, 6) or (..., c, 6), or None for those at home.
     ambiguous
-        Whether the search met another pose that fits, (...); None of an estimate with a start, which is the one nearby.
+        Whether the search met another pose that may be the true one, (...): it fits, or would by a test at 0.01 %. None
+        of an estimate with a start, which is the one nearby.
     by_gravity
         Whether the lengths alone leave the pose open, and the platform is at rest under its weight.
     """
@@ -161,13 +162,13 @@ class PoseEstimate:
         return dynamics_of(self.robot).cable_lengths(pose, carriers)
 
 
-def largest_cost(redundancy: int) -> float:
-    """Return the largest sum of squared errors, in standard deviations, that noise explains."""
+def largest_cost(redundancy: int, false_alarm: float = FALSE_ALARM) -> float:
+    """Return the sum of squared errors, in standard deviations, that noise exceeds in a share of measurements."""
     if redundancy <= 0:
         return EXACT**2
     from scipy.special import chdtri
 
-    return float(chdtri(redundancy, FALSE_ALARM))
+    return float(chdtri(redundancy, false_alarm))
 
 
 def gradient(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray | None) -> np.ndarray:

@@ -18,7 +18,7 @@ from .estimate import PoseEstimate
 from .problem import Problem, problem_of
 from .search import search
 
-__all__ = ["SIGMA", "checked_lengths", "checked_sigma", "pose_from_lengths"]
+__all__ = ["SIGMA", "checked_lengths", "checked_sigma", "one_pose", "pose_from_lengths"]
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
 
@@ -102,6 +102,18 @@ def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
     if not array.max(initial=0.0) <= LARGEST:
         raise InputError(f"lengths must be numbers up to {LARGEST:g} [m], got {array.max():g}")
     return array
+
+
+def one_pose(lengths: ArrayLike, carrier_pose: ArrayLike | None, robot: Robot) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the lengths (m,) and carriers (c, 6), or None, of one pose, or raise InputError."""
+    measured, carriers = checked_lengths(lengths, robot), None
+    if measured.ndim != 1:
+        raise InputError(f"lengths must have the shape ({robot.m},), those of one pose, got {shown(measured)}")
+    if carrier_pose is not None:
+        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
+        if carriers.ndim != 2:
+            raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {carriers.shape}")
+    return measured, carriers
 
 
 def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:

@@ -17,6 +17,8 @@ __all__ = ["Problem", "problem_of"]
 FEW, STEPS = 6, 60  # most steps of a descent; from a start nearby it takes three
 ROUNDING = 1e-11  # times the platform's size: a step that is rounding
 NEGLIGIBLE = 1e-8  # times the platform's size and the least sigma [m]: a step that is nothing beside the noise
+DAMPING = 1e-3  # of a first step from afar
+MILD = 3.0  # largest ratio of weights in a descent from afar
 OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, relative to the largest
 
 
@@ -90,17 +92,33 @@ class Problem(NamedTuple):
         free = self.free if free is None else free
         smallest = max(ROUNDING, NEGLIGIBLE / weights.max(initial=0.0)) * self.scale
         how = (weights, free, smallest, damping)
-        if len(lengths) == 1:
-            self._run(lengths, *how, STEPS, moved, errors, info)
-            return moved, errors, info[:, 0] > 0.0
-        self._run(lengths, *how, FEW, moved, errors, info)
-        if not info[:, 0].all():
+        alone = len(lengths) == 1
+        self._run(lengths, *how, STEPS if alone else FEW, moved, errors, info)
+        if not alone and not info[:, 0].all():
             # The others together: in a vector of many problems all wait for the slowest.
             slow = np.flatnonzero(info[:, 0] == 0.0)
             rest = moved[slow], errors[slow], info[slow]
             self.of(slow)._run(lengths[slow], *how, STEPS, *rest)
             moved[slow], errors[slow], info[slow] = rest
+        if not free[3:].all():
+            _keep_locked(moved, poses, free[3:] > 0.0)
         return moved, errors, info[:, 0] > 0.0
+
+    def descend_from_afar(
+        self, lengths: np.ndarray, weights: np.ndarray, poses: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what `descend` does, from poses that are not nearby.
+
+        Weights that are far apart make a narrow curved valley, in which a descent stops: it begins with `milder` ones.
+        """
+        mild = self.milder(weights)
+        if (mild < weights).any():
+            return self.descend(lengths, weights, self.descend(lengths, mild, poses, DAMPING)[0], 0.0)
+        return self.descend(lengths, weights, poses, DAMPING)
+
+    def milder(self, weights: np.ndarray) -> np.ndarray:
+        """Return weights, (m,), with none far above those of the cables that are needed to decide the pose."""
+        return np.minimum(weights, MILD * np.sort(weights)[max(self.m - self.freedoms, 0)])
 
     def _run(
         self,
@@ -137,6 +155,13 @@ def _at_home(robot: Any) -> Problem:
     values = np.linalg.svd(J * robot.wrench_scale[robot.dof_mask > 0.0], compute_uv=False)
     is_open = robot.m < J.shape[1] or bool(values[-1] < OPEN * values[0])
     return Problem(geometry, robot.pulley_radii, robot.dof_mask, robot.home, robot.length, J.shape[1], is_open)
+
+
+def _keep_locked(poses: np.ndarray, starts: np.ndarray, turning: np.ndarray) -> None:
+    """Write the angles that cannot move as they were, in place: the kernel returns any that give the same attitude."""
+    if turning[1]:  # beyond a quarter turn roll and yaw would be half turns
+        poses[:, 4] = np.arctan2(np.sin(poses[:, 4]), np.cos(poses[:, 4]) * np.cos(poses[:, 5]))
+    poses[:, 3:][:, ~turning] = starts[:, 3:][:, ~turning]
 
 
 def _geometry(robot: Robot, carriers: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from ..dynamics import dynamics_of
 from ..robot import Robot
 from ..statics import Equilibrium, equilibria, per_length, rest_near
 from .problem import Problem
-from .search import DAMPING
 
 __all__ = ["resting"]
 
@@ -47,7 +46,7 @@ def resting(
         )
     near = starts
     if near is None:
-        near = problem.descend(lengths, 1.0 / sigma, np.tile(problem.home, (len(lengths), 1)), DAMPING)[0]
+        near = problem.descend_from_afar(lengths, 1.0 / sigma, np.tile(problem.home, (len(lengths), 1)))[0]
     poses, errors = near.copy(), np.full(lengths.shape, np.inf)
     converged, covariance = np.zeros(len(lengths), bool), np.full((len(lengths), 6, 6), np.inf)
     for row, own in enumerate(lengths):

@@ -3,25 +3,29 @@
 A level platform with the given lengths is often near the true one, and home often is, so these come first; those that
 do not fit exactly go on from the level platform turned by 45 and 90 degrees about one axis. Of several poses that fit
 the likeliest is taken, if angles from home are spread by 30 degrees. With as many cables as coordinates many poses
-fit; those in which the cables cannot hold the weight are left out, since their lengths cannot have been measured.
+fit, so that six cables go on from turns about oblique axes; those poses in which the cables cannot hold the weight are
+left out, since their lengths cannot have been measured.
 """
 
 from __future__ import annotations
+
+from itertools import combinations, product
 
 import numpy as np
 
 from .. import points
 from ..robot import Robot
 from .estimate import EXACT, largest_cost, moved
-from .problem import Problem
+from .problem import DAMPING, Problem
 from .taut import taut
 
-__all__ = ["APART", "DAMPING", "level_platform", "search"]
+__all__ = ["APART", "level_platform", "search"]
 
-DAMPING = 1e-3  # of a first step from afar
 TURNS = np.radians([45.0, 90.0])
+OBLIQUE = np.radians([60.0, 25.0])  # about an axis between two, for platforms that have many poses with their lengths
 USUAL = np.radians(30.0)  # standard deviation of the angle from home, where several poses fit
 APART = 0.02  # in radians, and times the platform's size: poses that are not one
+RARE = 1e-4  # share of sound measurements that fit no better than the least likely pose that counts as ambiguous
 MISFIT = 1e12  # beyond the score of any pose that fits
 
 
@@ -36,7 +40,7 @@ def search(
     level = level_platform(problem, lengths, 1.0 / sigma)
     for start in _starts(problem, level):
         left = best.left
-        to, errors, ended = problem.of(left).descend(lengths[left], 1.0 / sigma, start[left], DAMPING)
+        to, errors, ended = problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left])
         carriers = carrier_pose if carrier_pose is None or carrier_pose.ndim == 2 else carrier_pose[left]
         best.offer(left, to, errors, ended, carriers)
         if not best.left.size:
@@ -61,6 +65,7 @@ class _Best:
         self._robot, self._home = robot, points.rotations(problem.home[3:])
         redundancy = robot.m - problem.freedoms
         self._most, self._square = largest_cost(redundancy), redundancy == 0
+        self._doubtful = largest_cost(redundancy, RARE)
         self.poses, self.errors = np.tile(problem.home, (count, 1)), np.full((count, robot.m), np.inf)
         self.ended, self.ambiguous, self.left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
         self._score = np.full(count, np.inf)
@@ -78,10 +83,12 @@ class _Best:
         turned = np.einsum("nij,ij->n", R, self._home)  # the trace of R R_home^T
         angle = np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))
         score = np.where(fits, cost + (angle / USUAL) ** 2, np.where(np.isfinite(cost), MISFIT + cost, np.inf))
-        known = self._score[rows] < MISFIT
+        # The true pose may be the one that hardly fits, so that one counts here too.
+        plausible = fits if self._square else ended & (cost <= self._doubtful)
+        known = self._score[rows] < (MISFIT if self._square else MISFIT + self._doubtful)
         apart = np.abs(poses[:, :3] - self.poses[rows, :3]).max(axis=1) > APART * self._robot.length
         apart |= np.abs(R - points.rotations(self.poses[rows, 3:])).max(axis=(1, 2)) > APART
-        self.ambiguous[rows] |= fits & known & apart
+        self.ambiguous[rows] |= plausible & known & self.ended[rows] & apart
         better = score < self._score[rows]
         kept = rows[better]
         self.poses[kept], self.errors[kept] = poses[better], errors[better]
@@ -96,7 +103,7 @@ def level_platform(problem: Problem, lengths: np.ndarray, weights: np.ndarray) -
     straight = problem.free.copy()
     straight[3:] = 0.0
     home = np.broadcast_to(problem.home, (len(lengths), 6))
-    return problem.descend(lengths, weights, home, DAMPING, straight)[0]
+    return problem.descend(lengths, problem.milder(weights), home, DAMPING, straight)[0]
 
 
 def _starts(problem: Problem, level: np.ndarray):
@@ -109,3 +116,10 @@ def _starts(problem: Problem, level: np.ndarray):
                 step = np.zeros(6)
                 step[3 + axis] = sign * turn
                 yield moved(level, step)
+    if problem.m == problem.freedoms == 6:
+        for turn in OBLIQUE:
+            for one, other in combinations(range(3, 6), 2):
+                for signs in product((1.0, -1.0), repeat=2):
+                    step = np.zeros(6)
+                    step[[one, other]] = turn * np.sqrt(0.5) * np.array(signs)
+                    yield moved(level, step)
