@@ -85,7 +85,9 @@ def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.n
     """
     import numpy as np
 
-    accepted = f"{count} finite numbers" + (f" for each of {rows} carriers, separated by ';'" if rows else "")
+    accepted = f"{count} finite number{'s' if count > 1 else ''}" + (
+        f" for each of {rows} carriers, separated by ';'" if rows else ""
+    )
     parts = text.split(";") if rows else [text]
     try:
         values = [[float(word) for word in part.replace(",", " ").split()] for part in parts]

@@ -86,13 +86,13 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
     typer.echo("The angles' sigmas are of small rotations about the axes of {G}.")
     if estimate.by_gravity and estimate.converged:
         typer.echo("The lengths leave motions open: this is where the platform rests under its weight.")
-    if not estimate.determined and estimate.converged:
+    if estimate.consistent and not estimate.determined:
         typer.echo("Undetermined: some motion changes none of these lengths.")
-    elif not estimate.conditioned:
+    elif estimate.consistent and not estimate.conditioned:
         typer.echo(
             "Nearly singular: the lengths are not linear within the sigmas, which are then only a rough measure."
         )
-    if not estimate.consistent and not estimate.by_gravity:
+    if not estimate.consistent and robot.m > robot.dof_mask.sum():
         off = int(np.argmax(estimate.suspects()))
         typer.echo(f"The least credible length is that of cable {off + 1}.")
     for other in others:

@@ -250,10 +250,10 @@ def test_200_poses_with_all_parameters_take_less_than_a_fifth_of_a_second():
     robot, built = load("cogiro"), as_built(200, 0)
     for known in (True, False):
         times = []
-        while len(times) < 20 and min(times, default=1) > 0.2:  # other tests may use the same processors
-            start = time.perf_counter()
+        for _ in range(4):
+            start = time.thread_time()  # other tests may use the same processors
             result = calibrate(robot, built.measurements(known), (*ALL_THREE, "scales"))
-            times.append(time.perf_counter() - start)
+            times.append(time.thread_time() - start)
             assert result.converged
         assert min(times) < 0.2
 

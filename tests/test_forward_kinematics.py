@@ -331,7 +331,7 @@ def test_parallel_cables_leave_it_to_gravity():
     assert estimate.by_gravity
     assert estimate.determined
     np.testing.assert_allclose(estimate.pose[:2], robot.home_anchors[:, :2].mean(axis=0), atol=1e-6)
-    assert not pose_from_lengths(robot, np.full(6, 0.1)).converged
+    assert not pose_from_lengths(robot, np.full(6, 0.1)).consistent
 
 
 def test_a_nearly_singular_geometry_is_reported():

@@ -41,7 +41,7 @@ class PoseEstimate:
         Whether the search met another pose that may be the true one, (...): it fits, or would by a test at 0.01 %. None
         of an estimate with a start, which is the one nearby.
     by_gravity
-        Whether the lengths alone leave the pose open, and the platform is at rest under its weight.
+        Whether the lengths alone leave the pose open, and the platform is at rest under its weight, (...).
     """
 
     def __init__(
@@ -53,12 +53,25 @@ class PoseEstimate:
         sigma: np.ndarray,
         carrier_pose: np.ndarray | None,
         ambiguous: Any = None,
-        rest_covariance: np.ndarray | None = None,
+        by_gravity: Any = False,
+        covariance: np.ndarray | None = None,
     ):
         self.robot, self.pose, self.residuals, self.converged = robot, pose, residuals, converged
         self.sigma, self.carrier_pose = sigma, carrier_pose
-        self.ambiguous, self.by_gravity = ambiguous, rest_covariance is not None
-        self._rest_covariance = rest_covariance
+        self.ambiguous, self.by_gravity, self._covariance = ambiguous, by_gravity, covariance
+
+    def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
+        """Return N estimates with other leading dimensions, and their carriers as they were given."""
+
+        def shaped(array: Any) -> Any:
+            return array if array is None or np.ndim(array) == 0 else array.reshape((*batch, *array.shape[1:]))
+
+        parts = [shaped(part) for part in (self.pose, self.residuals, self.converged, self.ambiguous, self.by_gravity)]
+        if not batch:
+            parts[2:] = [None if part is None else bool(part) for part in parts[2:]]
+        pose, residuals, converged, ambiguous, by_gravity = parts
+        given = (self.robot, pose, residuals, converged, self.sigma, carrier_pose, ambiguous, by_gravity)
+        return PoseEstimate(*given, shaped(self._covariance))
 
     @property
     def residual(self) -> Any:
@@ -69,10 +82,12 @@ class PoseEstimate:
     def consistent(self) -> Any:
         """Return whether the residuals are what noise of `sigma` explains, by a chi-square test at 1 %, (...).
 
-        With no more cables than coordinates nearly all lengths belong to some pose, and the test decides nothing.
+        With no more cables than coordinates nearly all lengths belong to some pose, and the test decides nothing;
+        lengths with which the platform rests are consistent.
         """
         cost = np.sum(np.square(self.residuals / self.sigma), axis=-1)
-        return self.converged & (cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum())))
+        fits = cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum()))
+        return self.converged & (fits | self.by_gravity)
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -80,8 +95,8 @@ class PoseEstimate:
 
         It is zero for coordinates that cannot move, and infinite where the lengths leave some motion open.
         """
-        if self._rest_covariance is not None:
-            return self._rest_covariance
+        if self._covariance is not None:
+            return self._covariance
         return covariance_of(self._weighted_gradient(), self.robot)
 
     @property

@@ -70,28 +70,30 @@ def pose_from_lengths(
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
     problem = problem_of(robot, each)
     starts = None if start is None else _start(problem, start, batch)
-    ambiguous = covariance = None
     if problem.open:
-        from .resting import resting
+        from .resting import open_estimates
 
-        places = np.broadcast_to(robot.carrier_home if each is None else each, (len(rows), *robot.carrier_home.shape))
-        poses, residuals, converged, covariance = resting(robot, problem, rows, starts, places, deviations)
+        flat = open_estimates(robot, problem, rows, starts, each, deviations)
     else:
-        if starts is None:
-            best = search(robot, problem, rows, deviations, each)
-            poses, errors, converged, ambiguous = best.poses, best.errors, best.ended, best.ambiguous
-        else:
-            poses, errors, converged = problem.descend(rows, 1.0 / deviations, starts, 0.0)
-        residuals = np.multiply(errors, deviations, out=errors)
-    if not batch:
-        pose, ambiguous = poses[0], None if ambiguous is None else bool(ambiguous[0])
-        covariance = None if covariance is None else covariance[0]
-        return PoseEstimate(robot, pose, residuals[0], bool(converged[0]), deviations, carriers, ambiguous, covariance)
-    ambiguous = None if ambiguous is None else ambiguous.reshape(batch)
-    covariance = None if covariance is None else covariance.reshape(*batch, 6, 6)
-    pose, residuals = poses.reshape(*batch, 6), residuals.reshape(*batch, robot.m)
-    converged = converged.reshape(batch)
-    return PoseEstimate(robot, pose, residuals, converged, deviations, carriers, ambiguous, covariance)
+        flat = estimates(robot, problem, rows, starts, each, deviations)
+    return flat.reshaped(batch, carriers)
+
+
+def estimates(
+    robot: Robot,
+    problem: Problem,
+    lengths: np.ndarray,
+    starts: np.ndarray | None,
+    carriers: np.ndarray | None,
+    sigma: np.ndarray,
+) -> PoseEstimate:
+    """Return the poses that fit lengths (N, m) best; the other arguments are checked ones of `pose_from_lengths`."""
+    if starts is None:
+        best = search(robot, problem, lengths, sigma, carriers)
+        residuals = np.multiply(best.errors, sigma, out=best.errors)
+        return PoseEstimate(robot, best.poses, residuals, best.ended, sigma, carriers, best.ambiguous)
+    poses, errors, converged = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
+    return PoseEstimate(robot, poses, np.multiply(errors, sigma, out=errors), converged, sigma, carriers)
 
 
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:

@@ -9,12 +9,68 @@ from .. import points
 from ..dynamics import dynamics_of
 from ..robot import Robot
 from ..statics import Equilibrium, equilibria, per_length, rest_near
+from .estimate import PoseEstimate
 from .problem import Problem
 
-__all__ = ["resting"]
+__all__ = ["open_estimates"]
 
 
-def resting(
+def open_estimates(
+    robot: Robot,
+    problem: Problem,
+    lengths: np.ndarray,
+    starts: np.ndarray | None,
+    carriers: np.ndarray | None,
+    sigma: np.ndarray,
+) -> PoseEstimate:
+    """Return the estimates of a robot whose lengths leave a motion open at home, or everywhere.
+
+    Where there are enough lengths and they decide the pose well, it is theirs; elsewhere it is the rest.
+
+    Parameters
+    ----------
+    problem, lengths, starts
+        As for a descent: (N, m) and (N, 6), or None for starts of its own.
+    carriers
+        (c, 6) or (N, c, 6), in {G}, or None for those at home.
+    sigma
+        (m,) [m].
+
+    Raises
+    ------
+    InputError
+        If the robot has no gravity and too few cables: the lengths alone do not decide.
+    """
+    from .from_lengths import estimates
+
+    places = np.broadcast_to(
+        robot.carrier_home if carriers is None else carriers, (len(lengths), *robot.carrier_home.shape)
+    )
+    if robot.m < problem.freedoms:
+        if robot.weight == 0.0:
+            raise InputError(
+                f"gravity must not be zero where the lengths leave a motion open, as the {robot.m} cables of robot "
+                f"{robot.name!r} do for {problem.freedoms} coordinates"
+            )
+        rests = _rests(robot, problem, lengths, starts, places, sigma)
+        return PoseEstimate(robot, *rests[:3], sigma, carriers, None, np.ones(len(lengths), bool), rests[3])
+    own = estimates(robot, problem, lengths, starts, carriers, sigma)
+    hang = np.flatnonzero(~(own.consistent & own.conditioned))
+    if robot.weight == 0.0 or not hang.size:
+        return own
+    covariance, by_gravity = own.covariance.copy(), np.zeros(len(lengths), bool)
+    near = own.pose if starts is None else starts
+    rests = _rests(robot, problem.of(hang), lengths[hang], near[hang], places[hang], sigma)
+    rows = hang[rests[2]]
+    for whole, part in zip((own.pose, own.residuals, own.converged, covariance), rests, strict=True):
+        whole[rows] = part[rests[2]]
+    by_gravity[rows] = True
+    return PoseEstimate(
+        robot, own.pose, own.residuals, own.converged, sigma, carriers, own.ambiguous, by_gravity, covariance
+    )
+
+
+def _rests(
     robot: Robot,
     problem: Problem,
     lengths: np.ndarray,
@@ -22,28 +78,7 @@ def resting(
     carriers: np.ndarray,
     sigma: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return poses (N, 6), errors of the lengths (N, m) [m], where there is a rest (N,), and covariances (N, 6, 6).
-
-    Parameters
-    ----------
-    problem, lengths, starts
-        As for a descent: (N, m) and (N, 6), or None for starts of its own.
-    carriers
-        (N, c, 6), in {G}.
-    sigma
-        (m,) [m].
-
-    Raises
-    ------
-    InputError
-        If the robot has no gravity: the lengths alone do not decide.
-    """
-    if robot.weight == 0.0:
-        freedoms = problem.freedoms
-        raise InputError(
-            f"gravity must not be zero where the lengths leave a motion open, as the {robot.m} cables of robot "
-            f"{robot.name!r} do for {freedoms} coordinates"
-        )
+    """Return poses (N, 6), errors (N, m) [m], where there is a rest (N,), and covariances (N, 6, 6)."""
     near = starts
     if near is None:
         near = problem.descend_from_afar(lengths, 1.0 / sigma, np.tile(problem.home, (len(lengths), 1)))[0]
