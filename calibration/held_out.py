@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..models.robot import Robot
+from .clock import CLOCK_RANGE
 from .fit import fit
 from .measurements import Measurements
 from .model import Model, State
@@ -27,6 +28,7 @@ SHORTEST = 4  # samples of a block; of fewer, every other sample is left out
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
+LIKELY = 0.9 * CLOCK_RANGE  # a clock offset at the end of the range has no minimum inside
 NESTED: tuple[tuple[str, ...], ...] = (
     ("offsets",),
     ("anchors",),
@@ -124,8 +126,9 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     first = [one for one in sets if set(one) <= CLEANED and _enough(robot, measurements, one)][-1]
     solved = solve(robot, measurements, first, {}, outliers)
     clock = float(solved.fit.state.x[solved.model.parameters.clock])
-    if "clock" in first and abs(clock) < CERTAIN * _clock_sigma(solved):
-        # Poses between samples have less noise than at them: a clock offset seems to help where there is none.
+    sure = CERTAIN * _clock_sigma(solved) < abs(clock) < LIKELY if "clock" in first else False
+    if "clock" in first and not sure:
+        # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
         sets, clock = [one[:-1] for one in sets], 0.0
     return _compare(robot, *cleaned(solved), sets, {}, clock).best
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 __all__ = ["report"]
 
 MOST_LISTED = 12
+MOST_NAMED = 4
+LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than
 HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
 
 
@@ -104,7 +106,17 @@ def _of_exceptions(result: Calibration) -> list[str]:
 
 def _of_open(result: Calibration) -> list[str]:
     texts = result.not_identifiable
+    loose = [one.name for one in result.parameters if one.unit == "m" and LOOSE < one.sigma < np.inf]
+    if loose:
+        names = ", ".join(loose[:MOST_NAMED]) + (
+            f" and {len(loose) - MOST_NAMED} more" if len(loose) > MOST_NAMED else ""
+        )
+        return [f"  hardly determined: {names}; measure other poses, or give a prior", *_directions(texts)]
+    return _directions(texts)
+
+
+def _directions(texts: tuple[str, ...]) -> list[str]:
     if not texts:
-        return ["  the measurements determine all of these parameters"]
+        return ["  no direction of the parameters is open"]
     lines = [f"  the measurements leave {len(texts)} directions open, along which the file's values are kept:"]
     return lines + [f"    {text}" for text in texts]

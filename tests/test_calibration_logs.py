@@ -217,7 +217,7 @@ def test_the_command_writes_a_robot_file(built, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert "residual of the lengths" in done.stdout
-    assert "determine all of these parameters" in done.stdout
+    assert "no direction of the parameters is open" in done.stdout
     assert (tmp_path / "mine.yaml").exists()
 
 
