@@ -76,7 +76,7 @@ class Spread:
     Raises
     ------
     InputError
-        If the robot has no uncertainty.
+        If the robot has no uncertainty, or fewer cables than rows.
     """
 
     def __init__(self, robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, rows: np.ndarray | None = None):
@@ -88,7 +88,7 @@ class Spread:
         A = wrench_matrices(robot, pose, carrier_pose)[:, rows] * scale[:, None]
         D, self._cables = derivatives(robot, pose, carrier_pose, uncertainty.parameters)
         self._D = D[:, rows] * scale[:, None]  # (n, rows, p)
-        self._inverse = np.linalg.pinv(A, rcond=RANK)  # (n, m, rows)
+        self._inverse = _inverse(A)  # (n, m, rows)
         self._factor = uncertainty.factor  # (p, r)
 
     def changes(self, tensions: np.ndarray) -> np.ndarray:
@@ -106,6 +106,19 @@ class Spread:
         part._cables, part._factor = self._cables, self._factor
         part._D, part._inverse = self._D[rows], self._inverse[rows]
         return part
+
+
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """Return the inverse of least norm of matrices (n, rows, m), (n, m, rows).
+
+    What the cables do not span takes huge tensions, instead of none as in a pseudo-inverse: other robots need wrenches
+    there.
+    """
+    U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
+    if A.shape[1] > A.shape[2]:
+        raise InputError(f"robust must be left out for {A.shape[2]} cables and {A.shape[1]} wrench rows")
+    held = np.maximum(sigma, RANK * np.maximum(sigma[:, :1], np.finfo(float).tiny))
+    return (Vt.swapaxes(1, 2) / held[:, None]) @ U.swapaxes(1, 2)
 
 
 def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray:

@@ -105,6 +105,8 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
     sigmas
         (m,) [m] by kind, such as "anchor x"; inf where the measurements leave a parameter open, nan where it is fixed.
     """
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     canvas = style.figure(6.4, 4.0)
     ax = style.axes(canvas, "cable", "standard deviation [mm]")
     every = np.concatenate([np.asarray(values, dtype=float) for values in sigmas.values()])
@@ -121,7 +123,9 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
             at[np.isinf(values)], np.full(np.isinf(values).sum(), beyond), markersize=5, fillstyle="none", **style_of
         )
     ax.set_yscale("log")
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_ylim(low / 2, (2 * beyond) if opened else 2 * high)
     if opened:
         style.limit_line(ax, beyond / 1.6, "above this line: not determined", above=True)

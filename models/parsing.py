@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import io
+import os
 import re
 import stat
 import warnings
@@ -18,7 +19,8 @@ from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.scanner import Scanner, ScannerError
 
 from ..errors import InputError
-from ..inputs import LONGEST_TEXT, printable, shown
+from ..inputs import LONGEST_TEXT, file_path, printable, shown
+from ..writing import whole_file
 from .schema import json_schema
 
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
@@ -35,6 +37,20 @@ def to_yaml(model: BaseModel) -> str:
     yaml.width = 120
     yaml.dump(model.model_dump(mode="json", exclude_none=True), stream)
     return stream.getvalue()
+
+
+def save_yaml(model: BaseModel, file: str | os.PathLike[str]) -> Path:
+    """Save the YAML text of a model, whole or not at all, and return the path.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    path = file_path("file", file)
+    with whole_file(path) as temporary:
+        temporary.write_text(to_yaml(model), encoding="utf-8")
+    return path
 
 
 def read_yaml(path: Path, model: type[Model]) -> Model:

@@ -15,8 +15,6 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from ..errors import InputError
-from ..inputs import file_path, whole_number
 from . import parameters, points
 from .carriers import AnyCarrier
 from .part import (
@@ -32,7 +30,7 @@ from .part import (
     Vector3,
     inertia_matrix,
 )
-from .uncertainty import Uncertainty
+from .uncertainty import Uncertainty, draw
 
 # Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
 # or with fewer axes, the reactions of what is locked would enter them.
@@ -278,14 +276,7 @@ class Robot(Part):
         InputError
             If the robot has no uncertainty, an argument is wrong, or so large an error is drawn that no robot has it.
         """
-        whole_number("count", count, 1, 1_000_000)
-        whole_number("seed", seed, 0, 2**63 - 1)
-        if self.uncertainty is None:
-            raise InputError("robot.uncertainty must be given to draw robots from it, got none")
-        names = self.uncertainty.parameters
-        exact = self.model_copy(update={"uncertainty": None})
-        numbers = self.parameter_values(names) + self.uncertainty.errors(count, seed)
-        return tuple(exact.with_parameters(dict(zip(names, row.tolist(), strict=True))) for row in numbers)
+        return draw(self, count, seed)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the robot as a robot file, whole or not at all; `load` reads an equal robot from it.
@@ -295,13 +286,9 @@ class Robot(Part):
         InputError
             If the file cannot be written.
         """
-        from ..writing import whole_file
-        from .parsing import to_yaml
+        from .parsing import save_yaml
 
-        path = file_path("file", file)
-        with whole_file(path) as temporary:
-            temporary.write_text(to_yaml(self), encoding="utf-8")
-        return path
+        return save_yaml(self, file)
 
     @property
     def m(self) -> int:

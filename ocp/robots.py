@@ -171,6 +171,8 @@ def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin, row: int, cabl
     below = value - reach < low[row, cable]
     bound = float(low[row, cable] + reach if below else high[cable] - reach)
     why = f"{quantity(100 * margin.share, '%')} of the robots differ by up to {quantity(reach, 'N')}"
+    if reach > high[cable]:
+        why += ", since the cables hardly resist some direction"
     side = "at least" if below else "at most"
     return Excess("tension", f"cable {cable + 1}", float(audit.times[row]), value, bound, "N", side, why)
 

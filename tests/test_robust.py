@@ -186,6 +186,18 @@ def test_no_plan_is_an_answer(tmp_path):
     assert turned.share_of_robots(seed=7).share >= 0.95
 
 
+def test_a_pose_that_only_the_exact_robot_can_hold_is_no_plan_for_others():
+    """Six cables of equal geometry span five directions at home: other robots need a wrench there, however small."""
+    robot = known("wang-ctmrts-6", 0.005)
+    rest = {"path": {"kind": "rest", "pose": robot.home.tolist()}, "duration": 0.5}
+    exact = plan(robot, rest)
+    assert exact.feasible
+    assert exact.share_of_robots(count=50).share < 0.5
+    found = plan(robot, rest, robust=0.95)
+    assert found.status.value == "not-found"
+    assert "since the cables hardly resist some direction" in str(found.audit.excess[0])
+
+
 def test_the_command_plans_for_robots(tmp_path):
     known("cogiro", 0.01).save(tmp_path / "mine.yaml")
     task = {"path": {"kind": "rest", "pose": [0, 0, 2, 0, 0, 0]}, "duration": 0.5}

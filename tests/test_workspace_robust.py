@@ -116,6 +116,8 @@ def test_wrong_shares_and_robots_are_one_line(tmp_path):
         sample(load("cogiro"), StaticEquilibrium(), samples=20, robust=0.95)
     with pytest.raises(InputError, match=r"robust must be None for a condition without tension limits, got 0\.95"):
         sample(robot, Lengths(max=9) & WrenchClosure(), samples=20, robust=0.95)
+    with pytest.raises(InputError, match=r"robust must be left out for 3 cables and 6 wrench rows"):
+        sample(known("wang-ctmrts", 0.01), StaticEquilibrium(), samples=20, robust=0.95)
     with pytest.raises(InputError, match=r"robust must be less than 1, got 2"):
         StaticEquilibrium(robust=2)
     robot.save(tmp_path / "mine.yaml")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import InputError
 from ..models import Robot
 from ..robust import Spread, check_share, ellipsoid_factor, uncertainty_of
 from ..solvers import solve_batch
@@ -38,11 +39,13 @@ class Tightened:
     Raises
     ------
     InputError
-        If the robot has no uncertainty, or the share is none.
+        If the robot has no uncertainty, or fewer cables than rows, or the share is none.
     """
 
     def __init__(self, robot: Robot, share: float, rows: np.ndarray):
         check_share(robot, share)
+        if robot.m < rows.size:
+            raise InputError(f"robust must be left out for {robot.m} cables and {rows.size} wrench rows, got {share:g}")
         self._robot, self._rows = robot, rows
         self._factor = ellipsoid_factor(uncertainty_of(robot), share)
 
