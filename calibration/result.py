@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..inputs import real_array
+from ..inputs import file_path, real_array
 from ..models.robot import Robot
 from . import rotations
 from .outliers import Outlier, Slip
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from .held_out import HeldOut
+    from .measurements import Measurements
     from .run import Solved
 
 __all__ = ["Calibration", "Parameter"]
@@ -60,6 +63,16 @@ class Calibration:
     def converged(self) -> bool:
         """Return whether no other values near these fit notably better."""
         return self._solved.fit.converged
+
+    @property
+    def file(self) -> Robot:
+        """Return the robot of the file, from which the calibration began."""
+        return self._solved.model.robot
+
+    @property
+    def measurements(self) -> Measurements:
+        """Return the measurements."""
+        return self._solved.model.measurements
 
     @cached_property
     def robot(self) -> Robot:
@@ -248,6 +261,28 @@ class Calibration:
             If the file cannot be written.
         """
         return self.robot.save(path)
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw residuals before and after, anchors with ellipsoids, and standard deviations: by name, to show or save.
+
+        Anchors are drawn if the measurements determine all of them.
+        """
+        from .drawings import drawings
+
+        return drawings(self)
+
+    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Save the figures as PNG files in `folder`, and return their paths.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written.
+        """
+        from ..figures import style
+
+        into = file_path("folder", folder)
+        return [style.save(drawn, into / f"{name}.png") for name, drawn in self.figures().items()]
 
     def report(self) -> str:
         """Return the result as text, for people."""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ..errors import InputError
 from .options import JsonOption, RobotArgument, print_json, print_written
-
-if TYPE_CHECKING:
-    from ..calibration import Calibration
 
 SIGMA_KEYS = "lengths, position, rotation"
 
@@ -55,6 +52,10 @@ def calibrate(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE.yaml", help="Default: ROBOT-calibrated.yaml here.")
     ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option("--figures", metavar="FOLDER", help="Folder to draw in: residuals, anchors, observability."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find a robot's anchors, offsets and more from measured cable lengths, and write it as a robot file.
@@ -72,22 +73,21 @@ def calibrate(
     known = None if prior is None else _by_name("--prior", prior)
     loaded = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
+    if figures is not None:
+        check_writable(figures / "residuals.png")
     if check_writable(target) == log.resolve():
         raise InputError(f"--out must be another file than the log, got {target}")
     measurements = read_measurements(log, stated)
     result = find(loaded, measurements, "auto" if groups == ["auto"] else groups, known, outliers)
     file = result.save(target)
-    _show(result, file, as_json)
+    pictures = [] if figures is None else result.plot(figures)
+    if as_json:
+        print_json({**result.to_dict(), "file": file, "figures": pictures})
+    else:
+        typer.echo(result.report())
+        print_written([file, *pictures])
     if not result.converged:
         raise typer.Exit(1)
-
-
-def _show(result: Calibration, file: Path, as_json: bool) -> None:
-    if as_json:
-        print_json({**result.to_dict(), "file": file})
-        return
-    typer.echo(result.report())
-    print_written([file])
 
 
 def _sigma(text: str) -> Any:

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from matplotlib.patches import Ellipse
 
+from towline import Measurements, calibrate
 from towline.figures.calibration import WITHIN_95, anchors, observability, residuals
+
+from .robots_as_built import as_built
 
 RNG = np.random.default_rng(0)
 
@@ -50,3 +53,22 @@ def test_what_is_not_determined_is_drawn_apart():
     assert opened.get_xdata()[0] == pytest.approx(2, abs=0.4)
     (ax,) = observability({"offset": np.full(3, np.inf)}).axes
     assert any(len(line.get_xdata()) == 3 for line in ax.lines)
+
+
+def test_a_calibration_draws_its_own_numbers(tmp_path):
+    built = as_built(40, 3)
+    result = calibrate("cogiro", built.measurements(), free=("anchors", "offsets"))
+    drawn = result.figures()
+    assert list(drawn) == ["residuals", "anchors", "observability"]
+    assert f"{1e3 * result.residual_after:.3g} mm" in drawn["residuals"].axes[1].get_title(loc="left")
+    values = {parameter.name: parameter for parameter in result.parameters}
+    moved = [1e3 * values[f"cables[2].anchor.{axis}"].correction for axis in "xyz"]
+    centres = [line.get_xydata()[0] for line in drawn["anchors"].axes[2].lines if "found" in str(line.get_label())]
+    np.testing.assert_allclose(centres, [[moved[0], moved[1]], [moved[0], moved[2]]], atol=1e-9)
+    (ax,) = drawn["observability"].axes
+    (offsets,) = [line for line in ax.lines if line.get_label() == "offset"]
+    np.testing.assert_allclose(offsets.get_ydata(), [1e3 * values[f"cables[{i}].offset"].sigma for i in range(8)])
+    assert [path.name for path in result.plot(tmp_path / "new")] == [f"{name}.png" for name in drawn]
+    assert all((tmp_path / "new" / f"{name}.png").stat().st_size > 5000 for name in drawn)
+    blind = calibrate("cogiro", Measurements(built.readings), free=("anchors",))
+    assert "anchors" not in blind.figures()  # they are open: they have no ellipsoids

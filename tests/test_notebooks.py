@@ -31,7 +31,8 @@ def verdicts(notebook):
 
 def test_they_are_all_there():
     names = ["quickstart", "flying_cdpr", "ctmrts", "tension_distribution", "trajectory_planning", "qp_benchmark"]
-    wanted = [f"{index:02d}_{name}" for index, name in enumerate([*names, "multi_quadrotor", "closed_loop"], start=1)]
+    names += ["multi_quadrotor", "closed_loop", "robot_as_built"]
+    wanted = [f"{index:02d}_{name}" for index, name in enumerate(names, start=1)]
     assert [path.stem for path in NOTEBOOKS] == wanted
 
 
@@ -67,7 +68,8 @@ def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_uses_the_public_interface(path):
     """Notebooks import the front door, and modules that the README names; they store nothing of this machine."""
-    allowed = {"towline", "towline.control", "towline.models.statics", "towline.solvers", "towline.workspace"}
+    packages = ("control", "models", "models.statics", "solvers", "workspace")
+    allowed = {"towline", *(f"towline.{package}" for package in packages)}
     text = path.read_text()
     assert set(re.findall(r"from (towline[\w.]*) import", text)) <= allowed
     assert not re.search(r"/home/|/tmp/|site-packages|Traceback", text)
