@@ -61,7 +61,7 @@ class PoseEstimate:
         self.ambiguous, self.by_gravity, self._covariance = ambiguous, by_gravity, covariance
 
     def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
-        """Return N estimates with other leading dimensions, and their carriers as they were given."""
+        """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
 
         def shaped(array: Any) -> Any:
             return array if array is None or np.ndim(array) == 0 else array.reshape((*batch, *array.shape[1:]))
