@@ -181,16 +181,18 @@ def _numbered(columns: Mapping[str, _Column], prefix: str) -> np.ndarray | None:
 
 
 def _from_netcdf(content: bytes) -> dict[str, Any]:
-    import h5netcdf
+    import h5py
 
     try:
-        with h5netcdf.File(io.BytesIO(content), "r") as file:
+        # NetCDF 4 is HDF5. Of a damaged file, h5netcdf would complain once more on standard error when it is forgotten.
+        with h5py.File(io.BytesIO(content), "r") as file:
             arrays = {
-                name: (np.asarray(variable[...]), dict(variable.attrs))
-                for name, variable in file.variables.items()
-                if np.dtype(variable.dtype).kind in "fiu"
+                str(name): (np.asarray(variable[...]), _attributes(variable))
+                for name, variable in file.items()
+                if isinstance(variable, h5py.Dataset) and variable.dtype.kind in "fiu"
             }
-            stated = {name: file.attrs[f"sigma_{name}"] for name in Sigma._fields if f"sigma_{name}" in file.attrs}
+            known = _attributes(file)
+            stated = {name: known[f"sigma_{name}"] for name in Sigma._fields if f"sigma_{name}" in known}
     except Exception as error:  # h5py raises of any kind for damaged files
         raise InputError(
             f"must be a NetCDF 4 file, got one that cannot be read ({printable(str(error), 80)})"
@@ -210,13 +212,24 @@ def _from_netcdf(content: bytes) -> dict[str, Any]:
     return _from_columns(columns)
 
 
+def _attributes(of: Any) -> dict[str, Any]:
+    """Return the texts and single numbers among the attributes of a file or a variable."""
+    result: dict[str, Any] = {}
+    for name in of.attrs:
+        if name == "units" or name.startswith("sigma_"):
+            value = np.asarray(of.attrs[name]).ravel()
+            text = value[0] if value.size == 1 else ""
+            result[name] = text.decode("utf-8") if isinstance(text, bytes) else text
+    return result
+
+
 def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], stated: dict[str, Any]) -> dict[str, Any]:
     """Return the arguments of `Measurements` from a file of it or of a flight, which has no standard deviations.
 
     Lengths of a flight are those under tension, so its tensions are left out.
     """
     known = {"cable_lengths": ("lengths", LENGTHS), "tensions": ("tensions", FORCES), "time": ("times", TIMES)}
-    result: dict[str, Any] = {"sigma": {name: float(value) for name, value in stated.items()}} if stated else {}
+    result: dict[str, Any] = {"sigma": dict(stated)} if stated else {}
     for name, (argument, units) in known.items():
         if name not in arrays or (name == "tensions" and not stated):
             continue
