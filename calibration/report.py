@@ -72,7 +72,7 @@ def _of_noise(result: Calibration) -> list[str]:
 
 
 def _of_parameters(result: Calibration) -> list[str]:
-    lines = ["  found, with standard deviations, and change from the file:"]
+    lines = ["  parameters, with standard deviations and their change from the file:"]
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (1e3 if one.unit == "m" else 1))
     shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
     lines += [f"    {_one(one)}" for one in result.parameters if one.name in shown]
@@ -90,8 +90,8 @@ def _one(one: Parameter) -> str:
 
 def _of_exceptions(result: Calibration) -> list[str]:
     lines = [
-        f"  winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(slip.size)} longer than its "
-        f"reading (+- {_mm(slip.sigma)})"
+        f"  winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(abs(slip.size))} "
+        f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip in result.slips
     ]
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))

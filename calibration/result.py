@@ -76,13 +76,13 @@ class Calibration:
 
     @cached_property
     def robot(self) -> Robot:
-        """Return the robot with the parameters found, encoders included, and its uncertainty."""
+        """Return the robot with the calibrated parameters, its encoders, and its uncertainty."""
         parameters, x = self._solved.model.parameters, self._solved.fit.state.x
         return parameters.calibrated(x, self.covariance if np.isfinite(self.noise) else None)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return the parameters found, slips included."""
+        """Return the calibrated parameters, slips included."""
         of, x = self._solved.model.parameters, self._solved.fit.state.x
         where = np.flatnonzero(of.varies)
         sigmas = np.sqrt(np.diag(self.covariance))
@@ -161,7 +161,7 @@ class Calibration:
 
     @cached_property
     def residuals(self) -> np.ndarray:
-        """Return the residuals of the lengths with the parameters found, (N, m) [m], wrong readings included."""
+        """Return the residuals of the lengths of the calibrated robot, (N, m) [m], wrong readings included."""
         from .run import lengths_of
 
         return lengths_of(self._solved.model, self._solved.fit.state)

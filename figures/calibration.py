@@ -56,9 +56,9 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
     Parameters
     ----------
     file, found
-        Anchors of the file and those found, (m, 3) each [m].
+        Anchors of the file and calibrated ones, (m, 3) each [m].
     covariances
-        Of those found, (m, 3, 3) [m^2].
+        Of the calibrated ones, (m, 3, 3) [m^2].
     true
         Where the anchors are, if that is known, as in a simulation, (m, 3) [m].
     """
@@ -80,7 +80,7 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
             sizes = 2e3 * WITHIN_95 * np.sqrt(np.maximum(values, 0.0))
             angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
             shade, centre = style.colour(index), (float(place[0]), float(place[up]))
-            label = f"found, {'xyz'[up]} against x, with 95 %"
+            label = f"calibrated, {'xyz'[up]} over x, 95 % ellipse"
             ax.plot(*centre, ".", color=shade, markersize=4, label=label)
             ax.add_patch(Ellipse(centre, sizes[1], sizes[0], angle=angle, facecolor=shade, alpha=0.35))
             if true is not None:
