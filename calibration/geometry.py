@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..models.cables.sheaves import sheaves
+
 __all__ = ["Runs", "runs"]
 
 
@@ -56,18 +58,7 @@ def runs(anchors: np.ndarray, axes: np.ndarray, radii: np.ndarray, attachments: 
     with np.errstate(invalid="ignore", divide="ignore"):
         directions = offset / lengths[..., None]
         if over.size:
-            lengths[over], directions[over], d_radius[over] = _over_sheaves(offset[over], axes[over], radii[over])
+            run = sheaves(offset[over], axes[over, None], radii[over, None])
+            lengths[over] = radii[over, None] * run.wrap + run.straight
+            directions[over], d_radius[over] = run.along, run.wrap - np.sin(run.wrap)
     return Runs(lengths, directions, d_radius)
-
-
-def _over_sheaves(offset: np.ndarray, axes: np.ndarray, radii: np.ndarray) -> Runs:
-    r, k = radii[:, None], axes[:, None]
-    up = np.einsum("mni,mi->mn", offset, axes)
-    across = offset - up[..., None] * k
-    distance = np.linalg.norm(across, axis=-1)
-    e = across / distance[..., None]
-    out = distance - r
-    s = np.sqrt(distance**2 - 2 * distance * r + up**2)
-    wrap = np.pi - np.arctan2(s, r) - np.arctan2(up, out)
-    direction = np.sin(wrap)[..., None] * e + np.cos(wrap)[..., None] * k
-    return Runs(r * wrap + s, direction, wrap - np.sin(wrap))

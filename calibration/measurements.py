@@ -13,7 +13,7 @@ from ..inputs import number, real_array, required, shown
 from ..models import points
 from ..models.part import LARGEST
 from ..models.robot import Robot
-from .rotations import angles_of, from_quaternions
+from .rotations import from_quaternions
 
 if TYPE_CHECKING:
     import os
@@ -220,7 +220,7 @@ def _angles(orientations: Any, count: int) -> np.ndarray:
             f"orientations must be quaternions of length 1, got {shown(array[row].tolist())} at sample {row}"
         )
     result = np.full((count, 3), np.nan)
-    result[known] = angles_of(from_quaternions(array[known]))
+    result[known] = points.angles(from_quaternions(array[known]))
     return result
 
 

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..models import points
 from .fit import fit, held
 from .measurements import Measurements
 from .model import Derivatives, Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import Parameters
 from .products import onto
-from .rotations import angles_of
 
 __all__ = ["Outlier", "Slip", "alike", "find_outliers", "find_slip"]
 
@@ -137,7 +137,7 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
     for (cable, first), size in zip(model.parameters.slips, state.x[parameters.clock + 1 :], strict=True):
         lengths[cable] += size / table[cable, 7] * (sample >= first)
     position, rotation = model.poses(state)
-    pose = np.concatenate([position[sample], angles_of(rotation[sample])])
+    pose = np.concatenate([position[sample], points.angles(rotation[sample])])
     given = model.measurements.poses
     copies = Measurements(
         np.tile(lengths, (m, 1)),

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..inputs import file_path, real_array
+from ..models import points
 from ..models.robot import Robot
-from . import rotations
 from .outliers import Outlier, Slip
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class Calibration:
     def poses(self) -> np.ndarray:
         """Return the poses of the platform at the times of the lengths, (N, 6) [m, rad], measured or found."""
         position, rotation = self._solved.model.poses(self._solved.fit.state)
-        return np.hstack([position, rotations.angles_of(rotation)])
+        return np.hstack([position, points.angles(rotation)])
 
     @property
     def outliers(self) -> tuple[Outlier, ...]:

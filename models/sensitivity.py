@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import points
+from .cables.sheaves import sheaves
 from .parameters import locate
 from .robot import Robot
 
@@ -76,19 +77,12 @@ def columns(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray) -> Columns
 
 def _over_sheave(offset: np.ndarray, axes: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return t (n, k, 3) and its derivatives by the attachment and by the radius, of cables over pulleys."""
-    up = np.sum(offset * axes, axis=2)  # d . k
-    across = offset - up[..., None] * axes
-    distance = np.linalg.norm(across, axis=2)  # rho
-    e = across / distance[..., None]
-    out = distance - radii  # d . e
-    straight = np.sqrt(distance**2 - 2 * distance * radii + up**2)  # s
-    wrap = np.pi - np.arctan2(straight, radii) - np.arctan2(up, out)
-    sin, cos = np.sin(wrap)[..., None], np.cos(wrap)[..., None]
-    along = sin * e + cos * axes
+    run = sheaves(offset, axes, radii)
+    e, sin, cos = run.e, np.sin(run.wrap)[..., None], np.cos(run.wrap)[..., None]
     n, f = cos * e - sin * axes, np.cross(axes, e)
-    turning = n[..., :, None] * n[..., None, :] / straight[..., None, None]
-    turning += (sin / distance[..., None])[..., None] * f[..., :, None] * f[..., None, :]
-    return along, turning, (1 - cos) / straight[..., None] * n
+    turning = n[..., :, None] * n[..., None, :] / run.straight[..., None, None]
+    turning += (sin / run.distance[..., None])[..., None] * f[..., :, None] * f[..., None, :]
+    return run.along, turning, (1 - cos) / run.straight[..., None] * n
 
 
 def derivatives(
