@@ -62,16 +62,16 @@ class PoseEstimate:
 
     def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
         """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
-
-        def shaped(array: Any) -> Any:
-            return array if array is None or np.ndim(array) == 0 else array.reshape((*batch, *array.shape[1:]))
-
-        parts = [shaped(part) for part in (self.pose, self.residuals, self.converged, self.ambiguous, self.by_gravity)]
-        if not batch:
-            parts[2:] = [None if part is None else bool(part) for part in parts[2:]]
-        pose, residuals, converged, ambiguous, by_gravity = parts
+        parts = self.pose, self.residuals, self.converged, self.ambiguous, self.by_gravity, self._covariance
+        if batch:
+            shaped = [p.reshape((*batch, *p.shape[1:])) if isinstance(p, np.ndarray) else p for p in parts]
+        else:
+            shaped = [p[0] if isinstance(p, np.ndarray) else p for p in parts]
+            shaped[2:5] = [None if p is None else bool(p) for p in shaped[2:5]]
+        pose, residuals, *verdicts, covariance = shaped
+        converged, ambiguous, by_gravity = verdicts
         given = (self.robot, pose, residuals, converged, self.sigma, carrier_pose, ambiguous, by_gravity)
-        return PoseEstimate(*given, shaped(self._covariance))
+        return PoseEstimate(*given, covariance)
 
     @property
     def residual(self) -> Any:

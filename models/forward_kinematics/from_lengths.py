@@ -65,7 +65,8 @@ def pose_from_lengths(
     if start is not None:
         start = as_array("start", start, (6,))
         shapes["start"] = start.shape[:-1]
-    batch = next(iter(shapes.values())) if len(set(shapes.values())) == 1 else leading(shapes)
+    first, *others = shapes.values()
+    batch = first if all(other == first for other in others) else leading(shapes)
     rows = _rows(lengths, batch, 1)
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
     problem = problem_of(robot, each)
@@ -101,7 +102,8 @@ def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
     array = as_array("lengths", lengths, (robot.m,))
     if not array.min(initial=np.inf) > 0.0:
         raise InputError(f"lengths must be numbers > 0 [m], got {array.min():g}")
-    if not array.max(initial=0.0) <= LARGEST:
+    # No number is larger than the root of the sum of squares.
+    if not np.vdot(array, array) <= LARGEST**2 and not array.max() <= LARGEST:
         raise InputError(f"lengths must be numbers up to {LARGEST:g} [m], got {array.max():g}")
     return array
 

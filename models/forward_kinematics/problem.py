@@ -100,7 +100,7 @@ class Problem(NamedTuple):
             rest = moved[slow], errors[slow], info[slow]
             self.of(slow)._run(lengths[slow], *how, STEPS, *rest)
             moved[slow], errors[slow], info[slow] = rest
-        if not free[3:].all():
+        if self.freedoms < 6 or free is not self.free:
             _keep_locked(moved, poses, free[3:] > 0.0)
         return moved, errors, info[:, 0] > 0.0
 
@@ -141,11 +141,18 @@ class Problem(NamedTuple):
 
 def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:
     """Return the problem of a robot with its carriers at home, or at (c, 6) or (N, c, 6)."""
-    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
-    problem = _at_home(key)
+    global _last
+    known, problem = _last
+    if known is not robot or problem is None:  # the hash of a robot takes a sixth of a call of a stream
+        key: Any = robot  # frozen, so it has a hash, unknown to a type checker
+        problem = _at_home(key)
+        _last = robot, problem
     if carrier_pose is None:
         return problem
     return problem._replace(geometry=_geometry(robot, carrier_pose.reshape(-1, *robot.carrier_home.shape)))
+
+
+_last: tuple[Robot | None, Problem | None] = (None, None)
 
 
 @lru_cache(maxsize=16)
