@@ -36,6 +36,13 @@ RobotArgument = Annotated[
     str,
     typer.Argument(metavar="ROBOT", help="A robot of the library, or a robot file (YAML).", autocompletion=robot_names),
 ]
+CarrierPoseOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="'six numbers; ...'",
+        help="Pose of each carrier in {G} [m, rad], separated by ';'; default: their homes.",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import JsonOption, RobotArgument, numbers, print_json, print_table
+from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, print_json, print_table
 
 if TYPE_CHECKING:
     from ..models import PoseEstimate, Robot
@@ -23,13 +23,7 @@ def pose(
         str | None,
         typer.Option(metavar=f"'{SIX}'", help="Pose to start from [m, rad]; default: a search that needs none."),
     ] = None,
-    carrier_pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="'six numbers; ...'",
-            help="Pose of each carrier in {G} [m, rad], separated by ';'; default: their homes.",
-        ),
-    ] = None,
+    carrier_pose: CarrierPoseOption = None,
     sigma: Annotated[
         str, typer.Option(metavar="S", help="Standard deviation of the lengths [m], one or one for each cable.")
     ] = "0.001",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import JsonOption, RobotArgument, numbers, print_json, print_table
+from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, print_json, print_table
 
 if TYPE_CHECKING:
     from ..models import Robot
@@ -32,13 +32,7 @@ def tension(
     acceleration: Annotated[
         str | None, typer.Option(metavar="'six numbers'", help="Second time derivative of the pose; default: zero.")
     ] = None,
-    carrier_pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="'six numbers; ...'",
-            help="Pose of each carrier in {G} [m, rad], separated by ';'; default: their homes.",
-        ),
-    ] = None,
+    carrier_pose: CarrierPoseOption = None,
     wind: Annotated[
         str | None,
         typer.Option(

@@ -70,7 +70,7 @@ def test_exact_lengths_give_the_pose_to_a_nanometre(name):
 
 
 def test_a_pose_that_another_one_hides_is_among_its_branches():
-    """Of nist-robocrane, poses beyond its workspace: most have several poses with the same lengths."""
+    """List all poses that share lengths: beyond its workspace most poses of nist-robocrane have others."""
     robot = load("nist-robocrane")
     rng = np.random.default_rng(5)
     for _ in range(8):
@@ -236,7 +236,7 @@ def test_an_angle_beyond_a_quarter_turn_leaves_the_others_at_home():
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9])
 def test_upright_roll_and_yaw_are_those_of_one_attitude(pitch):
-    """Where the nose points up only their difference is known; each has errors of its own."""
+    """Return the attitude itself: where the nose points up only the difference of roll and yaw is known."""
     robot = load("ipanema-2")
     pose = np.array([0.1, 0.2, 3, 0.3, pitch, 0.7])
     lengths = dynamics_of(robot).cable_lengths(pose)

@@ -41,7 +41,7 @@ def test_robots_are_changed_by_name():
 
 
 def test_drawn_robots_have_the_covariance():
-    """Of 4000 draws each variance is within 10 % with near certainty: its relative deviation is sqrt(2 / 4000)."""
+    """Compare variances of 4000 draws, whose relative deviation is sqrt(2 / 4000), within 10 %."""
     robot = known()
     drawn = robot.drawn(4000, seed=3)
     errors = np.array([one.parameter_values(NAMES) for one in drawn]) - robot.parameter_values(NAMES)

@@ -95,7 +95,7 @@ def test_every_condition_about_tension_limits_takes_it():
 
 
 def test_wrench_feasible_for_robots_is_so_for_each_of_its_wrenches():
-    """Of a convex set the corners decide for the robots too: random wrenches inside it hold for each drawn robot."""
+    """Draw wrenches inside a convex set whose corners decide: they hold for each drawn robot."""
     robot = known("cogiro", 0.01, t_max=600.0)
     low, high = np.array([-40, -40, -40, 0, 0, 0]), np.array([40, 40, 40, 0, 0, 0])
     condition = WrenchFeasible(box=(tuple(low), tuple(high)), robust=0.95)

@@ -149,6 +149,7 @@ def descend(m, radii, weights, free, scale, smallest, first, steps, W):
             turned = turned + load(W, STEP + 3 + k) * load(W, STEP + 3 + k)
         size = sqrt(moved + scale * scale * turned)
         ratio = where(before > 0.0, minimum(size / maximum(before, splat(1e-300)), one), one)
+        slow = (before > 0.0) & (ratio > _SLOW) & (size <= _NEAR * scale)  # a first step has none before it
         final = good & (size * ratio <= smallest)
         move_trial(W)
         trial = cost
@@ -174,7 +175,7 @@ def descend(m, radii, weights, free, scale, smallest, first, steps, W):
         going = (rejected | better) & (damping <= _MOST)
         if not any_of(going):
             break
-        slow = going & (ratio > _SLOW) & (size <= _NEAR * scale)
+        slow = slow & going
         fresh = any_of(going & ((damping > 0.0) | (size > _NEAR * scale) | slow))
         curved = any_of(slow) or curved
     end_with(zero > 0.0, ended <= 0.0, now, m, W)
