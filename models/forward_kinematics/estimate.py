@@ -63,13 +63,13 @@ class PoseEstimate:
     def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
         """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
         parts = self.pose, self.residuals, self.converged, self.ambiguous, self.by_gravity, self._covariance
+        shaped: list[Any]
         if batch:
             shaped = [p.reshape((*batch, *p.shape[1:])) if isinstance(p, np.ndarray) else p for p in parts]
         else:
             shaped = [p[0] if isinstance(p, np.ndarray) else p for p in parts]
             shaped[2:5] = [None if p is None else bool(p) for p in shaped[2:5]]
-        pose, residuals, *verdicts, covariance = shaped
-        converged, ambiguous, by_gravity = verdicts
+        pose, residuals, converged, ambiguous, by_gravity, covariance = shaped
         given = (self.robot, pose, residuals, converged, self.sigma, carrier_pose, ambiguous, by_gravity)
         return PoseEstimate(*given, covariance)
 
