@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, ncx2
 
 from towline import InputError, Robot, load, solve_batch
-from towline.models import PoseTracker, branches, points, pose_from_lengths
+from towline.models import PoseTracker, branches, points, pose_from_lengths, statics
 from towline.models.dynamics import dynamics_of
 from towline.models.forward_kinematics import descent, machine
 from towline.models.forward_kinematics.estimate import gradient, moved
@@ -458,3 +458,45 @@ def test_the_curvature_is_that_of_the_lengths(name):
             a, b = h * np.eye(6)[j] * robot.dof_mask, h * np.eye(6)[k] * robot.dof_mask
             expected[j, k] = weighted(a + b) - weighted(a - b) - weighted(b - a) + weighted(-a - b)
     np.testing.assert_allclose(H, expected / (4 * h * h), atol=2e-6 * max(np.abs(H).max(), 1))
+
+
+def test_poses_above_the_anchors_cannot_be_held():
+    """Six cables that only pull hold a weight below their anchors, not above them."""
+    robot = load("nist-robocrane")
+    listed = branches(robot, dynamics_of(robot).cable_lengths(robot.home))
+    above = [one for one in listed if one.pose[2] > robot.home_anchors[:, 2].max()]
+    assert above
+    assert not any(one.taut for one in above)
+    assert listed[0].taut
+    np.testing.assert_allclose(listed[0].pose, robot.home, atol=1e-9)
+
+
+def test_rests_take_a_few_newton_steps(monkeypatch):
+    """With the right derivative eight steps suffice, where the search by energy is not available."""
+    robot = load("multi-quadrotor-4")
+    lengths = dynamics_of(robot).cable_lengths(robot.home) + np.array([0.02, -0.03, 0.0, 0.02])
+    expected = pose_from_lengths(robot, lengths)
+    monkeypatch.setattr(statics, "NEWTON", 8)
+    monkeypatch.setattr(statics, "_descend", lambda *_: None)
+    start = expected.pose + np.array([0.01, -0.01, 0.01, 0.05, -0.04, 0.03])
+    quick = pose_from_lengths(robot, lengths, start)
+    assert quick.converged
+    np.testing.assert_allclose(quick.pose, expected.pose, atol=1e-8)
+
+
+@pytest.mark.parametrize(("name", "most"), [("cogiro", 3.3), ("ipanema-1", 6.0)])
+def test_noise_costs_few_steps(name, most):
+    """About the home of ipanema-1 the matrix of Gauss and Newton alone takes ten steps."""
+    from towline.models.forward_kinematics.problem import problem_of
+
+    robot, rng = load(name), np.random.default_rng(13)
+    problem, m, count = problem_of(robot), robot.m, 400
+    poses = robot.home + 0.1 * robot.length * rng.uniform(-1, 1, (count, 6))
+    lengths = dynamics_of(robot).cable_lengths(poses) + rng.normal(0, 1e-3, (count, m))
+    starts, errors, info = poses + rng.normal(0, 1e-3, poses.shape), np.empty(count * m), np.empty((count, 2))
+    how = (problem.free, problem.scale, 1e-11 * problem.scale, 0.0, 60, 0, count)
+    weights = np.full(m, 1e3)
+    arrays = (starts.ravel(), errors, info.reshape(-1))
+    machine.load()(problem.geometry.ravel(), 0, lengths.ravel(), weights, problem.radii, *how, *arrays)
+    assert info[:, 0].all()
+    assert info[:, 1].mean() < most
