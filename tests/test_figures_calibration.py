@@ -63,7 +63,7 @@ def test_a_calibration_draws_its_own_numbers(tmp_path):
     assert f"{1e3 * result.residual_after:.3g} mm" in drawn["residuals"].axes[1].get_title(loc="left")
     values = {parameter.name: parameter for parameter in result.parameters}
     moved = [1e3 * values[f"cables[2].anchor.{axis}"].correction for axis in "xyz"]
-    centres = [line.get_xydata()[0] for line in drawn["anchors"].axes[2].lines if "found" in str(line.get_label())]
+    centres = [line.get_xydata()[0] for line in drawn["anchors"].axes[2].lines if "calibrated" in str(line.get_label())]
     np.testing.assert_allclose(centres, [[moved[0], moved[1]], [moved[0], moved[2]]], atol=1e-9)
     (ax,) = drawn["observability"].axes
     (offsets,) = [line for line in ax.lines if line.get_label() == "offset"]
