@@ -126,6 +126,20 @@ def test_durations_of_a_range(seconds, bound):
     assert set(found(fixed.lasting(2.5), replace(none, nodes=NODES / LASTS * 2.5))) == {"duration"}
 
 
+@pytest.mark.parametrize(("beyond", "passes"), [(0.5, True), (2.0, False)])
+@pytest.mark.parametrize(("bound", "sign"), [(1.0, -1), (3.0, 1)])
+def test_durations_have_a_relative_tolerance(bound, sign, beyond, passes):
+    """A twentieth of a millionth beyond the bound is rounding, a fifth of one is too short or too long."""
+    path = {"kind": "rest", "pose": [0, 0, 1]}
+    scenario, none = on_the_path({"path": path, "duration": {"min": 1, "max": 3}, "tube": TUBE})
+    seconds = bound * (1 + sign * beyond * 1e-7)
+    told = found(scenario.lasting(seconds), replace(none, nodes=NODES / LASTS * seconds))
+    assert set(told) == (set() if passes else {"duration"})
+    # Nodes and audited motion agree as far.
+    apart = found(scenario.lasting(2.0), replace(none, nodes=NODES / LASTS * 2.0 * (1 + beyond * 1.5e-7)))
+    assert set(apart) == (set() if passes else {"duration"})
+
+
 def test_the_platforms_box():
     limits = {"platform_box": {"min": [-1, -1, 0], "max": [0.21, 1, 2]}}
     scenario, none = on_the_path({"path": RIGHT, "tube": {**TUBE, "ends": "free"}, "limits": limits})

@@ -178,3 +178,24 @@ def test_the_rounding_of_a_robot_file_does_not_choose_the_tensions(cables, lengt
             continue  # many tensions have the same sum
         tensions = solve(problem, name).tensions
         np.testing.assert_allclose(tensions, 98.1 / u[2].sum(), rtol=1e-7, err_msg=name)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_analytic_centre_with_unlimited_cables_is_stationary(seed):
+    """No step that keeps A t changes the sum of the logarithms of the distances to the limits that there are."""
+    rng = np.random.default_rng(seed)
+    m, n = int(rng.integers(7, 12)), 6
+    A = geometric_matrix(rng, m)[:n]
+    low, high = np.full(m, 1.0), np.full(m, 50.0)
+    free = rng.choice(m, size=int(rng.integers(1, 5)), replace=False)
+    low[free], high[free] = -np.inf, np.inf
+    low[np.setdiff1d(np.arange(m), free)[0]] = -np.inf  # one with an upper limit only
+    answer = solve(TensionProblem(A, A @ rng.uniform(5, 45, m), low, high), "analytic-centre")
+    if answer.tensions is None:
+        assert re.search(REFUSALS["analytic-centre"], answer.detail)
+        return
+    t = answer.tensions
+    slope = np.where(np.isfinite(low), 1 / (t - np.where(np.isfinite(low), low, 0)), 0.0)
+    slope -= np.where(np.isfinite(high), 1 / (np.where(np.isfinite(high), high, 0) - t), 0.0)
+    multipliers = np.linalg.lstsq(A.T, slope, rcond=None)[0]
+    assert np.abs(slope - A.T @ multipliers).max() < 1e-6 * max(np.abs(slope).max(), 1e-3)

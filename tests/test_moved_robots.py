@@ -1,0 +1,50 @@
+"""A robot does not notice where in {G} it stands: all its scales are its own."""
+
+import numpy as np
+import pytest
+
+from towline import Dynamics, Robot, load, tensions
+from towline.distribution import pose_problem
+from towline.models import points
+from towline.models.diagnosis import diagnose
+from towline.solvers import capacity_margin
+
+AWAY = np.array([120.0, -40.0, 65.0])
+
+
+def moved(robot):
+    """Return the robot with anchors and home elsewhere in {G}."""
+    data = robot.model_dump(mode="json")
+    for cable in data["cables"]:
+        cable["anchor"] = (np.array(cable["anchor"]) + AWAY).tolist()
+    if data["platform"]["home"] is not None:
+        data["platform"]["home"] = [*(robot.home[:3] + AWAY), *robot.home[3:]]
+    return Robot.model_validate(data)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-1", "caroca-pulleys", "example-spatial", "planar-4"])
+def test_a_ground_robot_elsewhere_is_the_same_robot(name):
+    here, there = load(name), moved(load(name))
+    assert there.length == here.length
+    np.testing.assert_allclose(there.home - here.home, [*AWAY, 0, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(there.wrench_scale, here.wrench_scale)
+    pose = here.home + 0.1 * here.length * here.dof_mask
+    elsewhere = pose + np.r_[AWAY, 0, 0, 0]
+    A, B = Dynamics(here).wrench_matrix(pose), Dynamics(there).wrench_matrix(elsewhere)
+    np.testing.assert_allclose(B, A, atol=1e-10)
+    one, other = (tensions(robot, at) for robot, at in ((here, pose), (there, elsewhere)))
+    assert one.status == other.status
+    if one.feasible:
+        np.testing.assert_allclose(other.tensions, one.tensions, rtol=1e-7)
+    margins = [
+        capacity_margin(pose_problem(Dynamics(robot), at)).value for robot, at in ((here, pose), (there, elsewhere))
+    ]
+    assert margins[0] == pytest.approx(margins[1], rel=1e-6)
+    reports = [diagnose(robot) for robot in (here, there)]
+    np.testing.assert_allclose(reports[0].singular_values, reports[1].singular_values, rtol=1e-8)
+
+
+def test_default_homes_move_with_the_anchors():
+    robot = load("cogiro")
+    level = points.default_home(robot.anchors, robot.attachments)
+    np.testing.assert_allclose(points.default_home(robot.anchors + AWAY, robot.attachments) - level, [*AWAY, 0, 0, 0])
