@@ -224,7 +224,7 @@ def _stepped(seen: Shaken, stepped: dict[int, DrivingForce]) -> Claim:
     damping = ", ".join(f"{_rms(given.dT_C[:, 0]) / _rms(seen.damping):.2f}" for given in stepped.values())
     return compared(
         "eq-10-plant",
-        "Eqs. 8, 10 to 13",
+        "Eqs. 8, 10, 11",
         "The displacement dB is the change of one sampling time dt (dT_K with it, its root mean square over that of "
         f"the elastic plant, for dt = {_milliseconds()} ms).",
         (1.0,) * len(elastic),

@@ -32,7 +32,7 @@ def _rotation() -> Claim:
     ends = turned_home()[:3] + robot.attachments @ turn.T
     return compared(
         "eq-3-rotation",
-        "Eqs. 1 to 3",
+        "Eqs. 1, 2, 3",
         "The lengths follow from a rotation about Z by phi_3, then Y by phi_2, then X by phi_1.",
         tuple(np.linalg.norm(robot.carrier_home[:, :3] - ends, axis=1).tolist()),
         tuple(Dynamics(robot).cable_lengths(turned_home()).tolist()),
