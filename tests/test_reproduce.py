@@ -39,6 +39,7 @@ from towline.studies.flying import (
     wind,
 )
 
+from .numbered import unnamed
 from .warm import towline
 
 CHEAP = [
@@ -278,6 +279,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
     assert {"id", "printed", "computed", "verdict"} <= set(printed["claims"][0])
     names = [claim["id"] for claim in printed["claims"]]
     assert len(names) == len(set(names)) > 50
+    assert not unnamed("flying", [claim["place"] for claim in printed["claims"]])
     by_name = {claim["id"]: claim for claim in printed["claims"]}
     assert by_name["circle"]["verdict"] == "impossible"
     assert by_name["circle-repair"]["verdict"] == "reproduced"

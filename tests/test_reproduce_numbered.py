@@ -1,5 +1,6 @@
-"""New verdicts of both papers, recomputed by code apart."""
+"""Each number of both papers has a claim; and paper F's new verdicts, recomputed by code apart."""
 
+import re
 from itertools import pairwise, permutations, product
 
 import numpy as np
@@ -12,6 +13,9 @@ from towline.studies.accounts.claim import Verdict
 from towline.studies.flying import balance, element, every_pairing, instants, structure, vibration
 from towline.studies.flying import procedure as steps_of_f
 from towline.studies.flying import radius as largest
+from towline.studies.towing import equations, loop, ranges, tensions
+
+from .numbered import IN_THE_TEXT, NUMBERED, STEPS, TEXTS, numbers_of, unnamed
 
 RING = np.radians(60 * np.arange(6))
 ANCHORS = np.column_stack([0.52 * np.cos(RING), 0.52 * np.sin(RING), np.full(6, -0.07)])
@@ -23,12 +27,47 @@ def claims_of(*chapters):
     return {claim.id: claim for chapter in chapters for claim in chapter.chapter().claims}
 
 
-# --- paper F, by code apart
+# --- what is numbered
 
 
 @pytest.fixture(scope="module")
 def flying():
     return claims_of(structure, element, balance, steps_of_f)
+
+
+@pytest.fixture(scope="module")
+def towing():
+    """Paper C's claims, with fewer loops in its workspaces: which claims there are does not depend on their number."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ranges, "loops", lambda drive, full=ranges.loops: full(drive, count=4000))
+        patch.setattr(ranges, "SECTIONS", [0.5, 0.6, 0.7])  # where few loops reach
+        patch.setattr(ranges, "volume_of", lambda drive, samples, full=ranges.volume_of: full(drive, 200, 16))
+        return claims_of(equations, tensions, loop, ranges)
+
+
+def test_a_place_names_numbers_one_by_one():
+    assert numbers_of("Eqs. 4, 26 and 37, section V, step 7", "Eq.") == {"4", "26", "37"}
+    assert numbers_of("Eqs. 34 to 36, figure 4", "Eq.") == {"34"}
+    assert numbers_of("steps (a) and (b), Eq. 2", "step") == {"a", "b"}
+
+
+def test_each_number_of_paper_c_has_a_claim(towing):
+    """Those of paper F are in the test of its command."""
+    places = [claim.place for claim in towing.values()]
+    assert not unnamed("ctmrts", places)
+    assert unnamed("ctmrts", [place for place in places if "(g)" not in place]) == {"step": {"g"}}
+
+
+@pytest.mark.parametrize("paper", NUMBERED)
+def test_the_numbers_are_those_of_the_papers(paper):
+    if not TEXTS[paper].exists():
+        pytest.skip("the texts of the papers are not here")
+    text = TEXTS[paper].read_text()
+    for kind, pattern in {**IN_THE_TEXT, "step": STEPS[paper]}.items():
+        assert set(re.findall(pattern, text, re.MULTILINE)) == {str(number) for number in NUMBERED[paper][kind]}, kind
+
+
+# --- paper F, by code apart
 
 
 @pytest.fixture(scope="module")
@@ -83,11 +122,9 @@ def test_the_inward_pull_of_any_pairing_by_hand():
 
 def test_the_best_radius_of_any_pairing_is_where_a_cable_goes_slack():
     best = largest.largest_radius_of_any(0.23)
-    times = np.linspace(0, 10, 2001)
-    (still,) = {len(every_pairing.hold(best))}
-    assert still > 0
-    motion = every_pairing.circle(best, times)
-    smallest = every_pairing.tensions(motion, every_pairing.hold(best)).min(axis=(0, 2))
+    pairs = every_pairing.hold(0.23)
+    motion = every_pairing.circle(best, np.linspace(0, 10, 2001))
+    smallest = every_pairing.tensions(motion, every_pairing.hold(best, pairs)).min(axis=(0, 2))
     assert smallest.max() == pytest.approx(0, abs=2e-3)
     assert best == pytest.approx(0.234, abs=1e-3)
     assert len(every_pairing.hold(best + 2 * largest.PRECISION)) == 0

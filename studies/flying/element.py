@@ -7,13 +7,14 @@ are printed, and their products are formed with the sizes that are printed.
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import cache, reduce
 
 import numpy as np
 
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import load
+from ...models.cables import ElementChain
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, compared, stated
 from .cable import STRETCH, chain
@@ -31,9 +32,15 @@ def chapter() -> Chapter:
     return Chapter(claims, {"elements": _figure()})
 
 
+@cache
+def cable_1() -> ElementChain:
+    """Return cable 1 at home as elements."""
+    return chain(load("wang-flying"), ELEMENTS)
+
+
 def stiffness() -> float:
     """Return E A / e of an element of cable 1 at home [N/m]."""
-    cable = chain(load("wang-flying"), ELEMENTS)
+    cable = cable_1()
     return cable.stiffness * cable.elements / cable.length
 
 
@@ -112,7 +119,7 @@ def _winding() -> Claim:
 
 def _in_world() -> Claim:
     """Compare k_n dx + k_l de in {G}, from the blocks of Eqs. 18 and 19, with Eq. 13 along the cable."""
-    u = chain(load("wang-flying"), ELEMENTS).direction
+    u = cable_1().direction
     k_1 = stiffness() * np.outer(u, u)
     k_n = np.block([[k_1, -k_1], [-k_1, k_1]])
     k_l = stiffness() * np.concatenate([-u, u])
@@ -186,7 +193,7 @@ def _sizes() -> list[Claim]:
 
 
 def _figure() -> Drawing:
-    cable = chain(load("wang-flying"), ELEMENTS)
+    cable = cable_1()
     nodes = cable.displacements(STRETCH * cable.direction)
     increments = stiffness() * cable.elongations(nodes)
     place = np.linspace(0.0, cable.length, ELEMENTS + 1)

@@ -21,7 +21,7 @@ from ...models.cables.driving_force import DrivingForce, driving_force
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, compared, stated, undetermined
-from .every_pairing import PAIRINGS, at_centre, hold
+from .every_pairing import PAIRINGS, at_centre, hold, printed
 from .every_pairing import tensions as tensions_of
 from .motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
 
@@ -112,7 +112,7 @@ def _length(lengths: np.ndarray) -> Claim:
 
 def together(pairs: np.ndarray, radius: float) -> np.ndarray:
     """Return the correlations of length and tension of cable 1 over a turn, of pairings (k, 6), (k,)."""
-    robot, motion = load("wang-flying-printed"), circle(radius, COARSE)
+    robot, motion = printed(), circle(radius, COARSE)
     ends = robot.attachments[pairs[:, 0]] + motion.pose[:, None, :3]
     lengths = np.linalg.norm(robot.anchors[0] - ends, axis=-1)
     pulls = tensions_of(motion, pairs)[..., 0]
