@@ -199,7 +199,7 @@ def _figure() -> Drawing:
     place = np.linspace(0.0, cable.length, ELEMENTS + 1)
     panels = [
         Panel("node moved [um]", {"": 1e6 * nodes @ cable.direction}, dots={"nodes": 1e6 * nodes @ cable.direction}),
-        Panel("tension added [N]", {"": np.concatenate([increments[:1], increments])}),
+        Panel("tension added [N]", {"": np.concatenate([increments[:1], increments])}, {"0 N": 0.0}),
     ]
     return Drawing(
         f"Figure 3: cable 1 as {ELEMENTS} elements, its end moved by {STRETCH * 1e6:g} um; the tension is the same in "

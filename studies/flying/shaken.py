@@ -163,7 +163,8 @@ def _superposed(seen: Shaken) -> Claim:
         0.0,
         float(off),
         within=SAME,
-        agrees="What a vibration adds to the tension is linear in the length that it adds, and in its rate.",
+        agrees="What a vibration adds to the tension is linear in the length that it adds, and in its rate. The "
+        "plant is this toolkit's own.",
         differs="The tension is no superposition.",
         figure="shaken",
     )
@@ -178,7 +179,7 @@ def _elastic(seen: Shaken, given: DrivingForce) -> Claim:
         1.0,
         _rms(given.dT_K[:, 0]) / _rms(seen.dT - seen.damping),
         within=SAME,
-        agrees="It does if cables stay taut, as they are here.",
+        agrees="It does if cables stay taut, as they are here. Chain and plant are both this toolkit's own.",
         differs="The elastic increments are others.",
         figure="shaken",
     )

@@ -166,5 +166,6 @@ def _frames() -> Drawing:
         "L_1": np.stack([end, anchor]),
     }
     return Drawing(
-        "Figure 2: the frames {G}, {A} and {B} with their axes, and the vectors of Eqs. 2 to 4", curve_in_space(lines)
+        "Figure 2: the frames {G}, {A} and {B} with their axes (x ends in a dot), and the vectors of Eqs. 2 to 4",
+        curve_in_space(lines),
     )

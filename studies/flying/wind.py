@@ -99,19 +99,20 @@ def _sign(dynamics: Dynamics) -> Claim:
 
 
 def _lift(dynamics: Dynamics) -> Claim:
-    """Compare C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind."""
+    """Report C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind, which nothing in the paper checks."""
     aero = dynamics.robot.platform.aero
     assert aero is not None
     printed = 0.5 * aero.lift * aero.air_density * (PEAK[0] ** 2 + PEAK[1] ** 2) * aero.area
-    return compared(
+    lift = float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[2])
+    used = "as printed" if np.isclose(lift, printed) else "another one"
+    return undetermined(
         "eq-25-lift",
         "Eq. 25",
         "F_ez = C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind, upwards.",
         printed,
-        float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[2]),
-        within=1e-9,
-        agrees="The lift is as printed; the wind along z, drawn in figure 5, is part of no force.",
-        differs="The lift of this run is another.",
+        lift,
+        missing=f"The lift of this run is {used}. Why a wind across lifts the platform, and the wind along z, drawn in "
+        "figure 5, is part of no force, is not printed.",
         unit="N",
     )
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ...figures.drawing import Drawing
 from ...figures.robot import RobotSketch, draw
-from ...models import Dynamics, Robot, load
+from ...models import Dynamics, Robot
 from ...models.statics import Equilibrium, equilibria
 from ...workspace import ForceBalance, Places
 from ..accounts.account import Chapter
@@ -82,13 +82,13 @@ def _suspended(rests: dict[int, Equilibrium]) -> Claim:
     """Check the balance of force and moment at rest, and that the load is below the robot-ends."""
     left, pulling = [], []
     for m, found in rests.items():
-        mover = load(SIZES[m])
+        mover = robot(SIZES[m], "fixed-length")
         vectors, arms = lines(mover, found.pose[None], mover.carrier_home[:, :3])
         forces = (found.tensions / np.linalg.norm(vectors[0], axis=1))[:, None] * vectors[0]
         force, moment = forces.sum(axis=0) - [0, 0, mover.weight], np.cross(arms[0], forces).sum(axis=0)
         left.append(np.abs(np.concatenate([force, moment])).max() / mover.weight)
         pulling.append(float((found.tensions > AT_REST * mover.weight).sum()))
-    below = all(rests[m].pose[2] < load(SIZES[m]).carrier_home[:, 2].min() for m in rests)
+    below = all(found.pose[2] < robot(SIZES[m], "fixed-length").carrier_home[:, 2].min() for m, found in rests.items())
     return stated(
         "figure-1",
         "section 2, figure 1",
@@ -105,7 +105,7 @@ def _suspended(rests: dict[int, Equilibrium]) -> Claim:
 
 def _dimension(found: Equilibrium) -> Claim:
     """Compute the dimension of the poses in balance: coordinates and tensions, less independent equations."""
-    dynamics = Dynamics(load("wang-ctmrts"))
+    dynamics = Dynamics(robot("wang-ctmrts", "both"))
     steps = STEP * np.eye(6)
     ahead, behind = (dynamics.wrench_matrix(found.pose + sign * steps) @ found.tensions for sign in (1, -1))
     slopes = np.hstack([(ahead - behind).T / (2 * STEP), dynamics.wrench_matrix(found.pose)])
@@ -126,7 +126,7 @@ def _dimension(found: Equilibrium) -> Claim:
 
 def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
     """Check x and y of the positions, in and around the box, where pulling cables balance the weight."""
-    ends = load("wang-ctmrts").carrier_home[:, :2]
+    ends = robot("wang-ctmrts", "both").carrier_home[:, :2]
     held = poses[(forces > 0).all(axis=1), :2]
     outside = np.maximum(ends.min(axis=0) - held, held - ends.max(axis=0)).max(axis=1)
     share = float((outside < 0).mean())
@@ -234,7 +234,7 @@ def _placed() -> Claim:
 
 
 def _solved() -> Claim:
-    J = Dynamics(load("wang-ctmrts")).wrench_matrix(rest(3).pose)
+    J = Dynamics(robot("wang-ctmrts", "both")).wrench_matrix(rest(3).pose)
     columns = J.shape[1]
     return stated(
         "step-e",
