@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
+from scipy.optimize import linprog, root
+from scipy.spatial.transform import Rotation
 
 from towline.models import Dynamics, load
 from towline.studies.accounts.claim import Verdict
 from towline.studies.towing import equations as towing_equations
+from towline.studies.towing import loop as towing_loop
 from towline.studies.towing import ranges as towing_ranges
 from towline.studies.towing import tensions as towing_tensions
 from towline.studies.towing.workspace import in_prism
@@ -19,6 +23,97 @@ def equations():
 @pytest.fixture(scope="module")
 def tensions():
     return {claim.id: claim for claim in towing_tensions.chapter().claims}
+
+
+@pytest.fixture(scope="module")
+def loop():
+    return {claim.id: claim for claim in towing_loop.chapter().claims}
+
+
+ENDS = np.array([[2.2, 0.45, 1.2], [1.275, 2.027, 1.2], [0.308, 0.405, 1.2]])
+SIDES = np.repeat([1, -1], 6)  # of a balance that is two inequalities
+CORNERS = np.array([[0.05, -0.1 / np.sqrt(12), 0], [0, 0.1 / np.sqrt(3), 0], [-0.05, -0.1 / np.sqrt(12), 0]])
+
+
+def cables(pose):
+    """Vectors from the corners of the load to the robot-ends of W2, and the corners from its centre, by scipy."""
+    arms = Rotation.from_euler("ZYX", pose[:2:-1]).apply(CORNERS)
+    return ENDS - pose[:3] - arms, arms
+
+
+def test_the_inertia_of_a_rotated_plate(equations):
+    """The load is flat, Ix = Iy + Iz: a mass M in the plane x = 0, whose second moments are Iz and Iy."""
+    points, share = towing_equations.masses(), 10 / 6
+    np.testing.assert_allclose((share * points[:, :, None] * points[:, None]).sum(axis=0), np.diag([0, 0.28, 0.26]))
+    spin = np.array([0.3, -0.2, 0.5])
+    energy = share / 2 * (np.linalg.norm(np.cross(spin, points), axis=1) ** 2).sum()
+    assert energy == pytest.approx(spin @ np.diag([0.54, 0.26, 0.28]) @ spin / 2, rel=1e-12)
+    assert equations["eq-10"].verdict is equations["eq-8"].verdict is Verdict.REPRODUCED
+
+
+def test_a_local_point_moves_with_the_load(equations):
+    claim = equations["table-1"]
+    home = load("wang-ctmrts").home
+    lengths = [np.linalg.norm(cables(home + shift * np.eye(6)[0])[0][0]) for shift in (0, 0.1)]
+    assert claim.verdict is Verdict.DIFFERS
+    assert claim.printed == pytest.approx(0, abs=1e-12)
+    assert claim.computed == pytest.approx(lengths[1] - lengths[0], rel=1e-9)
+
+
+def test_the_third_row_of_eq_15_by_hand(loop):
+    """Between 1 m and 1.4 m lie 0.38 m of each printed range, and between 1.2 m and 1.2 m nothing."""
+    assert loop["eq-15-z"].computed == pytest.approx((0.38 / 0.78, 0, 0.38 / 1.38))
+    assert loop["eq-15-z"].verdict is Verdict.IMPOSSIBLE
+
+
+def test_poses_in_balance_have_dimension_three(loop):
+    """Force and moment balance about a solved pose, in nine unknowns: as many directions change nothing."""
+
+    def unbalanced(unknown):
+        lines, arms = cables(unknown[:6])
+        pulls = unknown[6:, None] * lines / np.linalg.norm(lines, axis=1)[:, None]
+        return np.concatenate([pulls.sum(axis=0) - [0, 0, 98.1], np.cross(arms, pulls).sum(axis=0)])
+
+    place = np.array([1.2, 0.9, 0.4])
+    found = root(lambda x: unbalanced(np.concatenate([place, x])), [0, 0, 0, 50, 50, 50], tol=1e-12)
+    assert found.success
+    at = np.concatenate([place, found.x])
+    slopes = np.stack([(unbalanced(at + row) - unbalanced(at - row)) / 2e-6 for row in 1e-6 * np.eye(9)], axis=1)
+    assert loop["eq-14"].computed == null_space(slopes, rcond=1e-6).shape[1]
+    assert loop["eq-14"].verdict is Verdict.DIFFERS
+
+
+def test_the_load_rests_on_all_its_cables(loop):
+    """Where the claim has it at rest, m cables of 1.2 m balance force and moment, by scipy's least squares."""
+    for m in (3, 4, 5, 6):
+        robot, pose = load(towing_equations.SIZES[m]), towing_loop.rest(m).pose
+        arms = Rotation.from_euler("ZYX", pose[:2:-1]).apply(robot.attachments)
+        lines = robot.carrier_home[:, :3] - pose[:3] - arms
+        np.testing.assert_allclose(np.linalg.norm(lines, axis=1), 1.2, atol=1e-6)
+        A = np.vstack([lines.T, np.cross(arms, lines).T]) / 1.2
+        program = linprog(np.zeros(m), A_ub=np.vstack([A, -A]), b_ub=1e-6 + np.array([0, 0, 98.1, 0, 0, 0] * 2) * SIDES)
+        assert program.status == 0
+    assert loop["figure-1"].verdict is Verdict.REPRODUCED
+
+
+def test_what_is_recorded_by_linear_programs(loop):
+    poses, forces = towing_loop.around_the_ends()
+    for pose, tensions in zip(poses[:200], forces[:200], strict=True):
+        lines, _ = cables(pose)
+        units = (lines / np.linalg.norm(lines, axis=1)[:, None]).T
+        program = linprog(np.ones(3), A_eq=units, b_eq=[0, 0, 98.1], bounds=(0, 500))
+        assert (program.status == 0) == bool(((tensions > 0) & (tensions < 500)).all())
+    assert loop["step-f"].verdict is Verdict.REPRODUCED
+
+
+def test_steps_leave_a_position_open_where_lengths_vary(loop):
+    """Lengths of 1.2 m and a posture give a position by Newton, and with lengths unknown any position solves Eq. 1."""
+    found = root(lambda x: np.linalg.norm(cables(np.r_[x, 0.2, 0.1, 0.3])[0], axis=1) - 1.2, [1.2, 0.9, 0.6])
+    assert found.success
+    assert found.x[2] < 1.2
+    assert loop["step-b"].computed == (0, 3, 3)
+    assert loop["step-c"].verdict is Verdict.REPRODUCED
+    assert loop["step-e"].verdict is Verdict.IMPOSSIBLE
 
 
 def test_what_the_model_leaves_out_is_the_gyroscopic_moment(equations):

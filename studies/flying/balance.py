@@ -1,4 +1,4 @@
-"""Paper F's balance of forces and moments: Eqs. 26, 34, 36 and 37, compared with Newton and Euler in {G}."""
+"""Paper F's balance of forces and moments: Eqs. 24, 26, 29 and 33 to 38, compared with Newton and Euler in {G}."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from ...models import Dynamics, load
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, compared
 from .instants import Instants, instants
-from .rotations import printed_acceleration
+from .rotations import body_rates, printed_acceleration
 
 ROUNDING = 1e-11
 WIND = np.array([5.0, 6.0, 2.0])  # the paper's strongest [m/s]
+INCREMENTS = np.array([0.3, -0.2, 0.1, 0.4, -0.1, 0.2])  # dT of the six cables, any [N]
 
 
 def chapter() -> Chapter:
@@ -19,7 +20,12 @@ def chapter() -> Chapter:
     dynamics, samples = Dynamics(load("wang-flying")), instants()
     return Chapter(
         [
+            _newton(dynamics, samples),
             _force(dynamics, samples),
+            _euler(dynamics, samples),
+            _last_term(dynamics, samples),
+            _first_term(dynamics, samples),
+            _turned_increments(dynamics, samples),
             _moment(dynamics, samples),
             _moment_printed(dynamics, samples),
             _whole(dynamics, samples),
@@ -27,6 +33,111 @@ def chapter() -> Chapter:
             _wind_frame(dynamics, samples),
             _arms(dynamics, samples),
         ]
+    )
+
+
+def newton_euler(dynamics: Dynamics, samples: Instants) -> np.ndarray:
+    """Return m ddx_B - m g and dL/dt in {G} from the derivatives of both rotations, (n, 6) [N, N m]."""
+    x, dx, ddx = (part[:, :3] for part in samples.body)
+    R, dR, ddR = samples.R_A
+    acceleration = samples.base.acceleration[:, :3] + _turn(ddR, x) + 2 * _turn(dR, dx) + _turn(R, ddx)
+    whole, I_b = samples.R_A.then(samples.R_B), dynamics.robot.inertia
+    moment = _turn(whole.dR, whole.rate @ I_b.T) + _turn(whole.R, whole.acceleration @ I_b.T)  # of L = R I_b Omega
+    return np.hstack([dynamics.robot.platform.mass * (acceleration - np.array(dynamics.robot.gravity)), moment])
+
+
+def _newton(dynamics: Dynamics, samples: Instants) -> Claim:
+    """Give the platform the tensions that hold it in the wind, and form m ddx_B - m g - [u] (T + dT) of Eq. 24."""
+    pose, velocity, acceleration = dynamics.relative.motion_in_world(*samples.body, *samples.base)
+    A = dynamics.wrench_matrix(pose, samples.base.pose[:, None])
+    w = dynamics.required_wrench(pose, velocity, acceleration, wind=WIND)
+    T = np.linalg.solve(A, w[..., None])[..., 0]
+    left = newton_euler(dynamics, samples)[:, :3] - _turn(A[:, :3], T)
+    wind = dynamics.aerodynamic_wrench(pose, velocity, WIND)[:, :3]
+    return compared(
+        "eq-24",
+        "Eq. 24",
+        "m ddx_B = m g + [u] (T + dT) (largest force left over, with the tensions that the motion requires in the "
+        "strongest wind).",
+        0.0,
+        float(np.linalg.norm(left, axis=1).max()),
+        within=ROUNDING,
+        agrees="The equation is in balance.",
+        differs="F_e, the force of the wind, is defined below the equation and used in Eq. 26, but is not in Eq. 24; "
+        f"with it the rest is {np.abs(left - wind).max():.0e} N.",
+        unit="N",
+    )
+
+
+def _euler(dynamics: Dynamics, samples: Instants) -> Claim:
+    """Compare I alpha + omega x I omega in {G}, with I = R I_b R^T, with dL/dt."""
+    whole, I_b = samples.R_A.then(samples.R_B), dynamics.robot.inertia
+    inertia = whole.R @ I_b @ whole.R.transpose(0, 2, 1)
+    omega, alpha = _turn(whole.R, whole.rate), _turn(whole.R, whole.acceleration)
+    printed = _turn(inertia, alpha) + np.cross(omega, _turn(inertia, omega))
+    return compared(
+        "eq-29",
+        "Eq. 29",
+        "I_B alpha + omega x I_B omega in {G}, I_B = R I_b R^T (difference from the derivative of L = R I_b Omega).",
+        0.0,
+        float(np.abs(printed - newton_euler(dynamics, samples)[:, 3:]).max()),
+        within=ROUNDING,
+        agrees="It is the derivative of the angular momentum.",
+        differs="It is not the derivative of the angular momentum.",
+        unit="N m",
+    )
+
+
+def _last_term(dynamics: Dynamics, samples: Instants) -> Claim:
+    """Compare the left side of Eq. 33, which ends in P_b dTheta_b x R I_b P_b dTheta_b, with dL/dt."""
+    accelerations = samples.R_A.acceleration, samples.R_B.acceleration
+    off = _moment_off(dynamics, samples, *accelerations, last=samples.R_B.rate)
+    rest = float(_moment_off(dynamics, samples, *accelerations).max())
+    return compared(
+        "eq-33",
+        "Eqs. 33, 36",
+        "The left side of Eq. 33 ends in P_b dTheta_b x R_B I_b P_b dTheta_b (median relative difference from dL/dt).",
+        0.0,
+        float(np.median(off)),
+        within=ROUNDING,
+        agrees="The moment is the derivative of the angular momentum.",
+        differs=f"The first factor must be P_a dTheta_a, as in Eq. 36, with which the difference is {rest:.0e}; one "
+        "letter may be an error of the recognition.",
+    )
+
+
+def _first_term(dynamics: Dynamics, samples: Instants) -> Claim:
+    """Compare the left side of Eq. 34 with dTheta_b, as printed, in place of ddTheta_b, with dL/dt."""
+    printed = samples.body.velocity[:, 3:] - samples.body.acceleration[:, 3:]
+    I_b, R = dynamics.robot.inertia, samples.R_B.R
+    P = body_rates(samples.body.pose, printed)
+    true = _turn_back(samples.R_A.R, newton_euler(dynamics, samples)[:, 3:])
+    off = np.linalg.norm(_turn(R, P @ I_b.T), axis=1) / np.linalg.norm(true, axis=1)
+    return compared(
+        "eq-34",
+        "Eqs. 34, 37",
+        "Eq. 34 begins with R_B I_b P_b dTheta_b, first derivatives (median relative difference from dL/dt).",
+        0.0,
+        float(np.median(off)),
+        within=ROUNDING,
+        agrees="The moment is the derivative of the angular momentum.",
+        differs="It must be ddTheta_b, as in Eq. 37; a dot may be an error of the recognition.",
+    )
+
+
+def _turned_increments(dynamics: Dynamics, samples: Instants) -> Claim:
+    """Compare R_A [R_B b x u] dT of Eq. 34 with [R_B b x u] dT, which stands beside the same matrix times T."""
+    moments = dynamics.relative.wrench_matrix(samples.body.pose)[:, 3:] @ INCREMENTS
+    off = np.linalg.norm(_turn(samples.R_A.R, moments) - moments, axis=1) / np.linalg.norm(moments, axis=1)
+    return compared(
+        "eq-34-dT",
+        "Eqs. 33, 34, 37",
+        "In Eq. 34 the moments of dT have R_A in front, those of T have not (median relative difference).",
+        0.0,
+        float(np.median(off)),
+        within=ROUNDING,
+        agrees="The rotation changes nothing.",
+        differs="Eq. 33 times R_A^T has no R_A in front of either, as in Eq. 37.",
     )
 
 
@@ -55,7 +166,7 @@ def _moment(dynamics: Dynamics, samples: Instants) -> Claim:
     off = _moment_off(dynamics, samples, samples.R_A.acceleration, samples.R_B.acceleration)
     return compared(
         "eq-36",
-        "Eqs. 34 to 36",
+        "Eqs. 34, 35, 36",
         "F_M and D_M with the true angular accelerations (largest relative difference from dL/dt in {A}).",
         0.0,
         float(off.max()),
@@ -81,8 +192,17 @@ def _moment_printed(dynamics: Dynamics, samples: Instants) -> Claim:
     )
 
 
-def _moment_off(dynamics: Dynamics, samples: Instants, alpha_A: np.ndarray, alpha_B: np.ndarray) -> np.ndarray:
-    """Return the relative difference of the left side of Eq. 34 from dL/dt, in {A}, (n,)."""
+def _moment_off(
+    dynamics: Dynamics,
+    samples: Instants,
+    alpha_A: np.ndarray,
+    alpha_B: np.ndarray,
+    last: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the relative difference of the left side of Eq. 34 from dL/dt, in {A}, (n,).
+
+    `last` (n, 3) is the first factor of the last term of D_M; default: omega_A, as in Eq. 36.
+    """
     I_b = dynamics.robot.inertia
     R, omega_A, Omega = samples.R_B.R, samples.R_A.rate, samples.R_B.rate
     I_A = R @ I_b @ R.transpose(0, 2, 1)
@@ -92,7 +212,7 @@ def _moment_off(dynamics: Dynamics, samples: Instants, alpha_A: np.ndarray, alph
         _turn(I_A, alpha_A)
         + _turn(I_A, np.cross(omega_A, turned))
         + np.cross(omega_A + turned, _turn(I_A, omega_A))
-        + np.cross(omega_A, _turn(R, Omega @ I_b.T))
+        + np.cross(omega_A if last is None else last, _turn(R, Omega @ I_b.T))
     )
     whole = samples.R_A.then(samples.R_B)
     spin = whole.acceleration @ I_b.T + np.cross(whole.rate, whole.rate @ I_b.T)  # dL/dt in {B}
@@ -101,20 +221,19 @@ def _moment_off(dynamics: Dynamics, samples: Instants, alpha_A: np.ndarray, alph
 
 
 def _whole(dynamics: Dynamics, samples: Instants) -> Claim:
-    """Compare M ddX + F + D_B in {A} with the required wrench in {G}."""
+    """Compare M ddX + F + D_B in {A} with Newton and Euler in {G}."""
     in_A = dynamics.relative.required_wrench(*samples.body, *samples.base)
-    world = dynamics.relative.motion_in_world(*samples.body, *samples.base)
-    in_G = dynamics.required_wrench(*world)
+    in_G = newton_euler(dynamics, samples)
     turned = np.hstack([_turn(samples.R_A.R, in_A[:, :3]), _turn(samples.R_A.R, in_A[:, 3:])])
     return compared(
         "eq-38",
         "Eqs. 37, 38",
-        "M_B ddX_b + F_B + D_B with alpha corrected (difference from the required wrench in {G}).",
+        "M_B ddX_b + F_B + D_B with alpha corrected (difference from m ddx_B - m g and dL/dt in {G}).",
         0.0,
         float(np.abs(turned - in_G).max()),
         within=ROUNDING,
-        agrees="Paper F's form, with D_B, and the form in {G} are the same.",
-        differs="Paper F's form is not the form in {G}.",
+        agrees="Paper F's form, with D_B, is Newton's and Euler's equations, rotated.",
+        differs="Paper F's form is not Newton's and Euler's equations.",
         unit="N, N m",
     )
 

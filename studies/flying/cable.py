@@ -51,7 +51,8 @@ def _elongation(robot: Robot) -> Claim:
         0.0,
         share,
         holds=share < NEGLIGIBLE,
-        agrees=f"{largest:.1f} N on E A = {stiffness:g} N is less than {NEGLIGIBLE:.0%}, which is taken as negligible.",
+        agrees=f"{largest:.1f} N (crossed pairs) on E A = {stiffness:g} N is less than {NEGLIGIBLE:.0%}, which is "
+        f"taken as negligible: {NEGLIGIBLE * stiffness / robot.weight:.0f} times the weight on one cable would do.",
         differs=f"{largest:.1f} N on E A = {stiffness:g} N is more than {NEGLIGIBLE:.0%}.",
     )
 
@@ -65,7 +66,7 @@ def _one_element(robot: Robot) -> Claim:
     alike = spread < 1e-9 * spring
     return stated(
         "eq-21",
-        "section III.C, Eqs. 12 to 21",
+        "section III.C, Eqs. 12, 21",
         "The elastic force cannot be studied with the whole cable as a unit: n elements give another force.",
         "n matters",
         f"{increments[1]:.4g} N for n = 1, {increments[ELEMENTS[-1]]:.4g} N for n = {ELEMENTS[-1]}",
@@ -103,7 +104,7 @@ def _axis(robot: Robot) -> Claim:
     u = vector / np.linalg.norm(vector)
     return compared(
         "eq-17",
-        "Eqs. 4, 16 to 18",
+        "Eqs. 4, 17, 18",
         "x_c, from the pulley along the cable, is u = L / l in {G} (cosine of the angle between them).",
         1.0,
         float(u @ cable.direction),

@@ -120,7 +120,7 @@ def _mobility(spans: np.ndarray) -> Claim:
         "wider",
         f"{spans[0]:.2f} N at rest, {spans[-1]:.2f} N pitching by {np.degrees(PITCHES[-1]):.0f} degrees",
         holds=bool((np.diff(spans) > 0).all()),
-        agrees="The range grows with every step of the largest pitch.",
-        differs="The range does not grow with every step of the largest pitch.",
+        agrees="The range grows with every step of the largest pitch of the assumed flight.",
+        differs="The range does not grow with every step of the largest pitch of the assumed flight.",
         figure="mobility",
     )

@@ -12,6 +12,7 @@ from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, stated
 from . import plans
 from .circle import tasks
+from .every_pairing import pull_inward
 from .motion import RADIUS
 
 ON_CIRCLE = 0.01  # [m], allowed distance of the platform from its circle
@@ -38,6 +39,8 @@ def chapter() -> Chapter:
 
 def _hovering(planned: Plan) -> Claim:
     proof, robot = planned.certificate, planned.scenario.robot
+    pull = pull_inward(RADIUS)
+    excluded = pull.least > pull.needed
     why = "There is no certificate."
     if proof is not None:
         cables = ", ".join(str(index + 1) for index in proof.binding)
@@ -45,14 +48,20 @@ def _hovering(planned: Plan) -> Claim:
             f"At {proof.time:.2f} s tensions inside {robot.t_min.min():g} N to {robot.t_max.max():g} N are short by "
             f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind."
         )
+    why += (
+        f" With any other pairing cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
+        f"{pull.needed:.2f} N is needed."
+        if excluded
+        else " That excludes crossed pairs alone."
+    )
     return stated(
         "circle",
-        "VI.B, figures 8 to 10",
+        "VI.B, figures 8, 9 and 10",
         f"Under a quadrotor hovering at [50, 50, 100] m the platform follows a circle of radius {RADIUS:g} m at 99 m.",
         "tensions are drawn",
         planned.status.value,
         holds=planned.feasible,
-        otherwise=Verdict.IMPOSSIBLE if proof is not None else Verdict.NOT_DETERMINED,
+        otherwise=Verdict.IMPOSSIBLE if proof is not None and excluded else Verdict.NOT_DETERMINED,
         agrees="Every tension is inside its limits, audited at 1 kHz.",
         differs=why,
         figure="circle-tensions",

@@ -86,6 +86,11 @@ def printed_acceleration(motion_pose: np.ndarray, velocity: np.ndarray, accelera
     return bent + acceleration[:, 3:]
 
 
+def body_rates(pose: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return P dTheta of angles in `pose` (n, 6) and rates of them (n, 3), (n, 3) [rad/s]."""
+    return _each(rotation.body_rate, pose, np.hstack([np.zeros_like(rates), rates]))
+
+
 def _acceleration(samples: Instants) -> Claim:
     true = samples.R_A.acceleration
     printed = printed_acceleration(*samples.base)

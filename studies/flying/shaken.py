@@ -163,7 +163,8 @@ def _superposed(seen: Shaken) -> Claim:
         0.0,
         float(off),
         within=SAME,
-        agrees="What a vibration adds to the tension is linear in the length that it adds, and in its rate.",
+        agrees="What a vibration adds to the tension is linear in the length that it adds, and in its rate. The "
+        "plant is this toolkit's own.",
         differs="The tension is no superposition.",
         figure="shaken",
     )
@@ -178,7 +179,7 @@ def _elastic(seen: Shaken, given: DrivingForce) -> Claim:
         1.0,
         _rms(given.dT_K[:, 0]) / _rms(seen.dT - seen.damping),
         within=SAME,
-        agrees="It does if cables stay taut, as they are here.",
+        agrees="It does if cables stay taut, as they are here. Chain and plant are both this toolkit's own.",
         differs="The elastic increments are others.",
         figure="shaken",
     )
@@ -224,7 +225,7 @@ def _stepped(seen: Shaken, stepped: dict[int, DrivingForce]) -> Claim:
     damping = ", ".join(f"{_rms(given.dT_C[:, 0]) / _rms(seen.damping):.2f}" for given in stepped.values())
     return compared(
         "eq-10-plant",
-        "Eqs. 8, 10 to 13",
+        "Eqs. 8, 10, 11",
         "The displacement dB is the change of one sampling time dt (dT_K with it, its root mean square over that of "
         f"the elastic plant, for dt = {_milliseconds()} ms).",
         (1.0,) * len(elastic),

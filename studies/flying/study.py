@@ -7,6 +7,7 @@ from . import (
     balance,
     cable,
     disturbance,
+    element,
     flights,
     helix,
     pairing,
@@ -16,6 +17,7 @@ from . import (
     repair,
     rotations,
     shaken,
+    structure,
     vibration,
     wind,
 )
@@ -26,9 +28,11 @@ PAPER = Paper(
 )
 CHAPTERS = {
     "Table 1": parameters.chapter,
+    "The robot (section II)": structure.chapter,
     "The pairing of the cables": pairing.chapter,
     "Rotations (section II, IV)": rotations.chapter,
     "A vibrating cable (section III)": cable.chapter,
+    "An element of a cable (section III)": element.chapter,
     "Forces and moments (section IV)": balance.chapter,
     "The procedure (section V)": procedure.chapter,
     "Wind (section VI)": wind.chapter,

@@ -17,7 +17,8 @@ SIZES = {3: "wang-ctmrts", 4: "wang-ctmrts-4", 5: "wang-ctmrts-5", 6: "wang-ctmr
 
 def chapter() -> Chapter:
     """Check each equation of section 3 that can be tested."""
-    return Chapter([_rotation(), _rigid(), _gyroscopic(), _direction(), _shape(), _angular_acceleration(), _inverse()])
+    claims = [_rotation(), _rigid(), _inertia(), _weight(), _gyroscopic(), _direction(), _shape(), _summed()]
+    return Chapter([*claims, _angular_acceleration(), _inverse(), _symbols()])
 
 
 def turned_home() -> np.ndarray:
@@ -32,7 +33,7 @@ def _rotation() -> Claim:
     ends = turned_home()[:3] + robot.attachments @ turn.T
     return compared(
         "eq-3-rotation",
-        "Eqs. 1 to 3",
+        "Eqs. 1, 2, 3",
         "The lengths follow from a rotation about Z by phi_3, then Y by phi_2, then X by phi_1.",
         tuple(np.linalg.norm(robot.carrier_home[:, :3] - ends, axis=1).tolist()),
         tuple(Dynamics(robot).cable_lengths(turned_home()).tolist()),
@@ -55,6 +56,57 @@ def _rigid() -> Claim:
         agrees="The largest is the sum of the others, as in a flat body: just possible.",
         differs="The largest exceeds the sum of the others, which is impossible for a rigid body.",
         unit="kg m^2",
+    )
+
+
+def masses() -> np.ndarray:
+    """Return six points, (6, 3) [m] in {P}, each with a sixth of the load's mass, that have its inertia."""
+    robot = load("wang-ctmrts")
+    moments = np.diag(robot.inertia)
+    squares = np.maximum(moments.sum() / 2 - moments, 0.0)  # sum of m x^2, m y^2 and m z^2 of all points
+    arms = np.diag(np.sqrt(3 * squares / robot.platform.mass))
+    return np.vstack([arms, -arms])
+
+
+def _inertia() -> Claim:
+    """Compare R I R^T with the inertia of rotated point masses."""
+    robot, turn = load("wang-ctmrts"), Rotation.from_euler("ZYX", ANGLES[::-1]).as_matrix()
+    points = masses() @ turn.T
+    summed = (points**2).sum() * np.eye(3) - points.T @ points
+    off = np.abs(turn @ robot.inertia @ turn.T - robot.platform.mass / len(points) * summed).max()
+    return compared(
+        "eq-10",
+        "Eq. 10",
+        "I' = R I R^T is the inertia in {O} (largest difference from six point masses with this inertia, rotated).",
+        0.0,
+        float(off),
+        within=1e-12,
+        agrees="At an arbitrary posture both are the same.",
+        differs="The inertia of the rotated masses is another.",
+        unit="kg m^2",
+    )
+
+
+def _weight() -> Claim:
+    """Compare G with minus the slope of the potential energy of point masses, by position and by rotation."""
+    robot, turn = load("wang-ctmrts"), Rotation.from_euler("ZYX", ANGLES[::-1])
+    share, step = robot.platform.mass / 6, 1e-4
+
+    def energy(move: np.ndarray) -> float:
+        places = move[:3] + (Rotation.from_rotvec(move[3:]) * turn).apply(masses())
+        return float(-share * (places @ np.array(robot.gravity)).sum())
+
+    slope = [(energy(row) - energy(-row)) / (2 * step) for row in step * np.eye(6)]
+    return compared(
+        "eq-8",
+        "Eq. 8",
+        "G = [0, 0, -M g, 0, 0, 0]^T (minus the slope of the potential energy of six point masses).",
+        (0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0),
+        tuple(-part for part in slope),
+        within=1e-6,
+        agrees="The weight is a force without a moment about the mass centre.",
+        differs="The slope of the potential energy is another.",
+        unit="N, N m",
     )
 
 
@@ -128,6 +180,51 @@ def _shape() -> Claim:
         holds=printed[1] == A.shape[1] and printed[0] == 6,
         agrees="The product is defined.",
         differs="With the transpose the product J T is not defined; each cable is a column of J, not a row.",
+    )
+
+
+def _summed() -> Claim:
+    """Compare J T, with the tensions as a column, with the sum of each cable's force and moment, for every m."""
+    off = []
+    for m, name in SIZES.items():
+        robot, pose = load(name), turned_home()
+        arms = Rotation.from_euler("ZYX", ANGLES[::-1]).apply(robot.attachments)
+        lines = robot.carrier_home[:, :3] - pose[:3] - arms
+        pulls = np.arange(1.0, m + 1)[:, None] * lines / np.linalg.norm(lines, axis=1)[:, None]
+        summed = np.concatenate([pulls.sum(axis=0), np.cross(arms, pulls).sum(axis=0)])
+        off.append(np.abs(Dynamics(robot).wrench_matrix(pose) @ np.arange(1.0, m + 1) - summed).max())
+    return compared(
+        "eq-7",
+        "Eqs. 6, 7",
+        "T = [T_1 ... T_m]^T, and J T is the wrench of all cables (largest difference from the sum over the cables, "
+        "m = 3, 4, 5, 6).",
+        0.0,
+        float(max(off)),
+        within=1e-9,
+        agrees="With the columns of J, as corrected in Eqs. 5 and 6, it is.",
+        differs="The sum over the cables is another.",
+        unit="N, N m",
+    )
+
+
+def _symbols() -> Claim:
+    """Compute how L_1 changes as the load moves, with b_1 in the local and in the global coordinate system."""
+    robot, shift = load("wang-ctmrts"), np.array([0.1, 0.0, 0.0])
+    end, place, arm = robot.carrier_home[0, :3], robot.home[:3], robot.attachments[0]
+    before = np.linalg.norm(end - (place + arm))
+    change = np.linalg.norm(end - (place + shift + arm)) - before
+    inside = np.linalg.norm((end - place + place + shift) - (place + shift + arm)) - before  # b_1 moves too
+    return compared(
+        "table-1",
+        "Table 1, Eq. 1",
+        "b_i is a point in the local coordinate system (change of L_1 when the load moves by 0.1 m along x).",
+        float(inside),
+        float(change),
+        within=1e-9,
+        agrees="The length changes alike.",
+        differs="A point of the local coordinate system moves with the load. b_i is in the global one, as section 3 "
+        "states.",
+        unit="m",
     )
 
 

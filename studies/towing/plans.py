@@ -34,8 +34,9 @@ OBJECTIVES = {
 }
 
 
+@cache
 def robot(name: str, drive: Drive) -> Robot:
-    """Return a robot of the library with another drive and cables of 1.2 m."""
+    """Return a robot of the library with another drive and cables of 1.2 m, read from its file once."""
     data = load(name).model_dump(mode="json")
     cables = [{**cable, "length": FIXED} for cable in data["cables"]]
     return Robot.model_validate({**data, "drive": drive, "cables": cables})

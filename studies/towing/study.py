@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..accounts.account import Account, Paper, Progress, gather
-from . import equations, flights, modes, ranges, tensions
+from . import equations, flights, loop, modes, ranges, tensions
 
 PAPER = Paper(
     "ctmrts",
@@ -13,6 +13,7 @@ PAPER = Paper(
 CHAPTERS = {
     "The model, Eqs. 1 to 13": equations.chapter,
     "Tensions, Eqs. 11, 16, 17": tensions.chapter,
+    "The loop, Eqs. 14, 15, steps (a) to (f)": loop.chapter,
     "Workspaces, figures 2 to 6": ranges.chapter,
     "Three drives, three to six robots": modes.chapter,
     "The load towed": flights.chapter,

@@ -1,0 +1,171 @@
+"""Paper F's robot: figures 1 and 2 drawn from its numbers, Eqs. 2 and 3, and a small displacement (Eq. 8)."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...figures.curve_in_space import curve_in_space
+from ...figures.drawing import Drawing
+from ...figures.robot import RobotSketch, draw
+from ...models import Dynamics, load
+from ...models.rotation import rotation
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, compared, stated
+from .instants import Instants, instants
+
+ROUNDING = 1e-12  # [m]
+SMALL = 1e-4  # a small displacement [m] and rotation [rad]
+SHOWN = (np.array([0.5, 0.4, 1.4, 0.1, -0.15, 0.3]), np.array([0.15, -0.1, -1.0, 0.2, 0.1, -0.2]))
+"""Poses of {A} in {G} and of {B} in {A} in figure 2."""
+AXES = 0.25 * np.array([[1, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1]])  # of a frame, as one line [m]
+
+
+def chapter() -> Chapter:
+    """Check how the robot is put together."""
+    samples = instants()
+    drawings = {"structure": _structure(), "frames": _frames()}
+    return Chapter([_suspended(), _points(samples), _loop(samples), _displaced(samples)], drawings)
+
+
+def _suspended() -> Claim:
+    """Balance the weight at home with the tensions of least norm, for the printed pairing and for crossed pairs."""
+    pulls, left = [], []
+    for name in ("wang-flying-printed", "wang-flying"):
+        robot = load(name)
+        A, w = Dynamics(robot).wrench_matrix(robot.home), np.array([0, 0, robot.weight, 0, 0, 0])
+        tensions = np.linalg.pinv(A) @ w
+        pulls.append(tensions.min())
+        left.append(np.abs(A @ tensions - w).max())
+    return stated(
+        "fig-1",
+        "section II.A, figure 1",
+        "Six cables suspend the platform under the quadrotor, and its weight keeps them taut (smallest tension at "
+        "home, printed pairing and crossed pairs).",
+        "> 0",
+        tuple(float(value) for value in pulls),
+        holds=min(pulls) > 0 and max(left) < ROUNDING,
+        agrees="With either pairing cables that pull balance the weight at the centre of the circle.",
+        differs="Pulling cables do not balance the weight.",
+        unit="N",
+        figure="structure",
+    )
+
+
+def _points(samples: Instants) -> Claim:
+    """Compare A_i and B_i by Eqs. 2 and 3 with the points of the model at the world poses."""
+    dynamics = Dynamics(load("wang-flying"))
+    world, _, _ = dynamics.relative.motion_in_world(*samples.body, *samples.base)
+    own = np.concatenate(dynamics.points(world, samples.base.pose[:, None]), axis=1)
+    off = float(np.abs(np.concatenate(_anchors_and_ends(samples), axis=1) - own).max())
+    return compared(
+        "eq-3",
+        "Eqs. 2, 3",
+        "A_i = R_A a_i + x_A and B_i = R_A x_b + R_A R_B b_i + x_A (difference from the points of the model in {G}).",
+        0.0,
+        off,
+        within=ROUNDING,
+        agrees="The points are the same at random poses of both bodies.",
+        differs="The points are others.",
+        unit="m",
+    )
+
+
+def _anchors_and_ends(samples: Instants) -> tuple[np.ndarray, np.ndarray]:
+    """Return A_i and B_i in {G} by Eqs. 2 and 3, (n, 6, 3) each [m]."""
+    robot = load("wang-flying")
+    x_A, x_b = samples.base.pose[:, None, :3], samples.body.pose[:, None, :3]
+    R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)  # of rows, from the right
+    return robot.anchors @ R_A + x_A, x_b @ R_A + robot.attachments @ R_B @ R_A + x_A
+
+
+def _loop(samples: Instants) -> Claim:
+    """Close the loop from O over O_A and A_i, and over O_A, O_B and B_i, with L_i = R_A (a_i - x_b - R_B b_i)."""
+    robot = load("wang-flying")
+    anchors, ends = _anchors_and_ends(samples)
+    R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)
+    L = (robot.anchors - samples.body.pose[:, None, :3] - robot.attachments @ R_B) @ R_A
+    return compared(
+        "fig-2",
+        "Eq. 4, figure 2",
+        "The vectors of figure 2 close: B_i + L_i = A_i (largest gap).",
+        0.0,
+        float(np.linalg.norm(ends + L - anchors, axis=-1).max()),
+        within=ROUNDING,
+        agrees="They do, at random poses of both bodies.",
+        differs="They leave a gap.",
+        unit="m",
+        figure="frames",
+    )
+
+
+def _displaced(samples: Instants) -> Claim:
+    """Compare B + dB with the attachments of a platform that was moved and turned by little, at tilted poses."""
+    robot, small = load("wang-flying"), SMALL * np.array([0.6, -0.8, 0.5, 0.3, 0.9, -0.7])
+    _, ends = _anchors_and_ends(samples)
+    centre = samples.body.pose[:, None, :3] @ samples.R_A.R.transpose(0, 2, 1) + samples.base.pose[:, None, :3]
+    arms = ends - centre
+    turned = arms @ Rotation.from_rotvec(small[3:]).as_matrix().T
+    moved = small[:3] + turned - arms
+    linear = small[:3] + np.cross(small[3:], arms)  # Eq. 10
+    angles = samples.base.pose[:, 3:]
+    change = np.stack([_rotated(row + small[3:]) - _rotated(row) for row in angles])
+    by_angles = small[:3] + np.einsum("nij,mj->nmi", change, robot.attachments)
+    by_vector = small[:3] + np.cross(small[3:], robot.attachments @ samples.R_A.R.transpose(0, 2, 1))
+    share = float((np.linalg.norm(by_angles - by_vector, axis=-1) / np.linalg.norm(by_angles, axis=-1)).max())
+    return stated(
+        "eq-8",
+        "Eqs. 8, 10",
+        "B_new = B + dB, with dB of a small displacement and rotation in {G} (largest error at random poses).",
+        0.0,
+        float(np.linalg.norm(moved - linear, axis=-1).max()),
+        holds=bool(np.abs(moved - linear).max() < SMALL**2),
+        agrees=f"The error is of second order at {SMALL:g} m and rad, if dTheta is a rotation about the axes of "
+        f"{{G}}. Changes of roll, pitch and yaw in its place give an error of up to {share:.0%} of the displacement.",
+        differs="The error is of first order.",
+        unit="m",
+    )
+
+
+def _rotated(angles: np.ndarray) -> np.ndarray:
+    return rotation(ca.DM(angles)).full()
+
+
+def _structure() -> Drawing:
+    robot = load("wang-flying-printed")
+    tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home))[:, 2] * robot.weight
+    sketch = RobotSketch(
+        "the printed pairing at home",
+        robot.anchors,
+        robot.home_attachments,
+        robot.home[:3],
+        robot.carrier_home[:, :3],
+        [carrier.name for carrier in robot.carriers],
+        [],
+        tensions,
+        np.empty((0, 3)),
+        np.empty(0, dtype=bool),
+    )
+    return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(sketch))
+
+
+def _frames() -> Drawing:
+    robot, (base, body) = load("wang-flying-printed"), SHOWN
+    R_A, R_B = _rotated(base[3:]), _rotated(body[3:])
+    x_B = base[:3] + R_A @ body[:3]
+    anchor, end = base[:3] + R_A @ robot.anchors[0], x_B + R_A @ R_B @ robot.attachments[0]
+    lines = {
+        "{G}": AXES,
+        "{A}": base[:3] + AXES @ R_A.T,
+        "{B}": x_B + AXES @ (R_A @ R_B).T,
+        "x_A": np.stack([np.zeros(3), base[:3]]),
+        "R_A x_b": np.stack([base[:3], x_B]),
+        "R_A a_1": np.stack([base[:3], anchor]),
+        "R_A R_B b_1": np.stack([x_B, end]),
+        "L_1": np.stack([end, anchor]),
+    }
+    return Drawing(
+        "Figure 2: the frames {G}, {A} and {B} with their axes (x ends in a dot), and the vectors of Eqs. 2 to 4",
+        curve_in_space(lines),
+    )

@@ -1,0 +1,289 @@
+"""Paper C's loop: figure 1, the set of Eq. 14, the box of Eq. 15, and steps (a), (b), (c), (e) and (f).
+
+Step (d) is among the tensions (`tensions`), step (g) among the ranges that 60 000 loops give (`ranges`). Forces and
+lengths are computed here from points and scipy's rotations, apart from the conditions that the loops use.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...figures.drawing import Drawing
+from ...figures.robot import RobotSketch, draw
+from ...models import Dynamics, Robot
+from ...models.statics import Equilibrium, equilibria
+from ...workspace import ForceBalance, Places
+from ..accounts.account import Chapter
+from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from .equations import SIZES, rank
+from .plans import DRIVES, FIXED, robot
+from .workspace import POSTURE, PRINTED, loops, reach
+
+SAMPLES = 6000
+BESIDE = 0.2  # the box of Eq. 15 is sampled with so much more on each side [m]
+STEP = 1e-6  # of differences [m, rad]
+EQUATIONS = 17  # the last number of an equation
+SAME = 1e-9  # [m]
+AT_REST = 1e-6  # of the weight: the largest residual of a balance
+
+
+def chapter() -> Chapter:
+    """Check the configuration, the constraints and the steps."""
+    rests = {m: rest(m) for m in SIZES}
+    poses, forces = around_the_ends()
+    claims = [
+        _suspended(rests),
+        _dimension(rests[3]),
+        _beside(poses, forces),
+        _heights(),
+        _scope(),
+        _drawn(),
+        _placed(),
+        _solved(),
+        _bounded(poses, forces),
+    ]
+    return Chapter(claims, {"configuration": _figure(rests[3])})
+
+
+@cache
+def rest(m: int) -> Equilibrium:
+    """Return where the load of m robots rests on cables of 1.2 m, with the robot-ends at home."""
+    mover = robot(SIZES[m], "fixed-length")
+    return equilibria(mover, np.full(m, FIXED), mover.carrier_home)[0]
+
+
+def lines(mover: Robot, poses: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vectors from attachments to robot-ends, and the arms of the attachments, (n, m, 3) each [m]."""
+    turns = Rotation.from_euler("ZYX", poses[:, :2:-1]).as_matrix()
+    arms = mover.attachments @ turns.transpose(0, 2, 1)
+    return ends - poses[:, None, :3] - arms, arms
+
+
+def around_the_ends() -> tuple[np.ndarray, np.ndarray]:
+    """Draw poses of W2 in and around the box of Eq. 15, and return them with the tensions that balance the forces.
+
+    Three cables balance three components of force in one manner; (n, 6) and (n, 3) [N].
+    """
+    mover, rng = robot("wang-ctmrts", "variable-length"), np.random.default_rng(15)
+    ends = mover.carrier_home[:, :3]
+    low, high = ends.min(axis=0) - BESIDE, ends.max(axis=0) + BESIDE
+    low[2] = 0.0
+    poses = np.hstack([rng.uniform(low, high, (SAMPLES, 3)), rng.uniform(-POSTURE, POSTURE, (SAMPLES, 3))])
+    vectors, _ = lines(mover, poses, ends)
+    units = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    weight = np.array([0.0, 0.0, mover.weight])
+    return poses, np.linalg.solve(units.transpose(0, 2, 1), weight[:, None])[..., 0]
+
+
+def _suspended(rests: dict[int, Equilibrium]) -> Claim:
+    """Check the balance of force and moment at rest, and that the load is below the robot-ends."""
+    left, pulling = [], []
+    for m, found in rests.items():
+        mover = robot(SIZES[m], "fixed-length")
+        vectors, arms = lines(mover, found.pose[None], mover.carrier_home[:, :3])
+        forces = (found.tensions / np.linalg.norm(vectors[0], axis=1))[:, None] * vectors[0]
+        force, moment = forces.sum(axis=0) - [0, 0, mover.weight], np.cross(arms[0], forces).sum(axis=0)
+        left.append(np.abs(np.concatenate([force, moment])).max() / mover.weight)
+        pulling.append(float((found.tensions > AT_REST * mover.weight).sum()))
+    below = all(found.pose[2] < robot(SIZES[m], "fixed-length").carrier_home[:, 2].min() for m, found in rests.items())
+    return stated(
+        "figure-1",
+        "section 2, figure 1",
+        "The object is suspended under m robots through cables, 3 <= m <= 6 (cables that pull at rest, 1.2 m long).",
+        tuple(float(m) for m in rests),
+        tuple(pulling),
+        holds=below and max(left) < AT_REST and tuple(pulling) == tuple(float(m) for m in rests),
+        agrees=f"Forces and moments balance to {max(left):.0e} of the weight, below the robot-ends. The joints and "
+        "links of the robots that figure 1 names are in no equation.",
+        differs="The load does not rest on all of its cables.",
+        figure="configuration",
+    )
+
+
+def _dimension(found: Equilibrium) -> Claim:
+    """Compute the dimension of the poses in balance: coordinates and tensions, less independent equations."""
+    dynamics = Dynamics(robot("wang-ctmrts", "both"))
+    steps = STEP * np.eye(6)
+    ahead, behind = (dynamics.wrench_matrix(found.pose + sign * steps) @ found.tensions for sign in (1, -1))
+    slopes = np.hstack([(ahead - behind).T / (2 * STEP), dynamics.wrench_matrix(found.pose)])
+    size = slopes.shape[1] - int(np.linalg.matrix_rank(slopes, rtol=1e-6))
+    return stated(
+        "eq-14",
+        "Eq. 14",
+        "W is a set of poses in R^6 given by g_0 <= 0 (its dimension, three robot-ends at rest).",
+        6.0,
+        float(size),
+        holds=size == 6,
+        agrees="The poses in balance form a set of dimension 6.",
+        differs="The balance is six equations, not an inequality. With six coordinates and three tensions the poses in "
+        "balance have the computed dimension: each position has its own posture. The volumes and figures are those "
+        "of the positions.",
+    )
+
+
+def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
+    """Check x and y of the positions, in and around the box, where pulling cables balance the weight."""
+    ends = robot("wang-ctmrts", "both").carrier_home[:, :2]
+    held = poses[(forces > 0).all(axis=1), :2]
+    outside = np.maximum(ends.min(axis=0) - held, held - ends.max(axis=0)).max(axis=1)
+    share = float((outside < 0).mean())
+    return stated(
+        "eq-15-xy",
+        "Eq. 15",
+        "x and y of the load are between the smallest and the largest of the robot-ends (share of W2, forces in "
+        "balance).",
+        1.0,
+        share,
+        holds=share == 1.0,
+        agrees="All positions are.",
+        differs=f"Some are up to {outside.max():.3f} m outside: the attachments, not the centre of the load, are "
+        "between the robot-ends.",
+    )
+
+
+def _heights() -> Claim:
+    """Compute the shares of the printed ranges of z that the third row of Eq. 15 leaves."""
+    mover = robot("wang-ctmrts", "both")
+    (low, high), home = reach(mover), mover.carrier_home[:, 2]
+    allowed = {
+        "fixed-length": (low[:, 2].min(), high[:, 2].max()),
+        "variable-length": (home.min(), home.max()),
+        "both": (low[:, 2].min(), high[:, 2].max()),
+    }
+    shares = []
+    for drive, (least, most) in allowed.items():
+        start, end = PRINTED[drive][2]
+        shares.append(max(min(most, end) - max(least, start), 0.0) / (end - start))
+    return stated(
+        "eq-15-z",
+        "Eq. 15, third row",
+        "z of the load is between the smallest and the largest of the robot-ends (share of the printed ranges of W1, "
+        "W2 and W3 that this allows).",
+        (1.0, 1.0, 1.0),
+        tuple(shares),
+        holds=min(shares) == 1.0,
+        otherwise=Verdict.IMPOSSIBLE,
+        agrees="The row allows the printed ranges.",
+        differs=f"All robot-ends of W2 are at {home[0]:g} m, so W2 would be empty; those of W1 and W3 are above "
+        f"{low[0, 2]:g} m, and the printed ranges begin at {PRINTED['fixed-length'][2][0]:g} m and "
+        f"{PRINTED['both'][2][0]:g} m. The loops of this run have z > 0 in its place.",
+    )
+
+
+def _scope() -> Claim:
+    low, high = reach(robot("wang-ctmrts", "both"))
+    half = (high - low).max(axis=0) / 2
+    return undetermined(
+        "step-a",
+        "step (a), figure 2",
+        "The space in which the robot-ends move is given first (half-widths along x, y and z).",
+        None,
+        tuple(float(width) for width in half),
+        missing="Its heights are printed, its widths only drawn. Those of this run are inferred from the ranges of W3, "
+        "so they cannot confirm these.",
+        unit="m",
+    )
+
+
+def _drawn() -> Claim:
+    """Count, by drive, the coordinates of robot-ends and load that neither step (b) nor the lengths determine."""
+    mover = robot("wang-ctmrts", "both")
+    ends, pose = mover.carrier_home[:, :3], rest(3).pose
+    steps = STEP * np.eye(6)
+    slopes = [
+        np.linalg.norm(lines(mover, pose + sign * steps, ends)[0], axis=-1) / (2 * sign * STEP) for sign in (1, -1)
+    ]
+    fixed_by_lengths = rank((slopes[0] + slopes[1]).T[:, :3])  # of the position, where lengths are given
+    given = [robot("wang-ctmrts", drive).fixed_lengths is not None for drive in DRIVES]
+    missing = tuple(float(3 - fixed_by_lengths if known else 3) for known in given)
+    return compared(
+        "step-b",
+        "step (b)",
+        "The robot-ends and the posture are drawn at random (coordinates of the load that then are still free, for W1, "
+        "W2, W3).",
+        (0.0, 0.0, 0.0),
+        missing,
+        within=0.0,
+        agrees="The lengths give the position.",
+        differs="Where the lengths are not given they give no position: it must be drawn too, and the lengths follow. "
+        "This run draws it uniformly in the box of Eq. 15, from the ground.",
+    )
+
+
+def _placed() -> Claim:
+    """Compute the lengths at the places of the loops of W1."""
+    samples = loops("fixed-length", count=SAMPLES)
+    met = np.isfinite(samples.places.pose[:, 0])
+    vectors, _ = lines(samples.robot, samples.places.pose[met], samples.places.carriers[met, :, :3])
+    off = np.abs(np.linalg.norm(vectors, axis=-1) - FIXED).max()
+    return compared(
+        "step-c",
+        "step (c), Eqs. 1, 2",
+        f"The position follows from Eqs. 1 and 2 with lengths of {FIXED:g} m (largest difference of the lengths).",
+        0.0,
+        float(off),
+        within=SAME,
+        agrees=f"Three spheres meet for {met.mean():.0%} of the loops of W1, in two points, of which the lower is "
+        "used. For W2 and W3 there are six unknowns in three equations, see step (b).",
+        differs="The lengths are others.",
+        unit="m",
+    )
+
+
+def _solved() -> Claim:
+    J = Dynamics(robot("wang-ctmrts", "both")).wrench_matrix(rest(3).pose)
+    columns = J.shape[1]
+    return stated(
+        "step-e",
+        "step (e)",
+        "If rank(A) = rank(A, b) = m, Eq. 13 gives T, else Eq. 18 (size of J for m = 3).",
+        "6 x 6",
+        f"{J.shape[0]} x {columns}",
+        holds=J.shape[0] == columns,
+        otherwise=Verdict.IMPOSSIBLE,
+        agrees="J has an inverse.",
+        differs=f"J has rank {rank(J)} = m here, but no inverse, which Eq. 13 takes; Eq. 16 is meant. There is no Eq. "
+        f"18: the equations end with {EQUATIONS}, which is meant.",
+    )
+
+
+def _bounded(poses: np.ndarray, forces: np.ndarray) -> Claim:
+    """Compare the poses that the loops record with those whose tensions meet Eq. 11."""
+    mover = robot("wang-ctmrts", "variable-length")
+    meets = ((forces > 0) & (forces < mover.t_max)).all(axis=1)
+    recorded = ForceBalance().holds(mover, Places.at_home(mover, poses))
+    too_much = float(((forces > 0).all(axis=1) & ~meets).sum() / (forces > 0).all(axis=1).sum())
+    return compared(
+        "step-f",
+        "step (f), Eq. 11",
+        "A position is recorded if all T meet Eq. 12 (share of poses that are recorded if and only if T, by a second "
+        "computation, is inside the bounds of Eq. 11).",
+        1.0,
+        float((meets == recorded).mean()),
+        within=0.0,
+        agrees=f"They are, where Eq. 11 is read for Eq. 12, which is the acceleration. Tensions above 500 N exclude "
+        f"{too_much:.1%} of the poses whose cables all pull.",
+        differs="Other poses are recorded.",
+    )
+
+
+def _figure(found: Equilibrium) -> Drawing:
+    mover = robot("wang-ctmrts", "both")
+    low, high = reach(mover)
+    vectors, _ = lines(mover, found.pose[None], mover.carrier_home[:, :3])
+    sketch = RobotSketch(
+        "three robots, cables of 1.2 m, at rest",
+        mover.home_anchors,
+        mover.home_anchors - vectors[0],
+        found.pose[:3],
+        mover.carrier_home[:, :3],
+        [carrier.name for carrier in mover.carriers],
+        list(zip(low, high, strict=True)),
+        found.tensions,
+        np.empty((0, 3)),
+        np.empty(0, dtype=bool),
+    )
+    return Drawing("Figure 1: robot-ends in their boxes (widths inferred), cables and load", draw(sketch))
