@@ -95,7 +95,7 @@ def workspace(
         ),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option("--figure", help="PNG file for a picture of the positions reached.")
+        Path | None, typer.Option("--figure", help="Picture of the positions reached to write: .png, .pdf or .svg.")
     ] = None,
     mesh: Annotated[
         Path | None,
@@ -113,6 +113,8 @@ def workspace(
     from ..workspace.condition import for_robots
     from ..writing import check_writable
 
+    if figure is not None:
+        style.check_picture(figure)
     for file in define or []:
         _import(file)
     loaded = load(robot)
