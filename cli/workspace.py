@@ -161,9 +161,7 @@ def workspace(
     if as_json:
         print_json({**summary, "reason": reason, "file": target, "figure": figure, "mesh": mesh})
     else:
-        _show(result, summary, size)
-        if reason is not None:
-            typer.echo(f"  {reason}")
+        _show(result, summary, size, reason)
         print_written(written)
     if not summary["accepted"]:
         raise typer.Exit(1)
@@ -260,7 +258,7 @@ def _summary(result: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None) -> None:
+def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
     import math
 
     from ..text import quantity
@@ -269,6 +267,8 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None) -> No
     typer.echo(
         f"{summary['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted ({accepted / samples:.2%})"
     )
+    if reason is not None:
+        typer.echo(f"  why: {reason}")
     low, high = summary["volume_interval"]
     unit = summary["volume_unit"].replace("1", "")
     between = f", from {quantity(low, digits=6)} to {quantity(high, unit, digits=6)}"
