@@ -113,8 +113,6 @@ def workspace(
     from ..workspace.condition import for_robots
     from ..writing import check_writable
 
-    if figure is not None:
-        style.check_picture(figure)
     for file in define or []:
         _import(file)
     loaded = load(robot)
@@ -133,6 +131,8 @@ def workspace(
             raise InputError(f"{what} must be another file than {taken[place]}, got {file}")
         if place is not None:
             taken[place] = what
+    if figure is not None:
+        style.check_picture(figure)
     # Before the samples, so that an error in it is reported before hours of work.
     surface = None if mesh is None else _boundary(loaded, required, region)
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as progress:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+FLAT = 0.3  # of the largest range of tensions: panels of smaller ones have scales of their own
+
+
 def path(trajectory: xr.Dataset) -> Figure:
     """Draw the paths of platform and carriers in {G}, with the lines between them at a few instants."""
     canvas = style.figure(height=3.3)
@@ -45,7 +48,7 @@ def tensions(trajectory: xr.Dataset) -> Figure:
 
 
 def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
-    """Draw the tensions of several plans of one robot with their limits, panels of the same scales below each other.
+    """Draw the tensions of several plans of one robot with their limits, panels below each other.
 
     Where no tensions exist, thin lines show the tensions that the motion would need without limits, pushing included.
 
@@ -59,10 +62,10 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
     canvas = style.figure(height=1.1 + 1.6 * len(trajectories) + 0.4 * phases + 0.4 * missing)
     panels = style.panels_below(canvas, "time [s]", ["tension [N]"] * len(trajectories))
     for ax, (title, trajectory) in zip(panels, trajectories.items(), strict=True):
-        ax.sharey(panels[0])
         _draw_tensions(ax, trajectory)
         if title:
             style.heading(ax, title)
+    _same_scale(panels)
     style.legend_below(canvas, *panels)
     return canvas
 
@@ -82,6 +85,17 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
     ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())), top=1.08 * max(highest, 1e-3))
     style.legend_below(canvas, ax)
     return canvas
+
+
+def _same_scale(panels: list[Axes]) -> None:
+    """Give panels one vertical axis, unless the curves of one would look flat on it."""
+    ends = np.array([ax.get_ylim() for ax in panels])
+    spans = np.ptp(ends, axis=1)
+    if spans.min() < FLAT * spans.max():
+        return
+    for ax in panels[1:]:
+        ax.sharey(panels[0])
+    panels[0].set_ylim(ends[:, 0].min(), ends[:, 1].max())
 
 
 def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:

@@ -119,9 +119,10 @@ def axes_in_space(canvas: Figure, text: float = TEXT) -> Any:
 
     ax: Any = canvas.add_subplot(projection=Axes3D.name)
     for axis in "xyz":
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]", fontsize=text, labelpad=0.4 * text)
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]", fontsize=text, labelpad=(0.9 if axis == "z" else 0.4) * text)
         getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
     ax.tick_params(labelsize=text - TEXT + NOTE, pad=0.0)
+    ax.tick_params(axis="z", pad=0.5 * text)  # its numbers run across it
     return ax
 
 
