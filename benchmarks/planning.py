@@ -75,7 +75,7 @@ def draw(times: list[float], path: Path) -> None:
     """Draw towline's time against the number of steps, with a line of constant cost a step and 20 % above it."""
     from ..figures import style
 
-    canvas = style.figure(4.0, 3.0)
+    canvas = style.figure()
     ax = style.axes(canvas, "intervals N", "build and solve [s]")
     steps = np.array(STEPS, dtype=float)
     ax.loglog(steps, times, "o-", color=style.colour(0), label="towline")

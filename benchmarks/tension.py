@@ -304,7 +304,7 @@ def _picture(report: Report, path: Path) -> Path:
     sizes = {int(row.task.split("= ")[1]) for row in report.rows}
     m = min(sizes, key=lambda size: abs(size - 8))
     names = list(dict.fromkeys(row.contender for row in report.rows))[::-1]
-    canvas = style.figure(6.0, 1.0 + 0.22 * len(names))
+    canvas = style.figure(height=1.0 + 0.17 * len(names))
     ax = style.axes(canvas, f"time, as a ratio to {REFERENCE}", "")
     for index, kind in enumerate(KINDS):
         here = {row.contender: row for row in report.rows if row.task == f"{kind}, m = {m}"}
@@ -312,10 +312,10 @@ def _picture(report: Report, path: Path) -> Path:
         ratios = [here[name].ratio for name in shown]
         failed = ["none" if here[name].failures else style.colour(index) for name in shown]
         y = [names.index(name) for name in shown]
-        ax.scatter(ratios, y, marker="os^D"[index], s=22, c=failed, edgecolors=style.colour(index), label=kind)
+        ax.scatter(ratios, y, marker="os^D"[index], s=14, c=failed, edgecolors=style.colour(index), label=kind)
     ax.axvline(1.0, **style.LIMIT)
     ax.set_xscale("log")
     ax.set_yticks(range(len(names)), names)
-    ax.set_title(f"m = {m}; hollow: some answers wrong", fontsize="medium")
-    ax.legend(fontsize="small")
+    style.heading(ax, f"m = {m}; hollow: some answers wrong")
+    style.legend_below(canvas, ax)
     return style.save(canvas, path)

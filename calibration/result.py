@@ -271,18 +271,23 @@ class Calibration:
 
         return drawings(self)
 
-    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Save the figures as PNG files in `folder`, and return their paths.
+    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
+        """Save the figures in `folder`, and return their paths.
+
+        Parameters
+        ----------
+        format
+            png, pdf or svg.
 
         Raises
         ------
         InputError
-            If the folder cannot be written.
+            If the format is another, or a file cannot be written.
         """
         from ..figures import style
 
-        into = file_path("folder", folder)
-        return [style.save(drawn, into / f"{name}.png") for name, drawn in self.figures().items()]
+        into, suffix = file_path("folder", folder), style.check_format(format)
+        return [style.save(drawn, into / f"{name}.{suffix}") for name, drawn in self.figures().items()]
 
     def report(self) -> str:
         """Return the result as text, for people."""

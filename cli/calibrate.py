@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from .options import JsonOption, RobotArgument, print_json, print_written
+from ..inputs import one_of
+from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
 
 SIGMA_KEYS = "lengths, position, rotation"
 
@@ -56,6 +57,7 @@ def calibrate(
         Path | None,
         typer.Option("--figures", metavar="FOLDER", help="Folder to draw in: residuals, anchors, observability."),
     ] = None,
+    form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:
     """Find a robot's anchors, offsets and more from measured cable lengths, and write it as a robot file.
@@ -65,22 +67,24 @@ def calibrate(
     """
     from ..calibration import calibrate as find
     from ..calibration import read_measurements
+    from ..figures.style import FORMATS
     from ..models import load
     from ..writing import check_writable
 
+    one_of("--format", form, FORMATS)
     groups = [name.strip() for name in free.split(",")]
     stated = None if sigma is None else _sigma(sigma)
     known = None if prior is None else _by_name("--prior", prior)
     loaded = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
     if figures is not None:
-        check_writable(figures / "residuals.png")
+        check_writable(figures / f"residuals.{form}")
     if check_writable(target) == log.resolve():
         raise InputError(f"--out must be another file than the log, got {target}")
     measurements = read_measurements(log, stated)
     result = find(loaded, measurements, "auto" if groups == ["auto"] else groups, known, outliers)
     file = result.save(target)
-    pictures = [] if figures is None else result.plot(figures)
+    pictures = [] if figures is None else result.plot(figures, form)
     if as_json:
         print_json({**result.to_dict(), "file": file, "figures": pictures})
     else:

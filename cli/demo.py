@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_json, print_written
+from ..inputs import one_of
+from .options import FormatOption, JsonOption, print_json, print_written
 from .watching import COMPILING, watching
 
 
 def demo(
     folder: Annotated[Path, typer.Option("--out", help="Folder for pictures and files.")] = Path("towline-demo"),
+    form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:
     """Plan a circle of the flying cable robot and fly it in wind.
@@ -20,10 +22,12 @@ def demo(
     The circle is impossible while the quadrotor hovers, and feasible if it moves. The exit code is 0 if the plans show
     this and the flight passes.
     """
+    from ..figures.style import FORMATS
     from ..studies.flying import circle as flying_circle
 
+    one_of("--format", form, FORMATS)
     with watching("planning the circle with a quadrotor that may move", quiet=as_json) as progress:
-        result = flying_circle.run(folder, progress)
+        result = flying_circle.run(folder, progress, form)
     # Reports and files of the plans come first: they can be read while the first flight on a machine compiles, and
     # Ctrl-C loses none of them.
     if not as_json:
@@ -34,7 +38,7 @@ def demo(
         print_written([*result.pictures, *result.files])
         typer.echo(f"\nThis plan, flown in wind of {flying_circle.WIND} m/s with gusts of {flying_circle.GUSTS} m/s:\n")
     with watching(f"flying the circle in wind {COMPILING}", quiet=as_json):
-        flight, flown = flying_circle.fly(folder, result.free)
+        flight, flown = flying_circle.fly(folder, result.free, form)
     passed = result.as_expected and flight.passed
     if as_json:
         parts = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict(), "flight": flight.to_dict()}

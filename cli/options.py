@@ -45,6 +45,15 @@ CarrierPoseOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 
+FormatOption = Annotated[
+    str,
+    typer.Option(
+        "--format",
+        metavar="FORMAT",
+        help="Of figures, which are as wide as a journal's column (88 mm): png, pdf or svg.",
+    ),
+]
+
 
 def print_json(value: dict[str, Any]) -> None:
     """Print as JSON; numbers that are not finite become null, since JSON has no name for them, and paths text."""

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .options import JsonOption, RobotArgument, print_json, print_written
+from ..inputs import one_of
+from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
 from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
 from .watching import watching
@@ -41,6 +42,7 @@ def plan(
             "solver's convergence.",
         ),
     ] = None,
+    form: FormatOption = "png",
     report: Annotated[
         Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, to open anywhere.")
     ] = None,
@@ -88,12 +90,15 @@ def plan(
 
     With --vary it plans many, one for each combination of some values, and writes a table.
     """
+    from ..figures.style import FORMATS
+
+    one_of("--format", form, FORMATS)
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
                 instead = "the task's key robust serves all plans" if name == "--robust" else "--keep saves the plans"
                 raise InputError(f"{name} must be left out with --vary, got {value}; {instead}")
-        sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep), out, figures, as_json)
+        sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep, form), out, figures, as_json)
         return
     own = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
     for name, given in {**own, "--resume": resume, "--keep": keep}.items():
@@ -110,7 +115,7 @@ def plan(
         from ..figures.animation import check_film
 
         check_film(animate, speed, fps)
-    for file in (target, report, animate, figures and figures / "path.png"):
+    for file in (target, report, animate, figures and figures / f"path.{form}"):
         if file is not None:
             check_writable(file)
     with watching(f"planning {read.name}", quiet=as_json) as watch:
@@ -120,7 +125,7 @@ def plan(
             watch.now("searching for feasible tasks near this one")
             _ = planned.relaxations
         watch.now("drawing")
-        pictures = planned.plot(figures) if figures else []
+        pictures = planned.plot(figures, form) if figures else []
         if report is not None:
             written["report"] = planned.save_report(report)
         if animate is not None:

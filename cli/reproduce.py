@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
-from .options import JsonOption, print_json, print_written
+from ..inputs import one_of
+from .options import FormatOption, JsonOption, print_json, print_written
 from .watching import progress_bar
 
 if TYPE_CHECKING:
@@ -22,20 +23,23 @@ def reproduce(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report, errata and figures; default: towline-PAPER.")
     ] = None,
+    form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:
     """Recompute the equations, tables and figures of a paper, and report for each claim whether it is reproduced."""
+    from ..figures.style import FORMATS
     from ..studies.accounts.files import write
     from ..studies.papers import PAPERS
     from ..writing import check_writable
 
     if paper not in PAPERS:
         raise InputError(f"PAPER must be one of {', '.join(PAPERS)}, got {paper!r}")
+    one_of("--format", form, FORMATS)
     folder = out if out is not None else Path(f"towline-{paper}")
     check_writable(folder / f"{paper}.md")
     with progress_bar("", quiet=as_json) as progress:
         account = PAPERS[paper](progress)
-    files = write(account, folder)
+    files = write(account, folder, form)
     if as_json:
         print_json({**account.to_dict(), "files": files})
     else:

@@ -20,7 +20,9 @@ def robots(
         str | None,
         typer.Argument(metavar="ROBOT", help="A robot or robot file to diagnose.", autocompletion=robot_names),
     ] = None,
-    figure: Annotated[Path | None, typer.Option(metavar="FILE", help="PNG file to draw the robot in.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Picture of the robot to write: .png, .pdf or .svg.")
+    ] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of robot files.")] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -10,7 +10,7 @@ import typer
 from ..errors import InputError
 from ..inputs import one_of
 from ..processors import one_thread_each
-from .options import JsonOption, RobotArgument, numbers, print_json, print_written
+from .options import FormatOption, JsonOption, RobotArgument, numbers, print_json, print_written
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
 from .stopping import add_to_message
 from .watching import COMPILING, counting, watching
@@ -85,6 +85,7 @@ def simulate(
             "--figures", help="Folder to draw in: error, tensions and answers; with --runs: errors of all flights."
         ),
     ] = None,
+    form: FormatOption = "png",
     animate: Annotated[
         Path | None, typer.Option("--animate", help="Film of the flight to write: .gif, or .mp4 with ffmpeg.")
     ] = None,
@@ -97,7 +98,10 @@ def simulate(
     A flight passes if it lasts, its error stays within --tolerance, no tension exceeds t_max and no cable goes slack.
     The exit code is 0 if the flight passes, with --runs if all of them do, and else 1.
     """
+    from ..figures.style import FORMATS
+
     one_of("--controller", controller, CONTROLLERS)
+    one_of("--format", form, FORMATS)
     many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
     for name, given in many.items():
         if given and runs is None:
@@ -123,7 +127,7 @@ def simulate(
             from ..figures.animation import check_film
 
             check_film(animate, speed, fps)
-        for file in (target, animate, figures and figures / "error.png"):
+        for file in (target, animate, figures and figures / f"error.{form}"):
             if file is not None and check_writable(file) == (stored and stored.resolve()):
                 raise InputError(f"--out must be another file than the checkpoint, got {file}")
         conditions = {
@@ -138,11 +142,11 @@ def simulate(
         }
         if runs is None:
             film = None if animate is None else (animate, speed, fps)
-            passed = _fly_once(loaded, plan, conditions, target, figures, film, as_json)
+            passed = _fly_once(loaded, plan, conditions, target, (figures, form), film, as_json)
         else:
             conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
             conditions |= {"resume": resume is not None}
-            passed = _fly_often(loaded, plan, conditions, target, figures, as_json)
+            passed = _fly_often(loaded, plan, conditions, target, (figures, form), as_json)
     if not passed:
         raise typer.Exit(1)
 
@@ -152,18 +156,19 @@ def _fly_once(
     plan: Path,
     conditions: dict[str, Any],
     target: Path,
-    figures: Path | None,
+    drawn: tuple[Path | None, str],
     film: tuple[Path, float, float] | None,
     as_json: bool,
 ) -> bool:
     """Fly once, save, draw and print; return whether the flight passed."""
     from ..simulation import simulate
 
+    figures, form = drawn
     with watching(f"flying {plan.stem} {COMPILING}", quiet=as_json) as watch:
         flight = simulate(robot, plan, **conditions)
         written = {"file": flight.save(target)}
         watch.now("drawing")
-        pictures = [] if figures is None else flight.plot(figures)
+        pictures = [] if figures is None else flight.plot(figures, form)
         if film is not None:
             written["animation"] = flight.animate(*film)
     if as_json:
@@ -175,15 +180,16 @@ def _fly_once(
 
 
 def _fly_often(
-    robot: Robot, plan: Path, conditions: dict[str, Any], target: Path, figures: Path | None, as_json: bool
+    robot: Robot, plan: Path, conditions: dict[str, Any], target: Path, drawn: tuple[Path | None, str], as_json: bool
 ) -> bool:
     """Fly with many seeds, save, draw and print; return whether all flights passed."""
-    from ..figures import flight as drawn
+    from ..figures import flight as figure
     from ..figures import style
     from ..simulation import simulate
     from ..simulation.flights import report, save, summary
     from ..simulation.machine import prepare
 
+    figures, form = drawn
     with watching(f"flying {plan.stem} {COMPILING}", quiet=as_json):
         prepare()
     with counting(f"flying {plan.stem}", "passed", quiet=as_json) as show:
@@ -191,7 +197,7 @@ def _fly_often(
         flights = simulate(robot, plan, **conditions, progress=progress)
     add_to_message("")
     file = save(flights, target)
-    pictures = [] if figures is None else [style.save(drawn.errors(flights), figures / "errors.png")]
+    pictures = [] if figures is None else [style.save(figure.errors(flights), figures / f"errors.{form}")]
     if as_json:
         print_json({**summary(flights), "file": file, "figures": pictures})
     else:

@@ -27,6 +27,7 @@ class Sweeping:
     checkpoint: Path | None
     resume: Path | None
     keep: Path | None
+    form: str
 
 
 def sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures: Path | None, as_json: bool) -> None:
@@ -49,7 +50,7 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-sweep.nc")
     if target.suffix == ".csv":
         raise InputError(f"--out must be a NetCDF file, beside which the CSV is written, got {target}")
-    picture = None if figures is None else figures / "sweep.png"
+    picture = None if figures is None else figures / f"sweep.{options.form}"
     if picture is not None:
         check_figure(read_axes(vary))
     taken = None if stored is None else stored.resolve()

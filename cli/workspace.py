@@ -95,7 +95,7 @@ def workspace(
         ),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option("--figure", help="PNG file for a picture of the positions reached.")
+        Path | None, typer.Option("--figure", help="Picture of the positions reached to write: .png, .pdf or .svg.")
     ] = None,
     mesh: Annotated[
         Path | None,
@@ -131,6 +131,8 @@ def workspace(
             raise InputError(f"{what} must be another file than {taken[place]}, got {file}")
         if place is not None:
             taken[place] = what
+    if figure is not None:
+        style.check_picture(figure)
     # Before the samples, so that an error in it is reported before hours of work.
     surface = None if mesh is None else _boundary(loaded, required, region)
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as progress:
@@ -159,9 +161,7 @@ def workspace(
     if as_json:
         print_json({**summary, "reason": reason, "file": target, "figure": figure, "mesh": mesh})
     else:
-        _show(result, summary, size)
-        if reason is not None:
-            typer.echo(f"  {reason}")
+        _show(result, summary, size, reason)
         print_written(written)
     if not summary["accepted"]:
         raise typer.Exit(1)
@@ -258,7 +258,7 @@ def _summary(result: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None) -> None:
+def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
     import math
 
     from ..text import quantity
@@ -267,6 +267,8 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None) -> No
     typer.echo(
         f"{summary['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted ({accepted / samples:.2%})"
     )
+    if reason is not None:
+        typer.echo(f"  why: {reason}")
     low, high = summary["volume_interval"]
     unit = summary["volume_unit"].replace("1", "")
     between = f", from {quantity(low, digits=6)} to {quantity(high, unit, digits=6)}"

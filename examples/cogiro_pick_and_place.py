@@ -28,5 +28,5 @@ result = plan(
 )
 print(result.report())
 result.save("cogiro_pick_and_place.nc")
-result.figures()["views"].savefig("cogiro_pick_and_place.png", dpi=80)
+result.figures()["views"].savefig("cogiro_pick_and_place.png", dpi=150)
 print("saved: cogiro_pick_and_place.nc, cogiro_pick_and_place.png")

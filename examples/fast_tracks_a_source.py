@@ -41,5 +41,5 @@ result = plan(
 print(result.report())
 print(f"zenith angle: {np.degrees(np.arccos(up)).min():.1f} to {np.degrees(np.arccos(up)).max():.1f} degrees")
 result.save("fast_tracks_a_source.nc")
-result.figures()["views"].savefig("fast_tracks_a_source.png", dpi=80)
+result.figures()["views"].savefig("fast_tracks_a_source.png", dpi=150)
 print("saved: fast_tracks_a_source.nc, fast_tracks_a_source.png")

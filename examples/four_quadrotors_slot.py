@@ -35,5 +35,5 @@ result = plan(
 )
 print(f"\r{result.report()}")
 result.save("four_quadrotors_slot.nc")
-result.figures()["views"].savefig("four_quadrotors_slot.png", dpi=80)
+result.figures()["views"].savefig("four_quadrotors_slot.png", dpi=150)
 print("saved: four_quadrotors_slot.nc, four_quadrotors_slot.png")

@@ -35,5 +35,5 @@ result = plan(
 )
 print(f"\r{result.report()}")
 result.save("three_quadrotors_take_off.nc")
-result.figures()["tensions"].savefig("three_quadrotors_take_off.png", dpi=80)
+result.figures()["tensions"].savefig("three_quadrotors_take_off.png", dpi=150)
 print("saved: three_quadrotors_take_off.nc, three_quadrotors_take_off.png")

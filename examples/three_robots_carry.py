@@ -25,5 +25,5 @@ result = plan(
 )
 print(result.report())
 result.save("three_robots_carry.nc")
-result.figures()["views"].savefig("three_robots_carry.png", dpi=80)
+result.figures()["views"].savefig("three_robots_carry.png", dpi=150)
 print("saved: three_robots_carry.nc, three_robots_carry.png")

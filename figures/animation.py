@@ -132,7 +132,7 @@ class _Stage:
         self._figure = style.figure(*SIZE)
         self._figure.set_dpi(DPI)
         self._canvas = FigureCanvasAgg(self._figure)
-        self._axes = style.axes_in_space(self._figure)
+        self._axes = style.axes_in_space(self._figure, text=10.0)
         self._draw_surroundings()
         self._make_actors()
         self._canvas.draw()
@@ -185,7 +185,7 @@ class _Stage:
             named.append(ax.add_collection3d(reach))
         corners = [corner for box in scene.boxes for corner in box]
         shown = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
-        style.equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]))
+        style.equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]), zoom=1.0)
         outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
         if outlines:
             keep_out = Line3DCollection(outlines, colors=style.colour(1), linewidths=0.8, label="keep out")

@@ -34,19 +34,17 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
         Rows of (iteration, objective, infeasibility) in order. Another run begins where the iteration number falls to
         0: a finer mesh, tighter limits, or a program with slacks.
     """
-    canvas = style.figure(5.0, 4.4)
-    above = style.axes(canvas, "", "infeasibility [-]", (2, 1, 1))
-    below = style.axes(canvas, "iteration (all solver runs)", "objective [-]", (2, 1, 2))
+    canvas = style.figure(height=3.3)
+    labels = ("infeasibility [-]", "objective [-]")
+    above, below = style.panels_below(canvas, "iteration (all solver runs)", labels)
     parts = runs(iterates)
     starts = np.cumsum([0, *(len(part) for part in parts)])
     for index, (part, start) in enumerate(zip(parts, starts, strict=False)):
         at = start + np.arange(len(part))
         look = {
-            "color": style.colour(index),
-            "linestyle": style.line_style(index),
+            **style.look(index),
             "marker": ".",
-            "markersize": 5,
-            "linewidth": 1.3,
+            "markersize": 3,
             "label": f"run {index + 1}",
         }
         above.plot(at, np.maximum(part[:, 2], FLOOR), **look)

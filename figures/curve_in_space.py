@@ -15,12 +15,11 @@ if TYPE_CHECKING:
 
 def curve_in_space(ways: Mapping[str, np.ndarray]) -> Figure:
     """Draw curves (n, 3) [m] with their names and equal scales; a dot marks the start of each."""
-    canvas = style.figure(5.0, 4.4)
+    canvas = style.figure(height=3.3)
     ax = style.axes_in_space(canvas)
     for index, (name, points) in enumerate(ways.items()):
-        look = {"color": style.colour(index), "linestyle": style.line_style(index)}
-        ax.plot(*points.T, **look, label=name)
+        ax.plot(*points.T, **style.look(index), label=name)
         ax.plot(*points[0], "o", color=style.colour(index), markersize=4)
     style.equal_scales(ax, np.concatenate(list(ways.values())))
-    ax.legend(fontsize="small", loc="upper left")
+    style.legend_below(canvas, ax)
     return canvas

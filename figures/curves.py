@@ -48,7 +48,7 @@ def curves(
 ) -> Figure:
     """Draw panels over `x` (n,); curves of one name look the same in all of them.
 
-    Every second curve is dashed, so that curves on top of each other stay visible.
+    Curves differ by their dashes, so that those on top of each other stay visible.
 
     Parameters
     ----------
@@ -57,17 +57,18 @@ def curves(
     marks
         Positions of vertical lines, by their names in the legend.
     """
-    canvas = style.figure(5.0, 1.2 + 2.0 * len(panels))
+    canvas = style.figure(height=0.9 + 1.4 * len(panels))
     looks: dict[str, int] = {}
-    for ax, panel in zip(style.panels_below(canvas, xlabel, [panel.label for panel in panels]), panels, strict=True):
+    labels = [style.typeset(panel.label) for panel in panels]
+    for ax, panel in zip(style.panels_below(canvas, style.typeset(xlabel), labels), panels, strict=True):
         ax.set_xscale("log" if logarithmic else "linear")
         ax.set_yscale("log" if panel.logarithmic else "linear")
         for name, values in panel.curves.items():
             index = looks.setdefault(name, len(looks))
-            ax.plot(x, values, color=style.colour(index), linestyle=("-", "--")[index % 2], label=name)
+            ax.plot(x, values, **style.look(index), label=name)
         for name, values in panel.dots.items():
             index = looks.setdefault(name, len(looks))
-            ax.plot(x, values, "o", markersize=4, color=style.colour(index), label=name)
+            ax.plot(x, values, "o", markersize=3, color=style.colour(index), label=name)
         for text, bound in panel.bounds.items():
             style.limit_line(ax, bound, text, place=0.01)
         for (text, place), dashes in zip((marks or {}).items(), cycle((":", "-.")), strict=False):

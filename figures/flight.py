@@ -13,10 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DASHES = ("-", "--", ":")
 OFFSET = 1e-6  # [m]; carriers that stay so near to their reference have no panel
 GREY = "#d4d4d4"
-GAP = 0.06  # of a panel's height, between the names of curves at its edge
+GAP = 0.065  # of a panel's height, between the names of curves at its edge
 HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
@@ -38,30 +37,31 @@ def flight(trajectory: xr.Dataset) -> Figure:
     answers = _answers(trajectory)
     draws.append(("", 0.1 + 0.18 * len(answers), _draw_answers))
     heights = [height for _, height, _ in draws]
-    canvas = style.figure(5.0, 0.9 + 1.15 * sum(heights))
+    canvas = style.figure(height=0.7 + 0.85 * sum(heights))
     panels = style.panels_below(canvas, "time [s]", [label for label, _, _ in draws], heights)
     for ax, (_, _, draw) in zip(panels, draws, strict=True):
         draw(ax, trajectory)
         ax.set_xlim(time[0], _end(time))
     canvas.align_ylabels(panels[:-1])
+    style.legend_below(canvas, panels[0])  # of a tolerance outside the plot
     return canvas
 
 
 def tensions(trajectory: xr.Dataset) -> Figure:
     """Draw real tensions, those commanded where they differ, their limits, and grey spans in which a cable is slack."""
-    canvas = style.figure(5.0, 3.8)
+    canvas = style.figure(height=3.1)
     ax = style.axes(canvas, "time [s]", "tension [N]")
     time, real, commanded = (trajectory[name].values for name in ("time", "tensions", "tensions_commanded"))
     t_min, t_max = trajectory["t_min"].values, trajectory["t_max"].values
     low, high = float(np.nanmin([real, commanded])), float(np.nanmax([real, commanded]))
     differs = np.abs(real - commanded) > DIFFERENCE * max(high - low, 1e-9)
     for index in range(real.shape[1]):
-        hue = style.colour(index)
-        ax.plot(time, real[:, index], linestyle=style.line_style(index), color=hue, linewidth=1.3)
-        ax.plot(time, np.where(differs[:, index], commanded[:, index], np.nan), "--", color=hue, linewidth=1.0)
-    ax.plot([], [], color="#444444", linewidth=1.3, label="real" if differs.any() else "real, and as commanded")
+        ax.plot(time, real[:, index], **style.look(index))
+        commands = np.where(differs[:, index], commanded[:, index], np.nan)
+        ax.plot(time, commands, color=style.colour(index), linewidth=0.6)
+    ax.plot([], [], color="#444444", linewidth=1.5, label="real" if differs.any() else "real, and as commanded")
     if differs.any():
-        ax.plot([], [], "--", color="#444444", linewidth=1.0, label="commanded, where it differs")
+        ax.plot([], [], color="#444444", linewidth=0.6, label="commanded, where it differs")
     slack = (real <= 0) & (t_min > 0)
     if slack.any():
         for start, stop in _spans(time, np.asarray(slack.any(axis=1))):
@@ -77,7 +77,7 @@ def tensions(trajectory: xr.Dataset) -> Figure:
     for name, limit in near:
         style.limit_line(ax, limit, f"{name} = {limit:g} N", place=0.01, above=name == "t_max")
     if far := [f"{name} = {limit:g} N" for name, limit in limits if (name, limit) not in near]:
-        ax.set_title(f"{', '.join(far)} (outside the plot)", fontsize=9)
+        style.far_limit(ax, f"{', '.join(far)}, outside the plot")
     ax.set_xlim(time[0], _end(time))
     _name_at_the_end(ax, real[-1], [str(cable) for cable in trajectory["cable"].values])
     style.legend_below(canvas, ax)
@@ -86,7 +86,7 @@ def tensions(trajectory: xr.Dataset) -> Figure:
 
 def errors(flights: xr.Dataset) -> Figure:
     """Draw the largest error of each of many flights, from the smallest to the largest, with the tolerance."""
-    canvas = style.figure(5.0, 3.2)
+    canvas = style.figure(height=2.5)
     largest, tolerance = np.sort(flights["error_max"].values), float(flights.attrs["tolerance_m"])
     passed = flights["passed"].values[np.argsort(flights["error_max"].values, kind="stable")]
     scale, unit = _scale(largest[-1])
@@ -101,7 +101,7 @@ def errors(flights: xr.Dataset) -> Figure:
         ax.set_ylim(bottom=0.0)
     _draw_tolerance(ax, tolerance, largest[-1], scale)
     ax.set_xlim(0, 100)
-    ax.legend(fontsize="small", loc="best")
+    style.legend_below(canvas, ax)
     return canvas
 
 
@@ -109,7 +109,7 @@ def _draw_error(ax: Axes, trajectory: xr.Dataset) -> None:
     error = trajectory["tracking_error"].values
     largest = float(error.max(initial=0.0, where=np.isfinite(error)))
     scale, unit = _scale(largest)
-    ax.plot(trajectory["time"].values, error / scale, color=style.colour(0), linewidth=1.2)
+    ax.plot(trajectory["time"].values, error / scale, **style.look(0))
     ax.set_ylabel(f"error [{unit}]")
     ax.set_ylim(bottom=0.0)
     _draw_tolerance(ax, float(trajectory.attrs["tolerance_m"]), largest, scale)
@@ -123,12 +123,12 @@ def _draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) ->
         style.limit_line(ax, tolerance / scale, text, place=0.01)
         ax.set_ylim(top=1.2 * max(tolerance, largest) / scale)
     else:
-        ax.set_title(f"{text} (outside the plot)", fontsize=9, loc="left")
+        style.far_limit(ax, f"{text}, above the plot")
 
 
 def _draw_wind(ax: Axes, trajectory: xr.Dataset) -> None:
     for index, (axis, values) in enumerate(zip("xyz", trajectory["wind"].values.T, strict=True)):
-        ax.plot(trajectory["time"].values, values, DASHES[index], color=style.colour(index), linewidth=1.1, label=axis)
+        ax.plot(trajectory["time"].values, values, **style.look(index), label=axis)
     _legend_beside(ax)
 
 
@@ -138,8 +138,7 @@ def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
     ax.set_ylabel(f"offset of\ncarriers [{unit}]")
     names = trajectory["carrier"].values[trajectory["carrier_moves"].values]
     for index, name in enumerate(names):
-        look = {"color": style.colour(index), "linestyle": DASHES[index % len(DASHES)], "linewidth": 1.1}
-        ax.plot(trajectory["time"].values, offsets[:, index] / scale, **look, label=str(name))
+        ax.plot(trajectory["time"].values, offsets[:, index] / scale, **style.look(index), label=str(name))
     ax.set_ylim(bottom=0.0)
     _legend_beside(ax)
 
@@ -148,8 +147,7 @@ def _draw_thrusts(ax: Axes, trajectory: xr.Dataset) -> None:
     thrusts = trajectory["actuation"].sel(actuator=THRUST).values
     for index, name in enumerate(trajectory["carrier"].values):
         if np.isfinite(thrusts[:, index]).any():
-            look = {"color": style.colour(index), "linestyle": DASHES[index % len(DASHES)], "linewidth": 1.1}
-            ax.plot(trajectory["time"].values, thrusts[:, index], **look, label=str(name))
+            ax.plot(trajectory["time"].values, thrusts[:, index], **style.look(index), label=str(name))
     _legend_beside(ax)
 
 
@@ -164,7 +162,7 @@ def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
     ax.set_ylim(len(answers) - 0.5, -0.5)
     ax.grid(False)
     ax.tick_params(axis="y", length=0)
-    ax.set_title("how each step was answered", fontsize=9, loc="left")
+    style.heading(ax, "how each step was answered")
 
 
 def _answers(trajectory: xr.Dataset) -> dict[str, int]:
@@ -202,7 +200,7 @@ def _scale(largest: float) -> tuple[float, str]:
 
 
 def _legend_beside(ax: Axes) -> None:
-    ax.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, handlelength=1.6)
+    ax.legend(fontsize=style.NOTE, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, handlelength=2.6)
 
 
 def _name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
@@ -217,11 +215,11 @@ def _name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
             xytext=(1.05, place),
             xycoords="axes fraction",
             va="center",
-            fontsize=9,
+            fontsize=style.NOTE,
             arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
             annotation_clip=False,
         )
-    ax.annotate("cable", (1.0, 1.02), xycoords="axes fraction", fontsize=9)
+    ax.annotate("cable", (1.0, 1.02), xycoords="axes fraction", fontsize=style.NOTE)
 
 
 def _spread(places: np.ndarray) -> np.ndarray:

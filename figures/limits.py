@@ -41,9 +41,9 @@ class Limited(NamedTuple):
 
 def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
     """Draw quantities over `times` (n,) [s], with a panel for each."""
-    canvas = style.figure(5.0, 0.9 + 1.5 * len(quantities))
+    canvas = style.figure(height=0.7 + 1.2 * len(quantities))
     looks: dict[str, int] = {}
-    panels = style.panels_below(canvas, "time [s]", [f"[{quantity.unit}]" for quantity in quantities])
+    panels = style.panels_below(canvas, "time [s]", [f"[{style.typeset(quantity.unit)}]" for quantity in quantities])
     for ax, quantity in zip(panels, quantities, strict=True):
         _panel(ax, times, quantity, looks)
     style.legend_below(canvas, *canvas.axes)
@@ -61,7 +61,7 @@ def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]
     else:
         for label, curve in zip(quantity.labels, values.T, strict=True):
             index = looks.setdefault(label, len(looks))
-            ax.plot(times, curve, color=style.colour(index), linestyle=style.line_style(index), label=label)
+            ax.plot(times, curve, **style.look(index), label=label)
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     bounds = [bound for bound in (quantity.low, quantity.high) if np.isfinite(bound)]
@@ -74,13 +74,15 @@ def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]
     middle, shown = (low + high) / 2, [low, high, *near]
     ax.set_ylim(min(*shown, middle - size / 2) - 0.1 * size, max(*shown, middle + size / 2) + 0.1 * size)
     ax.margins(x=0.01)
-    ax.set_title(f"{quantity.name}: {', '.join(notes)}", fontsize=9, loc="left")
+    style.heading(ax, style.typeset(f"{quantity.name}: {', '.join(notes)}"))
 
 
 def _as_text(quantity: Limited) -> str:
-    low, high, unit = quantity.low, quantity.high, quantity.unit
+    low, high, unit = quantity.low, quantity.high, quantity.unit.replace("-", "")
     if low == high:
-        return f"exactly {low:g} {unit}"
-    if np.isfinite(low) and np.isfinite(high):
-        return f"limits {low:g} {unit} and {high:g} {unit}"
-    return f"lower limit {low:g} {unit}" if np.isfinite(low) else f"limit {high:g} {unit}"
+        text = f"exactly {low:g}"
+    elif np.isfinite(low) and np.isfinite(high):
+        text = f"limits {low:g} and {high:g}"
+    else:
+        text = f"lower limit {low:g}" if np.isfinite(low) else f"limit {high:g}"
+    return f"{text} {unit}".rstrip()

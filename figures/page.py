@@ -9,6 +9,7 @@ import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 from string import Template
+from typing import NamedTuple
 
 from . import style
 from .drawing import Drawing
@@ -21,23 +22,43 @@ PAGE = Template("""\
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>$title</title>
 <style>
-:root { color-scheme: light; }
-body { font: 16px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 46rem; margin: 0 auto;
-  padding: 0.5rem 1rem 3rem; overflow-wrap: anywhere; }
+:root { color-scheme: light dark;
+  --ink: #222; --paper: #fff; --faint: #555; --line: #ddd; --box: #f6f6f6; --link: #0057a0; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e4e4e4; --paper: #17191c; --faint: #a9adb2; --line: #3c4046; --box: #22252a; --link: #7cbcf5; }
+}
+body { font: 16px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 46rem;
+  margin: 0 auto; padding: 0.5rem 1rem 3rem; overflow-wrap: anywhere; }
+a { color: var(--link); }
 h1 { font-size: 1.5rem; margin: 0.8rem 0 0.3rem; }
 h2 { font-size: 1.1rem; margin: 1.6rem 0 0.3rem; }
 h3 { font-size: 1rem; margin: 1.2rem 0 0.2rem; }
-.status { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: #f6f6f6; margin: 0.6rem 0; }
+.status { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: var(--box); margin: 0.6rem 0; }
 table { border-collapse: collapse; width: 100%; }
-th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid #ddd; }
+th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid var(--line); }
 th { font-weight: 600; width: 9.5rem; }
-.wide { overflow-x: auto; overflow-wrap: normal; }
+.wide { overflow-x: auto; }
 table.columns th { width: auto; }
+table.columns td, table.columns th { overflow-wrap: break-word; }  /* whole words decide the widths */
 tr.more th, tr.more td { border-top: 0; padding-top: 0; }
 figure { margin: 1.2rem 0; }
-img { max-width: 100%; height: auto; display: block; margin: auto; }
-figcaption, footer, .source { color: #555; font-size: 0.9rem; }
-pre { overflow-x: auto; font-size: 0.8rem; background: #f6f6f6; padding: 0.6rem; overflow-wrap: normal; }
+.side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(20rem, 100%), 1fr)); gap: 0 1rem; }
+/* Figures stay dark on white in either scheme: their colours are chosen for paper. */
+img { width: 100%; max-width: 32rem; height: auto; display: block; margin: auto; background: #fff;
+  border-radius: 0.3rem; }
+figcaption, footer, .source { color: var(--faint); font-size: 0.9rem; }
+details { border-top: 1px solid var(--line); padding: 0.25rem 0; }
+details > table, details > figure { margin: 0.3rem 0 0.8rem 1rem; width: calc(100% - 1rem); }
+summary { cursor: pointer; }
+pre { overflow-x: auto; font-size: 0.8rem; background: var(--box); padding: 0.6rem; overflow-wrap: normal; }
+@media (max-width: 40rem) {
+  th { width: 6.5rem; }
+  /* Each cell in a line of its own, behind the name of its column. */
+  table.columns tr.heads { display: none; }
+  table.columns tr { display: block; border-top: 1px solid var(--line); padding: 0.4rem 0; }
+  table.columns td { display: block; border-top: 0; padding: 0.1rem 0; }
+  table.columns td::before { content: attr(data-label) ": "; color: var(--faint); }
+}
 </style>
 </head>
 <body>
@@ -48,6 +69,12 @@ $parts
 </body>
 </html>
 """)
+
+
+class Link(NamedTuple):
+    """A link as HTML, safe to put into a page."""
+
+    html: str
 
 
 def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str]) -> str:
@@ -65,45 +92,62 @@ def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str])
     from .. import __version__
 
     return PAGE.substitute(
-        title=escape(title),
-        word=escape(word),
-        summary=escape(summary),
+        title=_safe(title),
+        word=_safe(word),
+        summary=_safe(summary),
         colour=colour,
         parts="\n".join(parts),
         version=escape(__version__),
     )
 
 
-def heading(text: str, level: int = 2) -> str:
-    """Return a heading of level 2 or 3."""
-    return f"<h{level}>{escape(text)}</h{level}>"
+def heading(text: str, level: int = 2, anchor: str = "") -> str:
+    """Return a heading of level 2 or 3; with an `anchor`, links lead to it."""
+    return f"<h{level}{_id(anchor)}>{_safe(text)}</h{level}>"
 
 
 def paragraph(text: str) -> str:
     """Return a paragraph of plain text."""
-    return f"<p>{escape(text)}</p>"
+    return f"<p>{_safe(text)}</p>"
+
+
+def link(text: str, anchor: str) -> Link:
+    """Return a cell of a table, or an entry of the contents, that leads to an anchor of this page."""
+    return Link(f'<a href="#{escape(anchor)}">{_safe(text)}</a>')
+
+
+def contents(links: Iterable[Link]) -> str:
+    """Return a table of contents."""
+    return "<nav><ul>\n" + "\n".join(f"<li>{one.html}</li>" for one in links) + "\n</ul></nav>"
 
 
 def facts(title: str, rows: Iterable[tuple[str, str]], level: int = 2) -> str:
     """Return a table of named facts with a heading; a fact without a name continues the one before it."""
-    lines = [
-        f'<tr{"" if name else " class=more"}><th scope="row">{escape(name)}</th><td>{escape(fact)}</td></tr>'
-        for name, fact in rows
-    ]
-    return heading(title, level) + "\n<table>\n" + "\n".join(lines) + "\n</table>"
+    return f"{heading(title, level)}\n{_facts(rows)}"
 
 
-def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table with a heading and column names; on a narrow screen it scrolls."""
-    first = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
-    lines = ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows]
-    inner = "\n".join([f"<tr>{first}</tr>", *lines])
+def folded(title: str, rows: Iterable[tuple[str, str]], anchor: str, more: str = "") -> str:
+    """Return a table of named facts, and `more` below it, folded under a title; a link to `anchor` unfolds it."""
+    # The anchor is inside: browsers open what hides the target of a link.
+    return f"<details><summary>{_safe(title)}</summary>\n{_facts(rows, anchor)}{more}</details>"
+
+
+def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str | Link]]) -> str:
+    """Return a table with a heading and column names; on a narrow screen each cell is a line behind its name."""
+    first = "".join(f'<th scope="col">{_safe(head)}</th>' for head in heads)
+    lines = ["<tr>" + "".join(map(_cell, heads, row)) + "</tr>" for row in rows]
+    inner = "\n".join([f'<tr class="heads">{first}</tr>', *lines])
     return f'{heading(title)}\n<div class="wide"><table class="columns">\n{inner}\n</table></div>'
+
+
+def side_by_side(pictures: Iterable[str]) -> str:
+    """Return figures beside each other where the screen is wide enough."""
+    return '<div class="side">\n' + "\n".join(pictures) + "\n</div>"
 
 
 def picture(drawing: Drawing) -> str:
     """Return a figure with its caption as an embedded image."""
-    caption = escape(drawing.caption)
+    caption = _safe(drawing.caption)
     image = base64.b64encode(style.svg(drawing.figure).encode()).decode()
     source = f"data:image/svg+xml;base64,{image}"
     return f'<figure><img alt="{caption}" src="{source}"><figcaption>{caption}</figcaption></figure>'
@@ -112,3 +156,25 @@ def picture(drawing: Drawing) -> str:
 def file(title: str, text: str) -> str:
     """Return the text of a file, folded under its title."""
     return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"
+
+
+def _safe(text: str) -> str:
+    """Return text in which no mark-up is left and powers of units are raised."""
+    return style.typeset(escape(text))
+
+
+def _id(anchor: str) -> str:
+    return f' id="{escape(anchor)}"' if anchor else ""
+
+
+def _facts(rows: Iterable[tuple[str, str]], anchor: str = "") -> str:
+    lines = [
+        f'<tr{"" if name else " class=more"}><th scope="row">{_safe(name)}</th><td>{_safe(fact)}</td></tr>'
+        for name, fact in rows
+    ]
+    return f"<table{_id(anchor)}>\n" + "\n".join(lines) + "\n</table>"
+
+
+def _cell(head: str, cell: str | Link) -> str:
+    inside = cell.html if isinstance(cell, Link) else _safe(cell)
+    return f'<td data-label="{escape(head)}">{inside}</td>'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,30 +14,31 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PHASE_NAMES = 45.0  # points above a panel, for the names of its phases
+
+FLAT = 0.3  # of the largest range of tensions: panels of smaller ones have scales of their own
 
 
 def path(trajectory: xr.Dataset) -> Figure:
     """Draw the paths of platform and carriers in {G}, with the lines between them at a few instants."""
-    canvas = style.figure(5.0, 4.4)
+    canvas = style.figure(height=3.3)
     ax = style.axes_in_space(canvas)
     position = trajectory["pose"].values[:, :3]
     carriers = trajectory["carrier_pose"].values[:, :, :3]
-    ax.plot(*position.T, color=style.colour(0), label="platform")
+    ax.plot(*position.T, **style.look(0), label="platform")
     for index, name in enumerate(trajectory["carrier"].values):
         if not trajectory["carrier_moves"].values[index]:
             continue  # cables hang from all over it: `views` has them
-        label, drawn = str(name), style.colour(index + 1)
+        label = str(name)
         if np.ptp(carriers[:, index], axis=0).max() < 1e-9:
-            ax.plot(*carriers[0, index], "s", color=drawn, label=f"{label} (at rest)")
+            ax.plot(*carriers[0, index], "s", color=style.colour(index + 1), markersize=4, label=f"{label} (at rest)")
         else:
-            ax.plot(*carriers[:, index].T, color=drawn, label=label)
+            ax.plot(*carriers[:, index].T, **style.look(index + 1), label=label)
         for row in np.linspace(0, len(position) - 1, 9).astype(int):
             ax.plot(*np.stack([position[row], carriers[row, index]]).T, color="#bbbbbb", linewidth=0.6)
     ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
     moving = trajectory["carrier_moves"].values
     style.equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
-    ax.legend(fontsize="small", loc="upper left")
+    style.legend_below(canvas, ax)
     return canvas
 
 
@@ -47,25 +48,31 @@ def tensions(trajectory: xr.Dataset) -> Figure:
 
 
 def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
-    """Draw the tensions of several plans of one robot with their limits, a panel with a title for each.
+    """Draw the tensions of several plans of one robot with their limits, panels below each other.
 
     Where no tensions exist, thin lines show the tensions that the motion would need without limits, pushing included.
+
+    Parameters
+    ----------
+    trajectories
+        Datasets of plans, by the titles of their panels.
     """
-    canvas = style.figure(1.0 + 4.0 * len(trajectories), 3.6)
-    panels = [
-        style.axes(canvas, "time [s]", "tension [N]", (1, len(trajectories), i + 1)) for i in range(len(trajectories))
-    ]
+    phases = any("phase" in trajectory.coords for trajectory in trajectories.values())
+    missing = any(not np.isfinite(trajectory["tensions"].values).all() for trajectory in trajectories.values())
+    canvas = style.figure(height=1.1 + 1.6 * len(trajectories) + 0.4 * phases + 0.4 * missing)
+    panels = style.panels_below(canvas, "time [s]", ["tension [N]"] * len(trajectories))
     for ax, (title, trajectory) in zip(panels, trajectories.items(), strict=True):
-        notes = _draw_tensions(ax, trajectory)
-        above = PHASE_NAMES if "phase" in trajectory.coords else None
-        ax.set_title("\n".join([*([title] if title else []), *notes]), fontsize=9, pad=above)
-    style.legend_below(canvas, panels[0])
+        _draw_tensions(ax, trajectory)
+        if title:
+            style.heading(ax, title)
+    _same_scale(panels)
+    style.legend_below(canvas, *panels)
     return canvas
 
 
 def base_offset(trajectory: xr.Dataset) -> Figure:
     """Draw the horizontal distance of each carrier from the platform, and its height above it."""
-    canvas = style.figure()
+    canvas = style.figure(height=2.7)
     ax = style.axes(canvas, "time [s]", "carrier position\nrelative to platform [m]")
     time = trajectory["time"].values
     trajectory = trajectory.isel(carrier=trajectory["carrier_moves"].values)
@@ -73,29 +80,40 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
     sideways = np.linalg.norm(apart[:, :, :2], axis=2)
     highest = float(max(sideways.max(), apart[:, :, 2].max()))
     for index, name in enumerate(trajectory["carrier"].values):
-        ax.plot(time, sideways[:, index], color=style.colour(index), label=f"{name}: horizontal")
-        ax.plot(time, apart[:, index, 2], "--", color=style.colour(index), label=f"{name}: height")
+        ax.plot(time, sideways[:, index], **style.look(2 * index), label=f"{name}: horizontal")
+        ax.plot(time, apart[:, index, 2], **style.look(2 * index + 1), label=f"{name}: height")
     ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())), top=1.08 * max(highest, 1e-3))
     style.legend_below(canvas, ax)
     return canvas
 
 
-def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> list[str]:
-    """Draw one panel; return the note for its caption."""
+def _same_scale(panels: list[Axes]) -> None:
+    """Give panels one vertical axis, unless the curves of one would look flat on it."""
+    ends = np.array([ax.get_ylim() for ax in panels])
+    spans = np.ptp(ends, axis=1)
+    if spans.min() < FLAT * spans.max():
+        return
+    for ax in panels[1:]:
+        ax.sharey(panels[0])
+    panels[0].set_ylim(ends[:, 0].min(), ends[:, 1].max())
+
+
+def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:
+    """Draw one panel."""
     time = trajectory["time"].values
     values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
     missing = ~np.isfinite(values).all(axis=1)
-    notes = []
     for index, cable in enumerate(trajectory["cable"].values):
-        look: dict[str, Any] = {"linestyle": style.line_style(index), "color": style.colour(index)}
-        ax.plot(time, values[:, index], **look, label=f"cable {cable}")
-        ax.plot(time, np.where(missing, unlimited[:, index], np.nan), **look, linewidth=0.8)
+        ax.plot(time, values[:, index], **style.look(index), label=f"cable {cable}")
+        needed = np.where(missing, unlimited[:, index], np.nan)
+        ax.plot(time, needed, **style.look(index) | {"linewidth": 0.6 * style.look(index)["linewidth"]})
     _draw_phases(ax, trajectory)
     if missing.any():
-        ax.fill_between(time, 0, 1, where=missing, color="#eeeeee", transform=ax.get_xaxis_transform(), step="mid")
-        shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N")
-        notes.append(f"grey: no tensions inside the limits; shortfall up to {shortfall}")
-    return notes + _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
+        shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N", digits=3)
+        label = f"no tensions inside the limits:\nshortfall up to {shortfall}; thin\nlines: needed without limits"
+        across = {"transform": ax.get_xaxis_transform(), "step": "mid", "label": label}
+        ax.fill_between(time, 0, 1, where=missing, color="#e4e4e4", linewidth=0, **across)
+    _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 
 
 def _draw_phases(ax: Axes, trajectory: xr.Dataset) -> None:
@@ -113,21 +131,28 @@ def _draw_phases(ax: Axes, trajectory: xr.Dataset) -> None:
             xytext=(0, 2),
             textcoords="offset points",
             rotation=45,
-            fontsize="small",
+            fontsize=style.NOTE,
         )
     reaction = trajectory["ground_reaction"].values
     if reaction.any():
-        ax.plot(trajectory["time"].values, np.where(reaction > 0, reaction, np.nan), color="#777777", label="ground")
+        ax.plot(
+            trajectory["time"].values,
+            np.where(reaction > 0, reaction, np.nan),
+            color="#aaaaaa",
+            linewidth=1.8,
+            label="ground",
+        )
 
 
-def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> list[str]:
-    """Draw the limits; return a note on upper limits too far away to draw without flattening the curves."""
+def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:
+    """Draw the limits; upper ones too far away to draw without flattening the curves are in the legend."""
     for low in np.unique(trajectory["t_min"].values):
         style.limit_line(ax, low, f"t_min = {low:g} N")
-    far = []
+    far: list[str] = []
     for high in np.unique(trajectory["t_max"].values):
         if high < 2 * np.abs(shown).max():
             style.limit_line(ax, high, f"t_max = {high:g} N", above=False)
         else:
             far.append(f"{high:g}")
-    return [f"t_max = {', '.join(far)} N (outside the plot)"] if far else []
+    if far:
+        style.far_limit(ax, f"t_max = {', '.join(far)} N,\nabove the plot")

@@ -50,7 +50,7 @@ def draw(sketch: RobotSketch) -> Figure:
     """Draw a robot."""
     from matplotlib import cm, colormaps, colors
 
-    canvas = style.figure(5.6, 4.6)
+    canvas = style.figure(height=3.2)
     ax = style.axes_in_space(canvas)
     inside = sketch.positions[sketch.feasible]
     if len(inside):
@@ -59,21 +59,20 @@ def draw(sketch: RobotSketch) -> Figure:
     scale = colors.Normalize(0, float(tensions.max()) or 1.0) if tensions is not None else None
     for index, (anchor, attachment) in enumerate(zip(sketch.anchors, sketch.attachments, strict=True)):
         shade = "#999999" if tensions is None or scale is None else colormaps["viridis_r"](scale(tensions[index]))
-        ax.plot(*np.stack([anchor, attachment]).T, color=shade, linewidth=1.2)
-    ax.scatter(*sketch.anchors.T, s=12, color="#000000", label="anchors")
-    ax.scatter(*sketch.com, s=24, color=style.colour(1), label="CoM")
+        ax.plot(*np.stack([anchor, attachment]).T, color=shade, linewidth=1.0)
+    ax.scatter(*sketch.anchors.T, s=8, marker="^", color="#000000", label="anchors")
+    ax.scatter(*sketch.com, s=14, color=style.colour(1), label="CoM")
     _draw_platform(ax, sketch.attachments)
     for low, high in sketch.boxes:
         for edge in box_edges(low, high):
             ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
     for position, name in zip(sketch.carriers, sketch.names, strict=True):
-        ax.text(*position, name, fontsize=7)
+        ax.text(*position, name, fontsize=style.NOTE)
     style.equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
-    ax.set_title(sketch.title, fontsize=9)
-    ax.legend(fontsize="x-small", loc="upper left")
+    ax.set_title(sketch.title, fontsize=style.TEXT)
+    style.legend_below(canvas, ax)
     if scale is not None:
-        mappable = cm.ScalarMappable(scale, "viridis_r")
-        canvas.colorbar(mappable, ax=ax, shrink=0.6, pad=0.12, label="tension [N]")
+        style.colour_bar(canvas, cm.ScalarMappable(scale, "viridis_r"), ax, "tension [N]", shrink=0.6, pad=0.14)
     return canvas
 
 

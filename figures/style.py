@@ -1,4 +1,4 @@
-"""Give every figure the same style: colour-blind safe, units on the axes, legible at 8 cm width."""
+"""Give every figure the same style: a journal's column wide, colour-blind safe, legible in grey, units on the axes."""
 
 from __future__ import annotations
 
@@ -8,17 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
+from ..inputs import one_of, printable
 from ..writing import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-# Okabe and Ito (2008), distinct for every kind of colour vision; black and yellow last.
-COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442"]
-LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 1.0}
-DPI = 160
+# Okabe and Ito (2008), distinct for every kind of colour vision, with wine of Tol (2021) for their yellow, which is too
+# light for lines on paper.
+COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#882255"]
+# On and off, in widths of the line: eight, one for each colour, so that curves differ where there is no colour.
+DASHES = ((), (5, 1.6), (1.2, 1.2), (6, 1.4, 1.2, 1.4), (10, 2), (2.6, 1.2), (6, 1.2, 1.2, 1.2, 1.2, 1.2), (1.2, 2.6))
+LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 0.8}
+COLUMN = 88 / 25.4  # width of a journal's column [inches]
+TEXT, NOTE = 8.0, 7.0  # sizes of letters [points]: labels of axes; numbers, legends, titles and notes
+BESIDE, LETTER = 36.0, 3.8  # points: labels and numbers beside axes; a letter of a title on the average
+FORMATS = ("png", "pdf", "svg")
+DPI = 300
 
 
 def colour(index: int) -> str:
@@ -26,29 +36,64 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
-def line_style(index: int) -> str:
-    """Return solid for the first eight colours, then dashed, so that more than eight series stay distinct."""
-    return ["-", "--", ":", "-."][(index // len(COLOURS)) % 4]
+def line_style(index: int) -> tuple[float, tuple[float, ...]] | str:
+    """Return the dashes of the index-th series: of sixteen, those with the same dashes differ in brightness."""
+    dashes = DASHES[(index + len(DASHES) // 2 * (index // len(COLOURS))) % len(DASHES)]
+    return (0.0, dashes) if dashes else "-"
 
 
-def figure(width: float = 5.0, height: float = 3.6) -> Figure:
+def look(index: int) -> dict[str, Any]:
+    """Return colour, dashes and width of the index-th series.
+
+    The solid line is wider: it stays visible on either side of a dashed one that lies on it.
+    """
+    return {
+        "color": colour(index),
+        "linestyle": line_style(index),
+        "linewidth": 1.2 if line_style(index) != "-" else 1.8,
+    }
+
+
+def typeset(unit: str) -> str:
+    """Return a unit, or text with units, with its powers raised: m/s^2 becomes m/s²."""
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
+def figure(width: float = COLUMN, height: float = 2.5) -> Figure:
     """Return an empty figure, size in inches, that belongs to no window."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def axes(canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
-    """Return axes with labels, a light grid and no box, at `place` (rows, columns, index)."""
-    return _dressed(canvas.add_subplot(*place), xlabel, ylabel)
+def axes(
+    canvas: Figure, xlabel: str, ylabel: str, place: tuple[int, int, int] = (1, 1, 1), share: Axes | None = None
+) -> Axes:
+    """Return axes with labels, a light grid and no box, at `place` (rows, columns, index).
+
+    With `share` they have the limits of those axes, horizontally and vertically.
+    """
+    return dressed(canvas.add_subplot(*place, sharex=share, sharey=share), xlabel, ylabel)
 
 
-def _dressed(ax: Axes, xlabel: str, ylabel: str) -> Axes:
-    ax.set_xlabel(xlabel)
-    ax.set_ylabel(ylabel)
-    ax.grid(True, color="#dddddd", linewidth=0.6)
+def dressed(ax: Axes, xlabel: str, ylabel: str) -> Axes:
+    """Return axes after labels, a light grid and no box were set."""
+    ax.set_xlabel(xlabel, fontsize=TEXT)
+    ax.set_ylabel(ylabel, fontsize=TEXT)
+    ax.tick_params(labelsize=NOTE)
+    ax.grid(True, color="#dddddd", linewidth=0.5)
     ax.spines[["top", "right"]].set_visible(False)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.get_offset_text().set_fontsize(NOTE)
     return ax
+
+
+def heading(ax: Axes, text: str, share: float = 1.0) -> None:
+    """Write a title above axes that have a `share` of a column's width, on the left, in lines that fit."""
+    from textwrap import fill
+
+    points = 72.0 * COLUMN * share - BESIDE
+    ax.set_title(fill(text, max(int(points / LETTER), 10), break_long_words=False), fontsize=NOTE, loc="left")
 
 
 def panels_below(
@@ -59,33 +104,38 @@ def panels_below(
     `heights` are relative; default: all are equal.
     """
     grid = canvas.add_gridspec(len(ylabels), 1, height_ratios=heights)
-    every = []
+    every: list[Axes] = []
     for row, ylabel in enumerate(ylabels):
         last = row == len(ylabels) - 1
-        every.append(_dressed(canvas.add_subplot(grid[row]), xlabel if last else "", ylabel))
+        panel = canvas.add_subplot(grid[row], sharex=every[0] if every else None)
+        every.append(dressed(panel, xlabel if last else "", ylabel))
         every[-1].tick_params(labelbottom=last)
     return every
 
 
-def axes_in_space(canvas: Figure) -> Any:
-    """Return axes of a 3-D picture, with coordinates and units as labels, and few ticks."""
+def axes_in_space(canvas: Figure, text: float = TEXT) -> Any:
+    """Return axes of a 3-D picture, with coordinates and units as labels of size `text` [points], and few ticks."""
     from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 
     ax: Any = canvas.add_subplot(projection=Axes3D.name)
     for axis in "xyz":
-        # Numbers run across the label of z: it stands off. Below, the others' labels would leave the figure.
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]", labelpad=7 if axis == "z" else 4)
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]", fontsize=text, labelpad=(0.9 if axis == "z" else 0.4) * text)
         getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
+    ax.tick_params(labelsize=text - TEXT + NOTE, pad=0.0)
+    ax.tick_params(axis="z", pad=0.5 * text)  # its numbers run across it
     return ax
 
 
-def equal_scales(ax: Any, points: np.ndarray) -> None:
-    """Set the same scale on all three axes, so that a circle looks like a circle."""
+def equal_scales(ax: Any, points: np.ndarray, zoom: float = 0.85) -> None:
+    """Set the same scale on all three axes, so that a circle looks like a circle.
+
+    `zoom` below 1 leaves a margin for labels, which the layout does not count.
+    """
     low, high = points.min(axis=0), points.max(axis=0)
     half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
     for axis, centre in zip("xyz", (low + high) / 2, strict=True):
         getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
-    ax.set_box_aspect((1, 1, 1))
+    ax.set_box_aspect((1, 1, 1), zoom=zoom)
 
 
 def few_ticks() -> MaxNLocator:
@@ -99,29 +149,106 @@ def limit_line(ax: Axes, value: float, text: str, place: float = 1.0, above: boo
     """Draw a limit as a dashed line with its name above or below it: 0 is at the left end, 1 at the right."""
     ax.axhline(value, **LIMIT)
     side, edge = "left" if place < 0.5 else "right", "bottom" if above else "top"
-    ax.annotate(text, (place, value), xycoords=("axes fraction", "data"), ha=side, va=edge, fontsize=8)
+    ax.annotate(
+        text,
+        (place, value),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 1 if above else -1),
+        textcoords="offset points",
+        ha=side,
+        va=edge,
+        fontsize=NOTE,
+        bbox={"facecolor": "#ffffff", "alpha": 0.7, "linewidth": 0, "pad": 0.2},
+    )
+
+
+def far_limit(ax: Axes, text: str) -> None:
+    """Name a limit in the legend that is too far from the curves to be drawn."""
+    ax.plot([], [], **LIMIT, label=text)
 
 
 def legend_below(canvas: Figure, *panels: Axes) -> None:
     """Draw one legend for all panels at the bottom, in rows of equal length that fit the width of the figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     shown = {}
     for ax in panels:
         handles, labels = ax.get_legend_handles_labels()
         shown = {**shown, **{label: it for label, it in zip(labels, handles, strict=True) if label not in shown}}
-    labels, handles = list(shown), list(shown.values())
-    if not labels:
+    count = len(shown)
+    if not count:
         return
-    longest = max(len(label) for label in labels)
-    most = max(int(canvas.get_figwidth() / (0.45 + 0.07 * longest)), 1)
-    rows = max(-(-len(labels) // most), 1)
-    columns = max(-(-len(labels) // rows), 1)
-    canvas.legend(handles, labels, fontsize="small", ncols=columns, loc="outside lower center", frameon=False)
+    renderer = FigureCanvasAgg(canvas).get_renderer()
+    for rows in range(1, count + 1):
+        legend = canvas.legend(
+            list(shown.values()),
+            list(shown),
+            fontsize=NOTE,
+            ncols=-(-count // rows),
+            loc="outside lower center",
+            frameon=False,
+            handlelength=2.6,
+            columnspacing=1.2,
+            borderpad=0.2,
+        )
+        if rows == count or legend.get_window_extent(renderer).width <= 0.98 * canvas.bbox.width:
+            return
+        legend.remove()
+
+
+def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes], label: str, **place: Any) -> None:
+    """Draw the scale of colours beside panels."""
+    bar = canvas.colorbar(shades, ax=panels, **place)
+    bar.set_label(label, fontsize=NOTE)
+    bar.ax.tick_params(labelsize=NOTE)
+
+
+def check_format(name: str) -> str:
+    """Return the format of a figure, one of `FORMATS`.
+
+    Raises
+    ------
+    InputError
+        If it is another.
+    """
+    return one_of("format", name, FORMATS)
+
+
+def check_picture(path: Path) -> Path:
+    """Return the path of a figure, whose suffix is one of `FORMATS`.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another.
+    """
+    if path.suffix[1:].lower() not in FORMATS:
+        accepted = ", ".join(f".{name}" for name in FORMATS)
+        raise InputError(f"a figure's file must end in one of {accepted}, got {printable(str(path))}")
+    return path
 
 
 def save(canvas: Figure, path: Path) -> Path:
-    """Save as PNG; a failure leaves no partial file."""
+    """Save as PNG, PDF or SVG, as the suffix of `path` states; a failure leaves no partial file.
+
+    PDF contains its fonts as TrueType (type 42), whose text can be searched and edited; SVG has letters as shapes.
+    Equal figures give equal files.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another, or the file cannot be written.
+    """
+    from matplotlib import rc_context
+
+    form = check_picture(path).suffix[1:].lower()
     with whole_file(path) as temporary:
-        canvas.savefig(temporary, dpi=DPI, format="png")
+        if form == "svg":
+            temporary.write_text(svg(canvas), encoding="utf-8")
+        else:
+            metadata = {"CreationDate": None} if form == "pdf" else None
+            with rc_context({"pdf.fonttype": 42}):
+                canvas.savefig(temporary, dpi=DPI, format=form, metadata=metadata)
     return path
 
 

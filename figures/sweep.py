@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKS = {"infeasible": "x", "not-found": "o", "failed": "^"}  # by status; feasible plans have a value
-MOST_TICKS = 8
+MOST_TICKS = 6
+MOST_COLUMNS = 3  # of maps side by side
 NOTHING = "#eeeeee"  # behind marks in a map
 
 
@@ -61,7 +62,7 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
     """Draw panels below each other, with the plans without a value along the bottom."""
     from matplotlib.transforms import blended_transform_factory
 
-    canvas = style.figure(5.0, 0.9 + 1.8 * len(quantities))
+    canvas = style.figure(height=0.8 + 1.3 * len(quantities))
     words = isinstance(axis.values[0], str)
     x = np.arange(len(axis.values)) if words else np.array(axis.values)
     order = np.argsort(x)
@@ -86,29 +87,30 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
 def _maps(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
     """Draw the maps of all quantities side by side; over three fields a row of maps for each quantity."""
     if len(axes) == 2:
-        canvas = style.figure(0.4 + 3.3 * len(quantities), 3.2)
-        for column, (label, values) in enumerate(quantities.items()):
-            ax = canvas.add_subplot(1, len(quantities), column + 1)
+        canvas = style.figure(height=0.7 + 2.0 * len(quantities))
+        panels = style.panels_below(canvas, axes[0].label, [axes[1].label] * len(quantities))
+        for ax, (label, values) in zip(panels, quantities.items(), strict=True):
             image = _map(ax, axes, values, status, _range(values))
-            ax.set_title(label, fontsize=9)
-            ax.set_xlabel(axes[0].label)
-            ax.set_ylabel(axes[1].label if column == 0 else "")
-            canvas.colorbar(image, ax=ax)
+            style.colour_bar(canvas, image, ax, label)
         return canvas
     third = axes[2]
-    canvas = style.figure(1.2 + 2.0 * len(third.values), 0.9 + 2.2 * len(quantities))
-    panels = canvas.subplots(len(quantities), len(third.values), sharex=True, sharey=True, squeeze=False)
-    for row, (label, values) in enumerate(quantities.items()):
-        for column, ax in enumerate(panels[row]):
-            image = _map(ax, axes, values[..., column], status[..., column], _range(values))
-            if row == 0:
-                ax.set_title(f"{third.label}: {third.texts[column]}", fontsize=9)
-            if column == 0:
-                ax.set_ylabel(axes[1].label)
-            if row + 1 == len(quantities):
-                ax.set_xlabel(axes[0].label)
-            if column + 1 == len(third.values):
-                canvas.colorbar(image, ax=list(panels[row]), label=label)
+    columns = min(len(third.values), MOST_COLUMNS)
+    rows = -(-len(third.values) // columns)  # for each quantity
+    canvas = style.figure(height=0.8 + 1.45 * rows * len(quantities))
+    canvas.suptitle(f"titles: {third.label}", fontsize=style.TEXT)
+    canvas.supylabel(axes[1].label, fontsize=style.TEXT)  # once: the maps are lower than it is long
+    for number, (label, values) in enumerate(quantities.items()):
+        drawn: dict[Axes, ScalarMappable] = {}
+        for place, text in enumerate(third.texts):
+            row, column = divmod(place, columns)
+            leftmost, lowest = column == 0, number + 1 == len(quantities) and place + columns >= len(third.texts)
+            cell = (rows * len(quantities), columns, (number * rows + row) * columns + column + 1)
+            shared = canvas.axes[0] if canvas.axes else None
+            ax = style.axes(canvas, axes[0].label if lowest else "", "", cell, shared)
+            drawn[ax] = _map(ax, axes, values[..., place], status[..., place], _range(values))
+            ax.tick_params(labelleft=leftmost, labelbottom=lowest)
+            style.heading(ax, text, 1 / columns)
+        style.colour_bar(canvas, next(iter(drawn.values())), list(drawn), label)
     return canvas
 
 
@@ -123,6 +125,7 @@ def _map(
 ) -> ScalarMappable:
     """Draw a cell for each plan, all of one size, since values need not be evenly spaced."""
     ax.set_facecolor(NOTHING)
+    ax.grid(False)
     image = ax.imshow(values.T, origin="lower", aspect="auto", cmap="viridis", vmin=ends[0], vmax=ends[1])
     for word, mark in MARKS.items():
         x, y = np.nonzero(status == word)

@@ -1,4 +1,4 @@
-"""Draw a plan from above and from the side: paths, cables at start and end, reach boxes, regions to keep out of."""
+"""Draw a plan from above and from the side: paths, bodies and cables at start and end, reach boxes, keep-outs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from . import style
 from .hull import outline
+from .projection import ABOVE, FRONT, views_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,21 +16,25 @@ if TYPE_CHECKING:
 
     from .animation import Scene
 
-VIEWS = (("from above", 0, 1), ("from the side, along y", 0, 2))  # and the axes of {G} in the picture
+NEAR = 0.3  # of the robot's extent
 FORBIDDEN = {"facecolor": "#e8e8e8", "edgecolor": "#666666", "hatch": "////", "linewidth": 0.8}
 REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewidth": 0.8}
 
 
 def views(scene: Scene) -> Figure:
     """Draw a scene of a few instants, from start to end, in two views of equal scale."""
-    canvas = style.figure(5.0, 6.4)
-    panels = [
-        style.axes(canvas, f"{'xyz'[across]} [m]", f"{'xyz'[up]} [m]", (2, 1, row + 1))
-        for row, (_, across, up) in enumerate(VIEWS)
-    ]
-    for ax, (title, across, up) in zip(panels, VIEWS, strict=True):
-        _view(ax, scene, [across, up])
-        ax.set_title(title, fontsize=9)
+    robot = np.vstack(
+        [
+            np.reshape(part, (-1, 3))
+            for part in (scene.anchors, scene.attachments, scene.path, scene.carriers, *scene.boxes)
+        ]
+    )
+    near = NEAR * np.ptp(robot, axis=0).max()  # of walls that are much larger than the robot the near part is drawn
+    lines = [line for outline_of in scene.obstacles for line in outline_of]
+    outlines = [np.clip(line, robot.min(axis=0) - near, robot.max(axis=0) + near) for line in lines]
+    canvas, panels = views_of(np.vstack([robot, *outlines]), (ABOVE, FRONT), below=0.7)
+    for ax, view in zip(panels, (ABOVE, FRONT), strict=True):
+        _view(ax, scene, [view.across, view.up])
     style.legend_below(canvas, panels[0])
     return canvas
 
@@ -47,18 +52,26 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
         for cable in range(scene.anchors.shape[1]):
             ends = np.stack([scene.anchors[k, cable], scene.attachments[k, cable]])[:, axes]
             ax.plot(*ends.T, color=shade, linewidth=0.8, label=label if cable == 0 else None)
-        body = outline(scene.attachments[k][:, axes])
-        if len(body) > 1:
-            ax.add_patch(Polygon(body, facecolor=shade, edgecolor=style.colour(0), alpha=0.6))
+        _body(ax, scene.attachments[k][:, axes], shade, style.colour(0))
+        for index, cables in enumerate(scene.bodies):
+            _body(ax, scene.anchors[k, cables][:, axes], shade, style.colour(index + 1))
+            ax.plot(*scene.carriers[k, index, axes], "s", color=style.colour(index + 1), markersize=3)
+    fixed = np.setdiff1d(np.arange(scene.anchors.shape[1]), np.concatenate([[], *scene.bodies]))
+    if len(fixed):
+        ax.plot(*scene.anchors[0, fixed][:, axes].T, "^", color="#000000", markersize=3, label="anchors on the ground")
     for index, name in enumerate(scene.names):
-        curve, drawn = scene.carriers[:, index][:, axes], style.colour(index + 1)
+        curve, look = scene.carriers[:, index][:, axes], style.look(index + 1)
         if np.ptp(scene.carriers[:, index], axis=0).max() < 1e-9:
-            ax.plot(*curve[0], "s", color=drawn, markersize=5, label=f"{name} (at rest)")
+            ax.plot([], [], "s", color=look["color"], markersize=3, label=f"{name} (at rest)")
         else:
-            ax.plot(*curve.T, color=drawn, label=name)
-    ax.plot(*scene.path[:, axes].T, color=style.colour(0), linewidth=2.0, label="platform")
-    ax.plot(*scene.path[0, axes], "o", color=style.colour(0), markersize=5, label="start")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.autoscale_view()
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(style.few_ticks())
+            ax.plot(*curve.T, **look, label=name)
+    ax.plot(*scene.path[:, axes].T, **style.look(0), label="platform")
+    ax.plot(*scene.path[0, axes], "o", color=style.colour(0), markersize=4, label="start")
+
+
+def _body(ax: Axes, corners: np.ndarray, inside: str, edge: str) -> None:
+    """Draw a body as the convex hull of its points (k, 2); two points have a line between them, one point has none."""
+    from matplotlib.patches import Polygon
+
+    if len(body := outline(corners)) > 1:
+        ax.add_patch(Polygon(body, facecolor=inside, edgecolor=edge, alpha=0.6, linewidth=0.8))

@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..text import quantity
 from . import style
+from .projection import ABOVE, FRONT, SIDE, views_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-VIEWS = ((0, 1), (0, 2), (1, 2))  # axes of {G} in the pictures: from above, along y, along x
+VIEWS = (ABOVE, FRONT, SIDE)
 MOST_POINTS = 20_000  # of a series in a panel: more are not visible, and files grow
 
 
@@ -27,12 +29,9 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
     marks
         Points to mark, such as anchors, (k, 3) [m].
     """
-    canvas = style.figure(7.2, 3.0)
-    panels = [
-        style.axes(canvas, f"{'xyz'[across]} [m]", f"{'xyz'[up]} [m]", (1, 3, column + 1))
-        for column, (across, up) in enumerate(VIEWS)
-    ]
-    for ax, axes in zip(panels, VIEWS, strict=True):
+    canvas, panels = views_of(np.vstack([*points.values(), *([] if marks is None else [marks])]), VIEWS)
+    for ax, view in zip(panels, VIEWS, strict=True):
+        axes = [view.across, view.up]
         _panel(ax, {label: some[:, axes] for label, some in points.items()}, None if marks is None else marks[:, axes])
     style.legend_below(canvas, panels[0])
     return canvas
@@ -52,17 +51,24 @@ def cross_sections(
     marks
         Points to mark, (k, 3) [m].
     """
-    canvas = style.figure(2.4 * len(heights), 2.8)
+    columns = min(len(heights), 2)
+    rows = -(-len(heights) // columns)
+    canvas = style.figure(height=0.5 + 1.5 * rows)
     shown = [points[np.abs(points[:, 2] - height) <= thickness / 2][:, :2] for height in heights]
     every = np.vstack([*shown, *([] if marks is None else [marks[:, :2]])])
-    for column, height in enumerate(heights):
-        ax = style.axes(canvas, "x [m]", "y [m]", (1, len(heights), column + 1))
-        _panel(ax, {"": shown[column]}, None if marks is None else marks[:, :2])
-        ax.set_title(f"z = {height:g} m ± {500 * thickness:g} mm, {len(shown[column])} points", fontsize=8)
+    first = None
+    for place, height in enumerate(heights):
+        lowest, leftmost = place + columns >= len(heights), place % columns == 0
+        labels = "x [m]" if lowest else "", "y [m]" if leftmost else ""
+        ax = style.axes(canvas, *labels, (rows, columns, place + 1), first)
+        first = first or ax
+        ax.tick_params(labelbottom=lowest, labelleft=leftmost)
+        _panel(ax, {"": shown[place]}, None if marks is None else marks[:, :2])
+        ax.set_aspect("equal", adjustable="box")  # the limits are what is to be equal
+        style.heading(ax, f"z = {height:g} m ± {500 * thickness:g} mm,\n{len(shown[place])} points", 1 / columns)
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             middle, half = (low + high) / 2, 0.55 * max(float((high - low).max()), 1e-6)
-            ax.set_adjustable("box")  # the limits are what is to be equal
             ax.set_xlim(middle[0] - half, middle[0] + half)
             ax.set_ylim(middle[1] - half, middle[1] + half)
     return canvas
@@ -79,20 +85,26 @@ def reached(result: xr.Dataset) -> Figure:
         From `workspace.sample`, with the counts `tried` and `reached` (x, y, z) of its cells.
     """
     thick = [name for name in ("x", "y", "z") if result.sizes[name] > 1]
-    pairs = [(a, b) for a, b in (("x", "y"), ("x", "z"), ("y", "z")) if a in thick and b in thick]
-    canvas = style.figure(width=0.9 + 2.2 * max(len(pairs), 1), height=2.8)
-    if not pairs:
+    views = [view for view in VIEWS if "xyz"[view.across] in thick and "xyz"[view.up] in thick]
+    accepted, samples = result.attrs["accepted"], result.attrs["samples"]
+    title = f"{result.attrs['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted"
+    if not views:
+        canvas = style.figure()
+        canvas.suptitle(title, fontsize=style.TEXT)
         _reached_along(canvas, result, thick[0] if thick else "x")
         return canvas
-    panels = []
-    for index, (across, up) in enumerate(pairs):
+    canvas, panels = views_of(
+        np.array(np.meshgrid(*(_ends(result[name].values) for name in "xyz"))).reshape(3, -1).T, views, 0.8
+    )
+    canvas.suptitle(title, fontsize=style.TEXT)
+    for ax, view in zip(panels, views, strict=True):
+        across, up = "xyz"[view.across], "xyz"[view.up]
         behind = next(name for name in ("x", "y", "z") if name not in (across, up))
-        ax = style.axes(canvas, f"{across} [m]", f"{up} [m]", (1, len(pairs), index + 1))
         share = _share(result, (behind,)).transpose(up, across)
+        ax.grid(False)
         ax.pcolormesh(result[across], result[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
-        ax.set_aspect("equal")
-        panels.append(ax)
-    canvas.colorbar(panels[0].collections[0], ax=panels, label="share accepted along the line of sight [-]")
+    label = "share accepted along the line of sight [-]"
+    style.colour_bar(canvas, panels[0].collections[0], panels, label, location="bottom", aspect=40)
     return canvas
 
 
@@ -103,9 +115,12 @@ def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) ->
         ax.plot(*shown.T, ".", color=style.colour(index), markersize=1.2, label=label or None, rasterized=True)
     if marks is not None:
         ax.plot(*marks.T, "^", color="#000000", markersize=4, label="anchors")
-    ax.set_aspect("equal", adjustable="datalim")
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(style.few_ticks())
+
+
+def _ends(centres: np.ndarray) -> list[float]:
+    """Return the outer edges of equal cells, from their centres."""
+    half = 0.5 * float(centres[1] - centres[0]) if len(centres) > 1 else 0.0
+    return [float(centres[0]) - half, float(centres[-1]) + half]
 
 
 def _reached_along(canvas: Figure, result: xr.Dataset, along: str) -> None:

@@ -219,16 +219,26 @@ class Plan:
 
         return save_netcdf(trajectory(self), file_path("file", file))
 
-    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Save the figures as PNG files in `folder`, and return their paths.
+    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
+        """Save the figures in `folder`, as wide as a journal's column (88 mm), and return their paths.
 
         Path, views, tensions, base offset, other limits and convergence. A figure without content is left out:
         convergence if no solver ran, base if every carrier is on the ground.
+
+        Parameters
+        ----------
+        format
+            png, pdf or svg.
+
+        Raises
+        ------
+        InputError
+            If the format is another, or a file cannot be written.
         """
         from ..figures import style
 
-        into = file_path("folder", folder)
-        return [style.save(drawn, into / f"{name}.png") for name, drawn in self.figures().items()]
+        into, suffix = file_path("folder", folder), style.check_format(format)
+        return [style.save(drawn, into / f"{name}.{suffix}") for name, drawn in self.figures().items()]
 
     def figures(self) -> dict[str, Figure]:
         """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.

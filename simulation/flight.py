@@ -249,12 +249,23 @@ class Flight:
         """
         return save_netcdf(self._contents(), file_path("file", file))
 
-    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Save the figures as PNG files in `folder`, and return their paths."""
+    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
+        """Save the figures in `folder`, as wide as a journal's column (88 mm), and return their paths.
+
+        Parameters
+        ----------
+        format
+            png, pdf or svg.
+
+        Raises
+        ------
+        InputError
+            If the format is another, or a file cannot be written.
+        """
         from ..figures import style
 
-        into = file_path("folder", folder)
-        return [style.save(drawn, into / f"{name}.png") for name, drawn in self.figures().items()]
+        into, suffix = file_path("folder", folder), style.check_format(format)
+        return [style.save(drawn, into / f"{name}.{suffix}") for name, drawn in self.figures().items()]
 
     def figures(self) -> dict[str, Figure]:
         """Draw the flight, by the names of files: "flight", error, answers, wind and carriers over time; "tensions"."""

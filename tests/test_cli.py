@@ -154,7 +154,7 @@ def test_a_folder_for_figures_that_is_a_file_is_told_before_planning(tmp_path):
 
 def test_plan_writes_a_file_and_figures(tmp_path):
     (tmp_path / "line.yaml").write_text(TASK)
-    done = run("plan", "wang-flying", "line.yaml", "--figures", "pictures", "--json", cwd=tmp_path)
+    done = run("plan", "wang-flying", "line.yaml", "--figures", "pictures", "--format", "pdf", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
     keys = {"feasible", "tension_min", "tension_max", "margin", "tracking_error_max", "build_s", "solve_s"}
@@ -165,7 +165,18 @@ def test_plan_writes_a_file_and_figures(tmp_path):
     saved = xr.load_dataset(tmp_path / report["file"])
     assert saved["tensions"].shape[1] == 6
     drawn = sorted(path.name for path in (tmp_path / "pictures").iterdir())
-    assert drawn == ["base.png", "path.png", "tensions.png", "views.png"]
+    assert drawn == ["base.pdf", "path.pdf", "tensions.pdf", "views.pdf"]
+    assert all((tmp_path / "pictures" / name).read_bytes().startswith(b"%PDF") for name in drawn)
+
+
+@pytest.mark.parametrize(
+    "command", ["plan wang-flying line.yaml", "simulate wang-flying line.nc", "reproduce flying", "demo"]
+)
+def test_another_format_of_figures_is_refused_before_any_work(command, tmp_path):
+    done = run(*command.split(), "--format", "jpg", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "towline: --format must be one of png, pdf, svg, got 'jpg'\n"
+    assert not list(tmp_path.iterdir())
 
 
 FREE_TASK = """\

@@ -145,3 +145,22 @@ def test_wrong_input_is_one_line_and_exit_code_2(folder, arguments, message):
     assert done.stderr.count("\n") == 1
     assert os.listdir(folder) == ["mass.yaml"]
     assert (folder / "mass.yaml").read_text() == ROBOT
+
+
+def test_too_few_cables_report_why_and_what_to_request(tmp_path):
+    done = run("wang-ctmrts", "--samples", "50", cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    why = done.stdout.splitlines()[1]
+    assert why.startswith("  why: 3 cables cannot balance 6 components of force and moment")
+    for condition in ("equilibrium-posture", "force-balance"):
+        assert condition in why
+        other = run("wang-ctmrts", "--samples", "50", "--condition", condition, "--json", cwd=tmp_path)
+        assert other.returncode == 0, other.stderr
+        assert json.loads(other.stdout)["accepted"] > 5
+
+
+def test_a_picture_of_another_format_is_refused_before_any_work(folder):
+    done = run("mass.yaml", "--figure", "f.jpg", cwd=folder)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert ".png, .pdf, .svg, got f.jpg" in done.stderr

@@ -248,6 +248,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "Plan.animate.file": lambda: "film.gif",
     "Flight.animate.file": lambda: "film.gif",
     "folder": lambda: "folder",
+    "format": lambda: "png",
     "precision": lambda: "double",
     "speed": lambda: 1.0,
     "fps": lambda: 5.0,

@@ -17,6 +17,7 @@ from towline.cli.watching import watching
 from towline.errors import InputError, TowlineError
 from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
+from towline.figures.style import typeset
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.excess import Excess
@@ -187,11 +188,11 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
         file = found.save_report(tmp_path / "new" / "report.html")
         text = file.read_text()
         page = Page(text)
-        told = [fact for section in sections(found) for fact in section.facts]
+        told = [(name, typeset(fact)) for section in sections(found) for name, fact in section.facts]
         # A table's row is one heading or one text here; the spans are below the first section, the stages at the end.
         for table, below in ((stages_table(found), len(told)), (spans_table(found), len(sections(found)[0].facts))):
             if table is not None:
-                told[below:below] = [("".join(table.columns), ""), *(("", "".join(row)) for row in table.rows)]
+                told[below:below] = [("".join(table.columns), ""), *(("", typeset("".join(row))) for row in table.rows)]
         assert [tuple(row) for row in page.rows] == told
         assert "viewport" in text
         assert found.status.value in page.text

@@ -144,5 +144,6 @@ def too_few_cables(robot: Robot) -> str | None:
         return None
     return (
         f"{robot.m} cables cannot balance {count} components of force and moment, except at single poses; "
-        "force-balance checks the forces alone, equilibrium-posture lets the platform turn"
+        "request equilibrium-posture, which lets the platform turn until they balance, or force-balance, which "
+        "checks the forces alone"
     )

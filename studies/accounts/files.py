@@ -13,8 +13,8 @@ from .account import Account
 __all__ = ["write"]
 
 
-def write(account: Account, folder: Path) -> list[Path]:
-    """Write report (Markdown and HTML), errata, claims (JSON) and figures (PNG) into `folder`; return their paths.
+def write(account: Account, folder: Path, form: str = "png") -> list[Path]:
+    """Write report (Markdown and HTML), errata, claims (JSON) and figures into `folder`; return their paths.
 
     Each file is written whole or not at all.
 
@@ -25,7 +25,7 @@ def write(account: Account, folder: Path) -> list[Path]:
     """
     name = account.paper.name
     texts = {
-        f"{name}.md": text.report(account),
+        f"{name}.md": text.report(account, form),
         f"{name}.html": page.page(account),
         f"{name}-errata.md": text.errata(account),
         f"{name}.json": json.dumps(account.to_dict(), indent=2, allow_nan=False) + "\n",
@@ -33,7 +33,7 @@ def write(account: Account, folder: Path) -> list[Path]:
     files = [_write(folder / file, text) for file, text in texts.items()]
     for chapter in account.chapters.values():
         for figure, drawing in chapter.drawings.items():
-            files.append(style.save(drawing.figure, folder / text.FIGURES / f"{figure}.png"))
+            files.append(style.save(drawing.figure, folder / text.FIGURES / f"{figure}.{form}"))
     return files
 
 

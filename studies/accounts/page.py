@@ -2,57 +2,76 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from ...figures import page as html
 from ...figures import style
-from .claim import Claim, value_text
+from .claim import Claim, Verdict, value_text
 from .text import READ
 
 if TYPE_CHECKING:
     from .account import Account, Chapter
 
+NOT_REPRODUCED = "What was not reproduced"
+
 
 def page(account: Account) -> str:
-    """Return the page: an overview, then chapter by chapter each claim with its figure."""
+    """Return the page: contents, counts, what was not reproduced, then the claims and figures of each chapter."""
     summary = f"{account.summary()}. Computed in {account.seconds:.0f} s."
     word, colour = ("complete", style.colour(0)) if account.complete else ("incomplete", style.colour(1))
-    parts = [_overview(account)]
-    for title, chapter in account.chapters.items():
-        parts += [html.heading(title), *_chapter(chapter)]
+    chapters = [(title, f"chapter-{number}") for number, title in enumerate(account.chapters, 1)]
+    links = [html.link(NOT_REPRODUCED, "errata"), *(html.link(*chapter) for chapter in chapters)]
+    parts = [html.contents(links), _counts(account, chapters), *_errata(account)]
+    for (title, anchor), chapter in zip(chapters, account.chapters.values(), strict=True):
+        parts += [html.heading(title, anchor=anchor), *_chapter(chapter)]
     parts += [html.heading(f"{title}: not computed") + html.paragraph(why) for title, why in account.broken.items()]
-    parts.append(_errata(account))
     return html.page(account.paper.source, word, summary, colour, parts)
 
 
-def _overview(account: Account) -> str:
+def _counts(account: Account, chapters: list[tuple[str, str]]) -> str:
+    """Return a table with the number of claims of each chapter by verdict."""
+    rows: list[list[str | html.Link]] = []
+    for link, chapter in zip(chapters, account.chapters.values(), strict=True):
+        counts = Counter(claim.verdict for claim in chapter.claims)
+        rows.append([html.link(*link), *(str(counts[verdict] or "–") for verdict in Verdict)])
+    return html.columns("Summary", ("chapter", *(verdict.value for verdict in Verdict)), rows)
+
+
+def _errata(account: Account) -> list[str]:
+    """Return what was not reproduced: where, what the paper states, and why; each leads to its claim."""
     rows = [
-        (claim.id, value_text(claim.printed, claim.unit), value_text(claim.computed, claim.unit), claim.verdict.value)
-        for claim in account.claims
+        (html.link(claim.place, _anchor(claim)), claim.statement, claim.verdict.value, claim.why)
+        for claim in account.errata
     ]
-    return html.columns("All claims", ("claim", "printed", "computed", "verdict"), rows)
-
-
-def _errata(account: Account) -> str:
-    rows = [(claim.id, claim.place, claim.verdict.value, claim.why) for claim in account.errata]
-    return html.columns("Errata", ("claim", "where", "verdict", "why"), rows) + html.paragraph(READ)
+    table = html.columns(NOT_REPRODUCED, ("where", "the paper states", "verdict", "why"), rows)
+    return ['<div id="errata">', table, html.paragraph(READ), "</div>"]
 
 
 def _chapter(chapter: Chapter) -> list[str]:
-    """Return claims, each figure after the first claim that it belongs to, then the figures that belong to no claim."""
-    parts, waiting = [], dict(chapter.drawings)
-    for claim in chapter.claims:
-        parts.append(_claim(claim))
-        if claim.figure in waiting:
-            parts.append(html.picture(waiting.pop(claim.figure)))
-    return [*parts, *(html.picture(drawing) for drawing in waiting.values())]
+    """Return the claims, folded, then the figures side by side, with the claims that each belongs to."""
+    captions = {name: [claim.place for claim in chapter.claims if claim.figure == name] for name in chapter.drawings}
+    drawings = [
+        drawing._replace(caption=f"{drawing.caption} ({', '.join(places)})" if places else drawing.caption)
+        for drawing, places in zip(chapter.drawings.values(), map(_once, captions.values()), strict=True)
+    ]
+    parts = [_claim(claim) for claim in chapter.claims]
+    return [*parts, *([html.side_by_side(map(html.picture, drawings))] if drawings else [])]
 
 
 def _claim(claim: Claim) -> str:
     rows = [
-        (claim.place, claim.statement),
         ("Printed", value_text(claim.printed, claim.unit)),
         ("Computed", value_text(claim.computed, claim.unit)),
         (claim.verdict.value.capitalize(), claim.why),
+        ("Name", claim.id),
     ]
-    return html.facts(claim.id, rows, level=3)
+    return html.folded(f"{claim.place}: {claim.statement} – {claim.verdict.value}", rows, _anchor(claim))
+
+
+def _anchor(claim: Claim) -> str:
+    return f"claim-{claim.id}"
+
+
+def _once(places: list[str]) -> list[str]:
+    return list(dict.fromkeys(places))

@@ -16,8 +16,8 @@ READ = (
 )
 
 
-def report(account: Account) -> str:
-    """Return the report: for each chapter a table of its claims, and its figures."""
+def report(account: Account, form: str = "png") -> str:
+    """Return the report: for each chapter a table of its claims, and its figures, files of the format `form`."""
     from ... import __version__
 
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
@@ -39,7 +39,7 @@ def report(account: Account) -> str:
         for name, drawing in chapter.drawings.items():
             shows = [claim.id for claim in chapter.claims if claim.figure == name]
             caption = f"{drawing.caption} ({', '.join(shows)})" if shows else drawing.caption
-            lines += ["", f"![{drawing.caption}]({FIGURES}/{name}.png)", "", f"*{caption}*"]
+            lines += ["", f"![{drawing.caption}]({FIGURES}/{name}.{form})", "", f"*{caption}*"]
     lines += [f"\n## {title}: not computed\n\n{why}" for title, why in account.broken.items()]
     return "\n".join([*lines, "", f"towline {__version__}", ""])
 

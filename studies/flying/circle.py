@@ -51,8 +51,8 @@ def tasks() -> tuple[Task, Task]:
     return hovering, Task(name="circle-free", path=CIRCLE, base=moving)
 
 
-def run(folder: Path, progress: Progress | None = None) -> FlyingCircle:
-    """Plan both tasks, and write two NetCDF files and three pictures into `folder`."""
+def run(folder: Path, progress: Progress | None = None, form: str = "png") -> FlyingCircle:
+    """Plan both tasks, and write two NetCDF files and three pictures of the format `form` into `folder`."""
     robot = load("wang-flying")
     hovering_task, free_task = tasks()
     hovering, free = plan(robot, hovering_task), plan(robot, free_task, progress)
@@ -63,12 +63,12 @@ def run(folder: Path, progress: Progress | None = None) -> FlyingCircle:
         "tensions": figures.tensions_side_by_side(both),
         "base": figures.base_offset(free.trajectory),
     }
-    pictures = [style.save(drawing, folder / f"{name}.png") for name, drawing in drawings.items()]
+    pictures = [style.save(drawing, folder / f"{name}.{form}") for name, drawing in drawings.items()]
     return FlyingCircle(hovering, free, pictures, files)
 
 
-def fly(folder: Path, planned: Plan) -> tuple[Flight, list[Path]]:
+def fly(folder: Path, planned: Plan, form: str = "png") -> tuple[Flight, list[Path]]:
     """Fly a plan in gusts; return the flight, and the NetCDF file and the picture written into `folder`."""
     flight = simulate(planned.scenario.robot, planned, wind=WIND, gusts=GUSTS)
     file = flight.save(folder / "circle-flight.nc")
-    return flight, [file, style.save(flight.figures()["flight"], folder / "flight.png")]
+    return flight, [file, style.save(flight.figures()["flight"], folder / f"flight.{form}")]

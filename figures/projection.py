@@ -1,0 +1,92 @@
+"""Lay out views of one object along the axes of {G}: panels of one scale that share their axes, as in a drawing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["ABOVE", "FRONT", "SIDE", "View", "views_of"]
+
+AIR = 0.05  # of an extent, beyond its ends
+FLAT = 0.22  # of the largest extent: thinner objects have panels so thick
+BESIDE, BETWEEN, ROW = 0.55, 0.45, 0.5  # inches: labels left of panels, between two, and below and above one
+TALLEST = 4.6  # inches, of the panels together: higher objects are drawn smaller
+
+
+class View(NamedTuple):
+    """A view along an axis of {G}: its name, and the axes of {G} across and up in the picture."""
+
+    name: str
+    across: int
+    up: int
+
+
+ABOVE = View("from above", 0, 1)
+FRONT = View("along y", 0, 2)
+SIDE = View("along x", 1, 2)
+
+
+def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a panel for each view, which hold `points` (n, 3) [m], at one scale.
+
+    The view from above is over the view along y, and that along x beside it, so that what belongs together is in line.
+
+    Parameters
+    ----------
+    below
+        Height for a legend [inches].
+    """
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.ones(3))
+    extent = (1 + 2 * AIR) * (high - low)
+    middle, extent = (low + high) / 2, np.maximum(extent, max(FLAT * float(extent.max()), 1e-6))
+    places = _places(views)
+    widths, heights = (
+        {place[k]: float(extent[view[k + 1]]) for view, place in zip(views, places, strict=True)} for k in (0, 1)
+    )
+    free = style.COLUMN - BESIDE - BETWEEN * (len(widths) - 1) - 0.1
+    scale = min(free / sum(widths.values()), TALLEST / sum(heights.values()))
+    canvas = style.figure(height=scale * sum(heights.values()) + ROW * len(heights) + below)
+    grid = canvas.add_gridspec(
+        len(heights),
+        len(widths),
+        width_ratios=[widths[column] for column in sorted(widths)],
+        height_ratios=[heights[row] for row in sorted(heights)],
+    )
+    panels: list[Axes] = []
+    for view, (column, row) in zip(views, places, strict=True):
+        same = {
+            name: panels[i] for i, place in enumerate(places[: len(panels)]) for name in _shared(place, (column, row))
+        }
+        lowest = row == max(heights)
+        ax = canvas.add_subplot(grid[row, column], **same)
+        style.dressed(ax, f"{'xyz'[view.across]} [m]" if lowest else "", f"{'xyz'[view.up]} [m]" if not column else "")
+        style.heading(ax, view.name, extent[view.across] / extent[[v.across for v in views]].max() / len(widths))
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_xlim(*(middle[view.across] + np.array([-0.5, 0.5]) * extent[view.across]))
+        ax.set_ylim(*(middle[view.up] + np.array([-0.5, 0.5]) * extent[view.up]))
+        ax.tick_params(labelbottom=lowest, labelleft=not column)
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(style.few_ticks())
+        panels.append(ax)
+    return canvas, panels
+
+
+def _places(views: Sequence[View]) -> list[tuple[int, int]]:
+    """Return column and row of each view: views of one axis across are in one column, of one axis up in one row."""
+    columns = list(dict.fromkeys(view.across for view in views))
+    rows = list(dict.fromkeys(view.up for view in views))
+    return [(columns.index(view.across), rows.index(view.up)) for view in views]
+
+
+def _shared(one: tuple[int, int], other: tuple[int, int]) -> list[str]:
+    """Return which axes two places share."""
+    return [name for k, name in enumerate(("sharex", "sharey")) if one[k] == other[k]]
