@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
+from websockets.datastructures import Headers
 
 from towline.errors import InputError
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.viewer import read, save_page, serve
+from towline.viewer.access import refusal
 from towline.viewer.cloud import cloud
 from towline.viewer.colours import place, rgb, shades
 from towline.viewer.geometry import Geometry
@@ -260,6 +262,109 @@ def test_nobody_can_have_it_open_a_tunnel():
         assert started.request_share_url() is None
     finally:
         server._stop(started)
+
+
+def answer(url, upgrade=True, **changed):
+    """Return the status with which a server answers a request, and its other headers."""
+    told = urlsplit(url)
+    headers = {"Host": told.netloc, "Origin": url} | changed
+    if upgrade:
+        headers |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+        headers |= {"Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol": "viser-v0"}
+    lines = ["GET / HTTP/1.1", *(f"{name}: {value}" for name, value in headers.items() if value is not None), "", ""]
+    with socket.create_connection((told.hostname, told.port), timeout=10) as line:
+        line.sendall("\r\n".join(lines).encode())
+        stream = line.makefile("rb")
+        head = [text.decode().strip() for text in iter(stream.readline, b"\r\n")]
+    return int(head[0].split()[1]), head[1:]
+
+
+def test_only_the_page_of_the_viewer_opens_a_socket():
+    with serve(read("planar-4"), port=0) as url:
+        port = urlsplit(url).port
+        assert answer(url)[0] == 101
+        renamed = f"localhost:{port}"
+        assert answer(url, Host=renamed, Origin=f"http://{renamed}")[0] == 101
+        for origin in (
+            "http://evil.example",
+            f"http://127.0.0.1:{port + 1}",
+            f"https://127.0.0.1:{port}",
+            "null",
+            None,
+        ):
+            assert answer(url, Origin=origin)[0] == 403, origin
+        # A foreign name that leads here: the browser then sends it as Host and as Origin.
+        for host in (f"evil.example:{port}", f"192.0.2.1:{port}", "", f"localhost@evil.example:{port}", "[::1", None):
+            assert answer(url, Host=host, Origin=f"http://{host}")[0] == 403, host
+            assert answer(url, upgrade=False, Host=host, Origin=None)[0] == 403, host
+        assert answer(url, Upgrade="WebSocket", Origin="http://evil.example")[0] == 403
+        status, headers = answer(url, upgrade=False, Origin=None)
+        assert status == 200
+        assert "Content-Security-Policy: frame-ancestors 'self'" in headers
+
+
+@pytest.mark.parametrize(
+    ("listening", "own", "foreign"),
+    [
+        ("0.0.0.0", "192.168.1.7:9000", "evil.example"),
+        ("::", "[fe80::1]:9000", "evil.example:9000"),
+        ("crane.local", "Crane.local:9000", "crane.local.evil.example"),
+        ("0.0.0.0", socket.gethostname(), f"{socket.gethostname()}.evil.example"),
+        ("127.0.0.1", "[::1]:8080", "192.168.1.7:8080"),
+    ],
+)
+def test_the_names_under_which_a_server_answers(listening, own, foreign):
+    def headers(host, origin):
+        return Headers([("Host", host), ("Upgrade", "websocket"), ("Origin", origin)])
+
+    assert refusal(headers(own, f"http://{own}"), listening) is None
+    assert "Host" in refusal(headers(foreign, f"http://{foreign}"), listening)
+    assert "Origin" in refusal(headers(own, f"http://{foreign}"), listening)
+    twice = headers(own, f"http://{own}")
+    twice["Host"] = own
+    assert "Host" in refusal(twice, listening)
+
+
+@pytest.mark.parametrize("name", ["pose", "carrier_pose", "time", "tensions"])
+@pytest.mark.parametrize("number", [1e300, -np.inf])
+def test_numbers_that_no_picture_can_show_are_refused(folder, tmp_path, name, number):
+    saved = xr.load_dataset(folder / "line.nc").copy(deep=True)
+    values = saved[name].to_numpy().copy()
+    values[-1 if number > 0 else 0] = number
+    saved[name] = (saved[name].dims, values)
+    saved.to_netcdf(tmp_path / "absurd.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=f"absurd.nc: {name} must have numbers up to"):
+        read(str(tmp_path / "absurd.nc"))
+
+
+def test_robots_that_no_picture_can_show_are_refused():
+    robot = load("planar-4")
+    wide = [carrier.model_copy(update={"home": (1e100, 0, 0, 0, 0, 0)}) for carrier in robot.carriers]
+    with pytest.raises(InputError, match="planar-4 must have a size of at least"):
+        Geometry(robot.model_copy(update={"carriers": wide}))
+
+
+def test_a_workspace_cannot_name_a_file_to_read(folder, tmp_path):
+    hostile = xr.load_dataset(folder / "all.nc")
+    (tmp_path / "secret.yaml").write_text("password")
+    hostile.attrs |= {"robot": str(tmp_path / "secret.yaml"), "accepted": "\x1b[2J", "samples": [1, 2]}
+    hostile.to_netcdf(tmp_path / "named.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match="--robot must be the file of") as error:
+        read(str(tmp_path / "named.nc"))
+    assert "password" not in str(error.value)
+    assert cloud(hostile, "named.nc").summary.startswith("? of ? samples")
+    hostile["position"][3] = 1e300
+    with pytest.raises(InputError, match="positions must be within"):
+        cloud(hostile, "named.nc")
+
+
+def test_texts_from_files_do_not_reach_the_terminal_as_commands(folder, tmp_path):
+    saved = xr.load_dataset(folder / "line.nc").isel(time=slice(3))
+    saved.attrs["status"] = "\x1b]0;gone\x07\x1b[2J\nfeasible" + 5000 * "x"
+    saved.to_netcdf(tmp_path / "hostile.nc", engine="h5netcdf")
+    title = read(str(tmp_path / "hostile.nc")).title
+    assert title.isprintable()
+    assert len(title) < 300
 
 
 def test_names_from_files_cannot_be_code(folder, tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
+from ..inputs import printable
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
@@ -17,11 +18,13 @@ from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
 from ..solvers import Certificate
-from .geometry import Extent, Geometry
+from .geometry import FARTHEST, Extent, Geometry
 from .instant import Instant, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
+LARGEST = 1e12  # of any number: velocities and tensions of real machines are far below
+LONGEST = 100  # letters of a text of the file
 
 
 class Replay:
@@ -58,16 +61,19 @@ class Replay:
         self.robot = parse_yaml(dataset.attrs["robot"], Robot, f"{where}, robot")
         self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
         what, status = "flight" if self._task is None else self._task.name, dataset.attrs.get("status", "a plan")
-        self.title = f"{self.robot.name}, {what}: {status}"
+        self.title = f"{self.robot.name}, {printable(what, LONGEST)}: {printable(str(status), LONGEST)}"
         self.geometry = Geometry(self.robot)
-        self.times = _array(dataset, "time", (-1,), where)
+        self.times = _array(dataset, "time", (-1,), where, largest=FARTHEST)
         n, c = len(self.times), len(self.robot.carriers)
-        self._pose, self._velocity, self._acceleration = (
-            _array(dataset, name, (n, 6), where) for name in ("pose", "velocity", "acceleration")
+        self._pose = _array(dataset, "pose", (n, 6), where, largest=FARTHEST)
+        self._velocity, self._acceleration = (
+            _array(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
         )
-        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where)
+        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
         self._tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
-        self.reference = _array(dataset, "reference_pose", (n, 6), where)[:, :3] if self._flown else None
+        self.reference = (
+            _array(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
+        )
         self._words = _answers(dataset) if self._flown else None
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
@@ -163,10 +169,17 @@ def _answers(dataset: xr.Dataset) -> list[str] | None:
     numbers = dataset["answered"].to_numpy().astype(int)
     if not ((numbers >= 0) & (numbers < len(words))).all():
         return None
-    return [words[number].replace("_", " ") for number in numbers]
+    return [printable(words[number].replace("_", " "), LONGEST) for number in numbers]
 
 
-def _array(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False) -> np.ndarray:
+def _array(
+    dataset: xr.Dataset,
+    name: str,
+    shape: tuple[int, ...],
+    where: str,
+    gaps: bool = False,
+    largest: float = LARGEST,
+) -> np.ndarray:
     """Return a variable as numbers of the expected shape, -1 for any length; `gaps` permits nan."""
     try:
         values = dataset[name].to_numpy().astype(float)
@@ -177,6 +190,7 @@ def _array(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, g
     )
     if not fits:
         raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")
-    if not gaps and not np.isfinite(values).all():
-        raise InputError(f"{where}: {name} must have finite numbers, got nan or infinity")
+    wrong = ~(np.abs(values) <= largest) & ~(gaps & np.isnan(values))
+    if wrong.any():
+        raise InputError(f"{where}: {name} must have numbers up to {largest:g}, got {values[wrong][0]:g}")
     return values

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..models import Dynamics
 from ..writing import whole_file
 from . import words
+from .access import guarded
 from .geometry import Geometry
 from .instant import at_rest
 from .panel import Panel
@@ -41,7 +42,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
         From `read`.
     host
         The address to listen on: 127.0.0.1 for this machine only. There is no password: on any other address, everyone
-        who reaches it can look.
+        who reaches it can look. Pages of other sites in a browser cannot, whatever the address.
     port
         The port; if it is in use, one of the next. 0 selects any free port.
 
@@ -148,8 +149,12 @@ def _start(host: str, port: int) -> viser.ViserServer:
         def request_share_url(self, verbose: bool = True) -> str | None:
             return None
 
-    with _quiet():
-        return Unshared(host=host, port=port, verbose=False)
+    with _quiet(), guarded(host) as guards:
+        server = Unshared(host=host, port=port, verbose=False)
+    if not guards:
+        _stop(server)
+        raise InputError("viser must start its server with websockets.serve; install the version of constraints.txt")
+    return server
 
 
 def _stop(server: viser.ViserServer) -> None:

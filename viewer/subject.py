@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..models import Robot, load
+from ..inputs import printable
+from ..models import Robot, available, load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +67,7 @@ def read(target: str, robot: str | None = None) -> Subject:
     """
     path = Path(target)
     if path.suffix == ".zarr" or _is_netcdf(path):
-        return _of_dataset(_open(path), target, robot)
+        return _of_dataset(_open(path), printable(target), robot)
     if robot is not None:
         raise InputError(f"--robot must be left out unless a workspace is shown, got {robot!r} with {target}")
     loaded = load(target)
@@ -85,13 +86,11 @@ def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
         raise InputError(f"{where} must be {ACCEPTED}, got a dataset that is neither a plan nor a workspace")
     from .cloud import cloud
 
-    name = str(dataset.attrs.get("robot"))
-    try:
-        loaded = load(robot if robot is not None else name)
-    except InputError:
-        if robot is not None:
-            raise
-        raise InputError(f"--robot must be the file of {name!r}, which is not in the library, for {where}") from None
+    name = printable(str(dataset.attrs.get("robot")), 64)
+    # A workspace names its robot: as a path, the name would make this program read any file.
+    if robot is None and name not in available():
+        raise InputError(f"--robot must be the file of {name!r}, which is not in the library, for {where}")
+    loaded = load(name if robot is None else robot)
     if loaded.name != name:
         raise InputError(f"--robot must be the file of {name!r}, whose workspace this is, got {loaded.name!r}")
     return Subject(f"{loaded.name}, workspace", loaded, cloud=cloud(dataset, where))
@@ -111,7 +110,7 @@ def _open(path: Path) -> xr.Dataset:
     import xarray as xr
 
     if not path.exists():
-        raise InputError(f"{path} does not exist; it must be {ACCEPTED}")
+        raise InputError(f"{printable(str(path))} does not exist; it must be {ACCEPTED}")
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path} must be {ACCEPTED}, got a folder")
     try:
@@ -125,4 +124,4 @@ def _open(path: Path) -> xr.Dataset:
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         # HDF5 has its own message of several lines, where others have a few words.
         reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
-        raise InputError(f"{path} must be {ACCEPTED}, got a file that cannot be read ({reason})") from None
+        raise InputError(f"{path} must be {ACCEPTED}, got a file that cannot be read ({printable(reason)})") from None
