@@ -41,6 +41,8 @@ class Replay:
     ----------
     robot, title, times
         Times of the saved instants (n,) [s].
+    tensions
+        (n, m) [N], nan where there are none.
     reference
         Origin of the platform's frame (n, 3) in {G} [m] where a flight should have it; None for a plan.
 
@@ -70,7 +72,7 @@ class Replay:
             _array(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
         )
         self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
-        self._tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
+        self.tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
         self.reference = (
             _array(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
         )
@@ -88,6 +90,11 @@ class Replay:
     def duration(self) -> float:
         """Return the time from the first to the last instant [s]."""
         return float(self.times[-1] - self.times[0])
+
+    @cached_property
+    def margins(self) -> np.ndarray:
+        """Return the smallest distance of a tension from its limits at each instant, (n,) [N]; nan without tensions."""
+        return np.minimum(self.tensions - self._t_min, self.robot.t_max - self.tensions).min(axis=1)
 
     @property
     def path(self) -> np.ndarray:
@@ -119,7 +126,7 @@ class Replay:
 
     def at(self, index: int) -> Instant:
         """Return the `index`-th instant with its audited tensions, or with a certificate if there are none."""
-        tensions = self._tensions[index]
+        tensions = self.tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
         certificate = None if there or self._task is None else self._certificate(index)

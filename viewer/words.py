@@ -66,8 +66,10 @@ def _table(instant: Instant, robot: Robot) -> str:
         )
         shown = f"{tension:.2f} N" if there else "none"
         limits = f"{robot.t_min[index]:g} to {robot.t_max[index]:g}"
+        # The colour of the cable's curve, where there are curves.
+        edge = "" if instant.time is None else f"border-left:4px solid {style.colour(index)};padding-left:6px"
         rows.append(
-            f'<tr><td>{index + 1}</td><td style="text-align:right;padding:0 10px" '
+            f'<tr><td style="{edge}">{index + 1}</td><td style="text-align:right;padding:0 10px" '
             f'class="towline-tension">{shown}</td><td>{bar}</td>'
             f'<td style="color:{MUTED};padding-left:10px">{limits}</td></tr>'
         )
