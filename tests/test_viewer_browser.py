@@ -106,6 +106,21 @@ def test_a_plan_plays_and_pauses(page, plan_file, tmp_path):
         page.screenshot(path=tmp_path / "plan.png")
 
 
+def test_on_a_phone_the_panel_leaves_the_upper_half_free_and_folds(page, tmp_path):
+    page.set_viewport_size({"width": 400, "height": 800})
+    with serve(read("wang-ctmrts"), port=0) as url:
+        page.goto(url)
+        page.wait_for_selector(".towline-readout")
+        sheet = page.locator(".mantine-Paper-root:has(.towline-readout)").last
+        box = sheet.bounding_box()
+        assert box["y"] >= 0.54 * 800
+        assert box["width"] >= 390
+        page.get_by_text("wang-ctmrts", exact=True).first.click()
+        page.wait_for_timeout(1000)
+        assert sheet.bounding_box()["y"] > 700
+        page.screenshot(path=tmp_path / "phone.png")
+
+
 def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     file = save_page(read(str(plan_file)), tmp_path / "line.html")
     page.goto(Path(file).as_uri())

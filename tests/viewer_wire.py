@@ -58,7 +58,7 @@ class Wire:
             elif "name" in message:
                 node = self.scene.setdefault(message["name"], {})
                 node.update(message.get("props") or {})
-                node.update({key: message[key] for key in ("position", "wxyz", "visible") if key in message})
+                node.update({key: message[key] for key in ("position", "wxyz", "visible", "owner") if key in message})
         self.buffers = buffers
         return True
 

@@ -20,6 +20,7 @@ from .access import guarded
 from .geometry import Geometry
 from .instant import at_rest
 from .panel import Panel
+from .posing import home_at_rest
 from .stage import Stage
 
 if TYPE_CHECKING:
@@ -57,6 +58,12 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
         geometry = Geometry(subject.robot)
         stage = Stage(server, subject, geometry, captioned=False)
         panel = Panel(server, subject, geometry, stage)
+
+        @server.on_client_connect
+        def _(client: viser.ClientHandle) -> None:
+            if client.camera.image_width < client.camera.image_height:
+                stage.frame(client.camera, client.camera.image_width, client.camera.image_height)
+
         try:
             # An address of IPv6 has colons of its own.
             yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
@@ -98,7 +105,7 @@ def _page(subject: Subject) -> str:
         replay = subject.replay
         if replay is None:
             robot = subject.robot
-            stage.show(at_rest(Dynamics(robot), geometry, robot.home, robot.carrier_home))
+            stage.show(at_rest(Dynamics(robot), geometry, home_at_rest(robot), robot.carrier_home))
             document = server.get_scene_serializer().as_html()
         else:
             frames = replay.frames(FRAME_RATE)
@@ -111,11 +118,13 @@ def _page(subject: Subject) -> str:
     finally:
         _stop(server)
     title = escape(subject.title)
-    # Above the picture, but the mouse goes through to it.
+    # Above the picture, but the mouse goes through to it, except on the title, which folds the rest.
     aside = (
-        '<aside style="position:fixed;left:8px;bottom:52px;max-width:260px;z-index:1;pointer-events:none;color:#222;'
-        f'background:#ffffffcc;font-family:system-ui,sans-serif"><div style="padding:4px 12px;font-weight:600">{title}'
-        f"</div>{words.legend(subject, stage.cell)}</aside>"
+        '<aside style="position:fixed;left:8px;bottom:52px;max-width:260px;max-height:70%;overflow:auto;z-index:1;'
+        'pointer-events:none;color:#222;background:#ffffffcc;font-family:system-ui,sans-serif"><details open>'
+        '<summary style="padding:4px 12px;font-weight:600;pointer-events:auto;cursor:pointer">'
+        f"{title}</summary>{words.legend(subject, stage.cell)}</details></aside>"
+        "<script>if(innerWidth<innerHeight)document.querySelector('aside details').open=false</script>"
     )
     head, _, rest = document.partition("<head>")
     body, end, tail = rest.rpartition("</body>")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .subject import Subject
 
 FIELD_OF_VIEW = 0.75  # [rad]
+WIDE = 1.4  # width over height of a picture
 CABLE_WIDTH = 4.0  # [pixels]
 THIN = 1.5
 BLACK, GREY = (0, 0, 0), (150, 150, 150)
@@ -51,7 +52,7 @@ class Stage:
         self._robot = subject.robot
         self._extent = extent = subject.replay.extent if subject.replay else geometry.extent
         self._size, self._centre = extent.size, (extent.low + extent.high) / 2
-        self._look(server)
+        self.frame(server.initial_camera, WIDE, 1.0)
         self._draw_surroundings(subject)
         self._make_actors(captioned)
 
@@ -108,13 +109,27 @@ class Stage:
             self._short.position = ends[1]
             _write(self._short, words.shortfall(instant))
 
-    def _look(self, server: viser.ViserServer) -> None:
-        """Point the camera at the whole robot from the front, a little from the side and above."""
-        camera = server.initial_camera
-        along = np.array([0.45, -1.0, 0.45])
-        away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2)
-        camera.position = self._centre + away * along / np.linalg.norm(along)
-        camera.look_at = self._centre
+    def frame(self, camera: Any, width: float, height: float) -> None:
+        """Point a camera at the whole robot from the front, a little from the side and above.
+
+        In a picture that is higher than wide, as on a phone, the camera is farther away, and the robot above the panel.
+
+        Parameters
+        ----------
+        camera
+            Of viser: the initial one, or that of a client.
+        width, height
+            Of its picture [pixels].
+        """
+        free = 1.0 - words.SHEET_SHARE if width < height else 1.0
+        along = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])
+        away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2) / min(width / height, free, 1.0)
+        side = np.cross([0.0, 0.0, 1.0], along)
+        upwards = np.cross(along, side / np.linalg.norm(side))
+        # The middle of what the panel leaves free, above the middle of the picture.
+        centre = self._centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
+        camera.position = centre + away * along
+        camera.look_at = centre
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 

@@ -21,6 +21,15 @@ MUTED = "#595959"
 GHOST = style.colour(2)  # of the reference of a flight
 STOPS = 9  # of the legend's gradient
 COLUMNS = (("cable", "left", 0), ("tension", "right", 10), ("", "left", 0), ("limits [N]", "left", 10))
+# On screens below 36 em, viser's panel is a sheet of 20 em that covers 60 % of the height.
+SHEET = ".mantine-Paper-root:has(.towline-readout)"
+NARROW = (
+    "<style>@media (max-width:36em){"
+    f"{SHEET}{{width:100%!important;max-height:45%!important}}"
+    f"{SHEET} div[style*='width: 20em']{{width:100%!important}}"
+    "}</style>"
+)
+SHEET_SHARE = 0.45  # of the height, see NARROW
 BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums"
 
 
@@ -38,7 +47,7 @@ def readout(instant: Instant, robot: Robot) -> str:
         lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
         if arrow(instant, 1.0) is None:
             lines.append(f'<div style="color:{MUTED}">The direction has almost no force, so it has no arrow.</div>')
-    pose = ", ".join(f"{value:.3f}" for value in instant.pose + 0.0)
+    pose = ", ".join(f"{value:.3f}" for value in np.round(instant.pose, 3) + 0.0)
     lines.append(f'<div style="color:{MUTED}">({", ".join(COORDINATES)}) = ({pose}) m, rad</div>')
     return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{_table(instant, robot)}</div>'
 
