@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from towline.errors import InputError
 from towline.models import load
 from towline.ocp import plan
 from towline.viewer import read, serve
@@ -108,3 +109,48 @@ def test_curves_at_other_times_end_where_the_motion_ends():
     other = two.on(np.array([-1.0, 1.0, 2.0, 3.0]))
     np.testing.assert_allclose(other.tensions, [[np.nan, np.nan], [2, 6], [3, 7], [np.nan, np.nan]])
     np.testing.assert_allclose(other.margins, [np.nan, 0.5, 1, np.nan])
+
+
+@pytest.fixture(scope="module")
+def compared(folder):
+    """Another plan, slower and elsewhere, beside `line`."""
+    path = {"kind": "line", "start": [0, 0, -1], "end": [-0.05, 0.02, -0.9]}
+    task = {"path": path, "duration": 3, "base": {"kind": "hold"}, "output_rate": 20}
+    plan(load("wang-flying"), task).save(folder / "slow.nc")
+    return read(str(folder / "line.nc"), other=str(folder / "slow.nc"))
+
+
+def test_two_plans_are_compared_at_the_same_time(compared, folder):
+    slow = xr.load_dataset(folder / "slow.nc")
+    with serve(compared, port=0) as url:
+        wire = Wire(url)
+        wire.set(1.2, label="time [s]")
+        while wire.read(0.4):
+            pass
+        saved = slow.sel(time=1.2, method="nearest")
+        np.testing.assert_allclose(wire.scene["/other/platform"]["position"], saved["pose"][:3], atol=1e-6)
+        beside = [float(text) for text in re.findall(r'towline-other"[^>]*>([\d.]+) N', wire.readout())]
+        np.testing.assert_allclose(beside, saved["tensions"], atol=0.0051)
+        own = np.array(wire.scene["/platform"]["position"])
+        apart = float(re.search(r"platforms ([\d.]+) m apart", wire.readout())[1])
+        assert apart == pytest.approx(np.linalg.norm(own - saved["pose"][:3].to_numpy()), rel=1e-3)
+        # Its curve, dashed, in the same chart.
+        _, chart = wire.element(title="tensions [N]")
+        labels = [series["label"] for series in chart["series"]]
+        times, curve = (wire.array(chart["data"][k]) for k in (0, labels.index("cable 3, other")))
+        expected = np.interp(times, slow["time"], slow["tensions"][:, 2])
+        np.testing.assert_allclose(curve, expected, atol=1e-6)
+        wire.close()
+
+
+def test_only_motions_of_one_robot_are_compared(folder):
+    for other, words in (("cogiro", "must be plans or flights, got the robot cogiro"),):
+        with pytest.raises(InputError, match=words):
+            read(str(folder / "line.nc"), other=other)
+        with pytest.raises(InputError, match=words):
+            read(other, other=str(folder / "line.nc"))
+    saved = xr.load_dataset(folder / "line.nc")
+    saved.attrs["robot"] = saved.attrs["robot"].replace("wang-flying", "another")
+    saved.to_netcdf(folder / "another.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"another.nc must be of wang-flying with 6 cables, got another"):
+        read(str(folder / "line.nc"), other=str(folder / "another.nc"))

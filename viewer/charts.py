@@ -65,7 +65,7 @@ class Charts:
         low, high = 1.05 * low, 1.05 * high if high > low else low + 1.0
         outside = low + BELOW * (high - low)
         marks = self._curves.infeasible.astype(float)
-        columns = [marks, *(np.where(np.isfinite(values), values, outside) for values, _, _ in lines)]
+        columns = [marks, *(_drawn(values, outside) for values, _, _ in lines)]
         hidden = {"points": {"show": False}}
         series = (
             {"label": "time [s]"},
@@ -84,6 +84,15 @@ class Charts:
             padding=(4, 12, 0, 0),
         )
         return handle, columns
+
+
+def _drawn(values: np.ndarray, outside: float) -> np.ndarray:
+    """Return a curve that leaves the chart where it has gaps, and ends where its values end, where charts take nan."""
+    known = np.flatnonzero(np.isfinite(values))
+    drawn = np.where(np.isfinite(values), values, outside)
+    if len(known):
+        drawn[: known[0]] = drawn[known[-1] + 1 :] = np.nan
+    return drawn
 
 
 def _stroke(index: int) -> dict[str, Any]:

@@ -32,7 +32,7 @@ class Panel:
         if subject.replay is None:
             Posing(server, subject.robot, geometry, self._show, self._refuse)
         else:
-            self._time_line = TimeLine(server, subject.replay, self._show)
+            self._time_line = TimeLine(server, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
@@ -53,6 +53,7 @@ class Panel:
 
     def _show(self, instant: Instant) -> None:
         """Draw an instant in scene and panel, in one update, so that both agree in every frame."""
+        other = self._subject.other_at(instant)
         with self._server.atomic():
-            self._stage.show(instant)
-            self._readout.content = words.readout(instant, self._subject.robot)
+            self._stage.show(instant, other)
+            self._readout.content = words.readout(instant, self._subject.robot, other)

@@ -124,12 +124,12 @@ class Replay:
         instants = np.linspace(self.times[0], self.times[-1], count)
         return np.unique([self.index_at(time) for time in instants])
 
-    def at(self, index: int) -> Instant:
-        """Return the `index`-th instant with its audited tensions, or with a certificate if there are none."""
+    def at(self, index: int, prove: bool = True) -> Instant:
+        """Return the `index`-th instant with its audited tensions; if there are none, with a certificate if `prove`."""
         tensions = self.tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
-        certificate = None if there or self._task is None else self._certificate(index)
+        certificate = None if there or self._task is None or not prove else self._certificate(index)
         status = "feasible" if there else "no tensions" if certificate is None else "infeasible"
         return Instant(
             pose=self._pose[index],

@@ -109,11 +109,13 @@ def _page(subject: Subject) -> str:
             document = server.get_scene_serializer().as_html()
         else:
             frames = replay.frames(FRAME_RATE)
-            stage.show(replay.at(int(frames[0])))
+            first = replay.at(int(frames[0]))
+            stage.show(first, subject.other_at(first))
             recording = server.get_scene_serializer()
             for before, index in pairwise(frames):
                 recording.insert_sleep(float(replay.times[index] - replay.times[before]))
-                stage.show(replay.at(int(index)))
+                instant = replay.at(int(index))
+                stage.show(instant, subject.other_at(instant))
             document = recording.as_html()
     finally:
         _stop(server)

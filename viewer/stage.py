@@ -14,7 +14,7 @@ from ..figures.robot import box_edges
 from ..text import quantity
 from . import words
 from .colours import place, rgb, shades
-from .geometry import Geometry
+from .geometry import Extent, Geometry
 from .instant import Instant, arrow
 
 if TYPE_CHECKING:
@@ -50,11 +50,16 @@ class Stage:
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
         self._scene = server.scene
         self._robot = subject.robot
-        self._extent = extent = subject.replay.extent if subject.replay else geometry.extent
+        extent = subject.replay.extent if subject.replay else geometry.extent
+        if subject.other is not None:
+            extent = Extent.of(*extent, *subject.other.extent)
+        self._extent = extent
         self._size, self._centre = extent.size, (extent.low + extent.high) / 2
         self.frame(server.initial_camera, WIDE, 1.0)
         self._draw_surroundings(subject)
         self._make_actors(captioned)
+        if subject.other is not None:
+            self._make_shadow(subject.other.path)
 
     @property
     def cell(self) -> float:
@@ -63,8 +68,10 @@ class Stage:
         power = 10.0 ** np.floor(np.log10(wanted))
         return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
-    def show(self, instant: Instant) -> None:
-        """Draw an instant."""
+    def show(self, instant: Instant, other: Instant | None = None) -> None:
+        """Draw an instant, and one of another plan or flight as a shadow."""
+        if other is not None:
+            self._shadow(other)
         points = instant.points
         colours = shades(place(instant.tensions, self._robot.t_min, self._robot.t_max))
         exits = np.where(np.isfinite(points.exits), points.exits, points.anchors)
@@ -99,6 +106,12 @@ class Stage:
         """Show or hide number and tension at the cables."""
         for label in self._numbers:
             label.visible = shown
+
+    def _shadow(self, other: Instant) -> None:
+        """Draw platform and cables of another plan or flight."""
+        _place(self._other_platform, other.pose)
+        exits = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
+        self._other_cables.points = np.stack([exits, other.points.attachments], axis=1).astype(np.float32)
 
     def _point(self, instant: Instant) -> None:
         """Draw the arrow of the certificate."""
@@ -228,7 +241,20 @@ class Stage:
         above = np.array([*self._centre[:2], self._extent.high[2] + 0.12 * size])
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
-    def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
+    def _make_shadow(self, path: np.ndarray) -> None:
+        colour = rgb(words.OTHER)
+        self._other_platform = self._scene.add_frame("/other/platform", show_axes=False)
+        self._body("/other/platform/body", self._robot.attachments, colour, opacity=0.35)
+        self._other_cables = self._scene.add_line_segments(
+            "/other/cables",
+            np.zeros((self._robot.m, 2, 3), np.float32),
+            colour,
+            thickness=THIN,
+            thickness_units="screen",
+        )
+        self._lines("/other/path", [path], colour)
+
+    def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int], opacity: float = 0.7) -> None:
         """Draw the convex hull of corners (k, 3) [m] in the frame above `name`, if it has a volume or an area."""
         triangles = [[face[0], *pair] for face in faces(corners) for pair in pairwise(face[1:])]
         if triangles:
@@ -237,7 +263,7 @@ class Stage:
                 corners.astype(np.float32),
                 np.array(triangles, np.uint32),
                 color=colour,
-                opacity=0.7,
+                opacity=opacity,
                 material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
                 flat_shading=True,
                 side="double",

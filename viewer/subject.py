@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from .cloud import Cloud
+    from .instant import Instant
     from .replay import Replay
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how NetCDF files begin
@@ -34,12 +35,15 @@ class Subject:
         The instants of a plan or a flight, or None.
     cloud
         The points of a workspace, or None.
+    other
+        A plan or a flight of the same robot to compare the replay with, or None.
     """
 
     title: str
     robot: Robot
     replay: Replay | None = None
     cloud: Cloud | None = None
+    other: Replay | None = None
 
     @property
     def kind(self) -> str:
@@ -48,8 +52,14 @@ class Subject:
             return "flight"
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
+    def other_at(self, instant: Instant) -> Instant | None:
+        """Return the instant of the other plan or flight at the same time, or its last one; None without another."""
+        if self.other is None or instant.time is None:
+            return None
+        return self.other.at(self.other.index_at(instant.time), prove=False)
 
-def read(target: str, robot: str | None = None) -> Subject:
+
+def read(target: str, robot: str | None = None, other: str | None = None) -> Subject:
     """Read a robot, a plan, a flight or a workspace.
 
     Parameters
@@ -59,12 +69,17 @@ def read(target: str, robot: str | None = None) -> Subject:
         folder.
     robot
         The robot of a workspace, if it is not in the library: a workspace file has only the name.
+    other
+        A plan or a flight to compare a plan or a flight with.
 
     Raises
     ------
     InputError
         If it is none of these, or belongs to another robot.
     """
+    if other is not None:
+        first, second = read(target, robot), read(other)
+        return _compared(first, second, printable(other))
     path = Path(target)
     if path.suffix == ".zarr" or _is_netcdf(path):
         return _of_dataset(_open(path), printable(target), robot)
@@ -72,6 +87,16 @@ def read(target: str, robot: str | None = None) -> Subject:
         raise InputError(f"--robot must be left out unless a workspace is shown, got {robot!r} with {target}")
     loaded = load(target)
     return Subject(loaded.name, loaded)
+
+
+def _compared(first: Subject, second: Subject, where: str) -> Subject:
+    if first.replay is None or second.replay is None:
+        wrong = first if first.replay is None else second
+        raise InputError(f"two files to compare must be plans or flights, got the {wrong.kind} {wrong.title}")
+    if (first.robot.name, first.robot.m) != (second.robot.name, second.robot.m):
+        raise InputError(f"{where} must be of {first.robot.name} with {first.robot.m} cables, got {second.robot.name}")
+    title = f"{first.title}; {second.kind} beside it: {second.title.partition(', ')[2]}"
+    return Subject(title, first.robot, replay=first.replay, other=second.replay)
 
 
 def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:

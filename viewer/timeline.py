@@ -33,9 +33,13 @@ class TimeLine:
         What plays.
     show
         Draws an instant.
+    other
+        Is charted beside it, if there is one.
     """
 
-    def __init__(self, server: viser.ViserServer, replay: Replay, show: Callable[[Instant], None]):
+    def __init__(
+        self, server: viser.ViserServer, replay: Replay, show: Callable[[Instant], None], other: Replay | None = None
+    ):
         self._server, self._replay, self._show = server, replay, show
         self._playing, self._closed, self._busy = threading.Event(), threading.Event(), threading.Lock()
         self._index = -1
@@ -47,7 +51,7 @@ class TimeLine:
             self._step = gui.add_button_group("step", ("first", "back", "next", "last"))
             self._loop = gui.add_checkbox("loop", True)
             self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1x")
-            self._charts = Charts(gui, curves(replay))
+            self._charts = Charts(gui, curves(replay), None if other is None else curves(other))
         self._now.on_update(self._dragged)
         self._play.on_click(lambda _: self._turn(not self._playing.is_set()))
         steps = {
