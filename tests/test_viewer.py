@@ -24,6 +24,7 @@ from towline.viewer.cloud import cloud
 from towline.viewer.colours import place, rgb, shades
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import arrow, at_rest
+from towline.viewer.shapes import posts, sheaves
 from towline.viewer.sliders import poses, sliders
 from towline.viewer.words import readout
 from towline.workspace import StaticEquilibrium, sample, save
@@ -85,7 +86,7 @@ def test_what_is_shown_at_rest_carries_the_weight(name):
     assert seen.margin == slack > 0
     assert seen.reserve > 0
     assert seen.certificate is None
-    assert arrow(seen, 1.0) is None
+    assert arrow(seen, 1.0, 1.0) is None
 
 
 def test_above_its_anchors_a_load_lacks_a_force_upwards():
@@ -95,7 +96,7 @@ def test_above_its_anchors_a_load_lacks_a_force_upwards():
     seen = rest(robot, above)
     assert seen.status == "infeasible"
     assert np.isnan(seen.tensions).all()
-    start, tip = arrow(seen, size=10.0)
+    start, tip = arrow(seen, 10.0, robot.weight)
     np.testing.assert_allclose(start, seen.points.com)
     np.testing.assert_allclose((tip - start) / np.linalg.norm(tip - start), [0, 0, 1], atol=1e-6)
     assert seen.certificate.shortfall > robot.weight
@@ -109,10 +110,30 @@ def test_a_missing_moment_alone_is_no_arrow():
     """The arrow is as long as the share of force in the direction, and is left out where there is none."""
     robot = load("wang-flying")
     seen = rest(robot, robot.home + np.array([0.4, 0, 0, 0, 0, 0]))
-    force = seen.certificate.direction[:3]
-    assert np.linalg.norm(arrow(seen, 1.0)[1] - seen.points.com) == pytest.approx(0.3 * np.linalg.norm(force))
+    force, shortfall = np.linalg.norm(seen.certificate.direction[:3]), seen.certificate.shortfall
+    # Half of what grows where the shortfall is the typical force, and less than 0.3 of the size however large it is.
+    assert np.linalg.norm(arrow(seen, 1.0, shortfall)[1] - seen.points.com) == pytest.approx(0.3 * 0.625 * force)
+    lengths = [np.linalg.norm(np.diff(arrow(seen, 1.0, shortfall / times), axis=0)) for times in (0.1, 1, 10, 1e9)]
+    assert (np.diff(lengths) > 0).all()
+    assert lengths[-1] == pytest.approx(0.3 * force)
     seen.certificate.direction[:3] = 0
-    assert arrow(seen, 1.0) is None
+    assert arrow(seen, 1.0, 1.0) is None
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "ipanema-2"])
+def test_sheaves_touch_the_anchor_and_the_cable(name):
+    robot = load(name)
+    points = Geometry(robot)(robot.home + robot.dof_mask * [0.1, -0.2, 0.1, 0, 0, 0.1], robot.carrier_home)
+    turning = np.flatnonzero(robot.pulley_radii)
+    rings = sheaves(robot, points)
+    assert len(turning) == 0 or len(rings) % len(turning) == 0
+    for index, ring in zip(turning, np.split(rings[:, 0], max(len(turning), 1)), strict=False):
+        centre, radius = ring.mean(axis=0), robot.pulley_radii[index]
+        for at in (points.anchors[index], points.exits[index]):
+            assert np.linalg.norm(at - centre) == pytest.approx(radius, rel=1e-6)
+        spoke = points.exits[index] - centre
+        assert abs(spoke @ (points.attachments[index] - points.exits[index])) < 1e-9 * radius
+    assert len(posts(robot, -1.0)) == robot.m
 
 
 def test_colours_are_ordered_between_the_limits_and_tell_none_apart():
@@ -374,6 +395,20 @@ def test_names_from_files_cannot_be_code(folder, tmp_path):
     page = save_page(read(str(tmp_path / "hostile.nc")), tmp_path / "page.html").read_text()
     assert "alert(1)" in page
     assert "<script>alert(1)" not in page
+
+
+def test_the_page_lists_the_tensions_of_each_instant(folder, tmp_path):
+    saved = xr.load_dataset(folder / "line.nc")
+    page = save_page(read(str(folder / "line.nc")), tmp_path / "line.html").read_text()
+    frames = json.loads(re.search(r"const FRAMES = (\{.*?\});\n", page)[1])
+    np.testing.assert_allclose(frames["times"], saved["time"], atol=1e-9)
+    np.testing.assert_allclose(frames["tensions"], saved["tensions"], atol=0.0051)
+    assert frames["clocks"][-1] == "t = 2.00 s"
+    assert page.count('class="towline-tension"') == 6
+    infeasible = save_page(read(str(folder / "hover.nc")), tmp_path / "hover.html").read_text()
+    frames = json.loads(re.search(r"const FRAMES = (\{.*?\});\n", infeasible)[1])
+    assert {tension for row in frames["tensions"] for tension in row} == {None}
+    assert save_page(read("wang-ctmrts"), tmp_path / "robot.html").read_text().count('class="towline-tension"') == 3
 
 
 def test_the_command_writes_a_page_and_nothing_else(folder, tmp_path):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from . import words
 from .posing import Posing
 from .timeline import TimeLine
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
     from .instant import Instant
     from .stage import Stage
     from .subject import Subject
+
+PATIENCE = 60.0  # [s] for a browser to draw a picture
 
 
 class Panel:
@@ -39,6 +43,8 @@ class Panel:
             if subject.cloud is not None:
                 points = self._gui.add_checkbox("points", True)
                 points.on_update(lambda _: stage.show_cloud(points.value))
+            save = self._gui.add_button("Save picture")
+            save.on_click(lambda event: _send_picture(event.client, f"{subject.robot.name}.png"))
         with self._gui.add_folder("Legend"):
             self._gui.add_html(words.legend(subject, stage.cell))
 
@@ -57,3 +63,19 @@ class Panel:
         with self._server.atomic():
             self._stage.show(instant, other)
             self._readout.content = words.readout(instant, self._subject.robot, other)
+
+
+def _send_picture(client: viser.ClientHandle | None, name: str) -> None:
+    """Send a browser what it shows of the scene as a file to keep, on white."""
+    if client is None:
+        return
+    import io
+
+    from matplotlib.image import imsave
+
+    width, height = client.camera.image_width, client.camera.image_height
+    picture = client.get_render(height, width, transport_format="png", timeout=PATIENCE) / 255.0
+    opaque = picture[..., 3:]
+    file = io.BytesIO()
+    imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")
+    client.send_file_download(name, file.getvalue(), save_immediately=True)

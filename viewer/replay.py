@@ -108,11 +108,11 @@ class Replay:
         return [path for path in paths if np.ptp(path, axis=0).max() > 1e-9]
 
     @property
-    def obstacles(self) -> list[np.ndarray]:
-        """Return lines (k, 3) in {G} [m] that outline the regions to keep out of."""
+    def obstacles(self) -> list[list[np.ndarray]]:
+        """Return lines (k, 3) in {G} [m] that outline each of the regions to keep out of."""
         if self._task is None:
             return []
-        return [line for place in self._task.limits.keep_out if place.frame == "world" for line in outline(place)]
+        return [outline(place) for place in self._task.limits.keep_out if place.frame == "world"]
 
     def index_at(self, time: float) -> int:
         """Return the index of the instant nearest to `time` [s]."""

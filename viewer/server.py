@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..models import Dynamics
 from ..writing import whole_file
-from . import words
 from .access import guarded
 from .geometry import Geometry
 from .instant import at_rest
+from .page import aside
 from .panel import Panel
 from .posing import home_at_rest
 from .stage import Stage
@@ -105,32 +105,21 @@ def _page(subject: Subject) -> str:
         replay = subject.replay
         if replay is None:
             robot = subject.robot
-            stage.show(at_rest(Dynamics(robot), geometry, home_at_rest(robot), robot.carrier_home))
-            document = server.get_scene_serializer().as_html()
+            frames = [at_rest(Dynamics(robot), geometry, home_at_rest(robot), robot.carrier_home)]
         else:
-            frames = replay.frames(FRAME_RATE)
-            first = replay.at(int(frames[0]))
-            stage.show(first, subject.other_at(first))
-            recording = server.get_scene_serializer()
-            for before, index in pairwise(frames):
-                recording.insert_sleep(float(replay.times[index] - replay.times[before]))
-                instant = replay.at(int(index))
-                stage.show(instant, subject.other_at(instant))
-            document = recording.as_html()
+            frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
+        stage.show(frames[0], subject.other_at(frames[0]))
+        recording = server.get_scene_serializer()
+        for before, instant in pairwise(frames):
+            recording.insert_sleep((instant.time or 0.0) - (before.time or 0.0))
+            stage.show(instant, subject.other_at(instant))
+        document = recording.as_html()
     finally:
         _stop(server)
     title = escape(subject.title)
-    # Above the picture, but the mouse goes through to it, except on the title, which folds the rest.
-    aside = (
-        '<aside style="position:fixed;left:8px;bottom:52px;max-width:260px;max-height:70%;overflow:auto;z-index:1;'
-        'pointer-events:none;color:#222;background:#ffffffcc;font-family:system-ui,sans-serif"><details open>'
-        '<summary style="padding:4px 12px;font-weight:600;pointer-events:auto;cursor:pointer">'
-        f"{title}</summary>{words.legend(subject, stage.cell)}</details></aside>"
-        "<script>if(innerWidth<innerHeight)document.querySelector('aside details').open=false</script>"
-    )
     head, _, rest = document.partition("<head>")
     body, end, tail = rest.rpartition("</body>")
-    return f"{head}<head><title>{title}</title>{body}{aside}{end}{tail}"
+    return f"{head}<head><title>{title}</title>{body}{aside(subject, frames, stage.cell)}{end}{tail}"
 
 
 def _check_address(host: str, port: int) -> None:

@@ -15,7 +15,8 @@ from ..text import quantity
 from . import words
 from .colours import place, rgb, shades
 from .geometry import Extent, Geometry
-from .instant import Instant, arrow
+from .instant import Instant, arrow, typical_force
+from .shapes import posts, rotors, sheaves
 
 if TYPE_CHECKING:
     import viser
@@ -79,6 +80,11 @@ class Stage:
         for cable, way, colour in zip(self._cables, ways.astype(np.float32), colours, strict=True):
             cable.points = way
             cable.colors = colour
+        if self._sheaves is not None:
+            rings = sheaves(self._robot, points)
+            self._sheaves.visible = len(rings) > 0
+            if len(rings):
+                self._sheaves.points = rings.astype(np.float32)
         self._ends.points = np.concatenate([points.anchors, points.attachments]).astype(np.float32)
         _place(self._platform, instant.pose)
         for handle, pose in zip(self._carriers, instant.carriers, strict=True):
@@ -115,7 +121,7 @@ class Stage:
 
     def _point(self, instant: Instant) -> None:
         """Draw the arrow of the certificate."""
-        ends = arrow(instant, self._size)
+        ends = arrow(instant, self._size, typical_force(self._robot))
         self._arrow.visible = self._short.visible = ends is not None
         if ends is not None:
             self._arrow.points = _strokes(*ends).astype(np.float32)
@@ -166,6 +172,8 @@ class Stage:
             position=floor,
         )
         scene.add_frame("/G", axes_length=0.08 * self._size, axes_radius=0.004 * self._size, origin_radius=0.0)
+        scene.add_label("/G/name", "{G}", anchor="top-right", font_screen_scale=0.8)
+        self._lines("/posts", posts(self._robot, floor[2]), GREY)
         boxes = [box for carrier in self._robot.carriers for box in carrier.drawing.boxes]
         edges = [edge for box in boxes for edge in box_edges(np.array(box.min), np.array(box.max))]
         self._lines("/reach", edges, rgb(style.colour(3)))
@@ -174,7 +182,9 @@ class Stage:
             if subject.replay.reference is not None:
                 self._lines("/reference", [subject.replay.reference], rgb(words.GHOST), THIN)
             self._lines("/carrier_paths", subject.replay.carrier_paths, GREY)
-            self._lines("/keep_out", subject.replay.obstacles, rgb(style.colour(5)))
+            for index, lines in enumerate(subject.replay.obstacles):
+                self._lines(f"/keep_out/{index + 1}/edges", lines, rgb(style.colour(5)))
+                self._body(f"/keep_out/{index + 1}/body", np.concatenate(lines), rgb(style.colour(5)), opacity=0.25)
         self._cloud = None
         if subject.cloud is not None and len(subject.cloud.positions):
             self._cloud = scene.add_point_cloud(
@@ -207,6 +217,11 @@ class Stage:
         self._ends = scene.add_point_cloud(
             "/ends", ends, BLACK, point_size=0.008 * size, point_shape="circle", precision="float32"
         )
+        self._sheaves = None
+        if robot.pulley_radii.any():
+            self._sheaves = scene.add_line_segments(
+                "/pulleys", nowhere, BLACK, thickness=2 * THIN, thickness_units="screen"
+            )
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
         com = np.array([robot.platform.com], np.float32)
@@ -224,6 +239,8 @@ class Stage:
                 )
             )
             self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)
+            if carrier.drawing.arm is not None:
+                self._lines(f"{name}/rotors", rotors(max(carrier.drawing.arm, 0.03 * size)), BLACK, 2 * THIN)
             scene.add_label(f"{name}/name", carrier.name, anchor="bottom-center", font_screen_scale=0.8)
         self._numbers = [
             scene.add_label(f"/tensions/{index + 1}", "", anchor="center-center", font_screen_scale=0.8)

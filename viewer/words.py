@@ -41,9 +41,9 @@ def readout(instant: Instant, robot: Robot, other: Instant | None = None) -> str
     """
     feasible = instant.certificate is None and np.isfinite(instant.tensions).all()
     colour = style.colour(0) if feasible else style.colour(1)
-    facts = [f'<b style="color:{colour}">{escape(instant.status)}</b>']
+    facts = [f'<b class="towline-status" style="color:{colour}">{escape(instant.status)}</b>']
     if instant.time is not None:
-        facts.append(f"t = {instant.time:.2f} s")
+        facts.append(f'<span class="towline-time">t = {instant.time:.2f} s</span>')
     facts += _margins(instant)
     if other is not None:
         apart = float(np.linalg.norm(instant.pose[:3] - other.pose[:3]))
@@ -52,11 +52,11 @@ def readout(instant: Instant, robot: Robot, other: Instant | None = None) -> str
     if instant.certificate is not None:
         words = escape(instant.certificate.describe()).replace("\n", "<br>")
         lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
-        if arrow(instant, 1.0) is None:
+        if arrow(instant, 1.0, 1.0) is None:
             lines.append(f'<div style="color:{MUTED}">The direction has almost no force, so it has no arrow.</div>')
     pose = ", ".join(f"{value:.3f}" for value in np.round(instant.pose, 3) + 0.0)
     lines.append(f'<div style="color:{MUTED}">({", ".join(COORDINATES)}) = ({pose}) m, rad</div>')
-    return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{_table(instant, robot, other)}</div>'
+    return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{table(instant, robot, other)}</div>'
 
 
 def _margins(instant: Instant) -> list[str]:
@@ -69,7 +69,7 @@ def _margins(instant: Instant) -> list[str]:
     return lines
 
 
-def _table(instant: Instant, robot: Robot, other: Instant | None) -> str:
+def table(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
     """Return a table of the cables: colour, tension, and its place between the limits."""
     places = place(instant.tensions, robot.t_min, robot.t_max)
     rows = []
@@ -78,7 +78,8 @@ def _table(instant: Instant, robot: Robot, other: Instant | None) -> str:
         hue = f"rgb({', '.join(str(part) for part in shade)})"
         bar = (
             f'<div style="width:64px;height:8px;background:#e8e8e8">'
-            f'<div style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}"></div></div>'
+            f'<div class="towline-bar" style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}">'
+            "</div></div>"
         )
         shown = f"{tension:.2f} N" if there else "none"
         if other is not None:
