@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 from towline.distribution import tensions
 from towline.models import Dynamics, load
 from towline.viewer import read, serve
+from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest
-from towline.workspace import Places, StaticEquilibrium
+from towline.viewer.sliders import whole_steps
+from towline.workspace import Places, StaticEquilibrium, sample, save
 from towline.workspace.nearest import nearest_feasible
 
 from .viewer_wire import CAMERA, Wire
@@ -133,6 +135,10 @@ def test_on_a_phone_the_whole_robot_is_above_the_panel(name):
     robot = load(name)
     with serve(read(name), port=0) as url:
         wire = Wire(url, width=400, height=800)
+        settle(wire)
+        # The browser applies the initial camera late.
+        middle = ((geometry := Geometry(robot).extent).low + geometry.high) / 2
+        wire.send(**CAMERA | {"look_at": middle.tolist()}, image_width=400, image_height=800)
         got = {}
         while wire.read(0.5):
             got |= {message["type"]: message for message in wire.messages}
@@ -148,3 +154,40 @@ def test_on_a_phone_the_whole_robot_is_above_the_panel(name):
     assert (pixels > 0).all()
     assert (pixels < [400, 440]).all()
     assert np.ptp(pixels, axis=0).max() > 100
+
+
+def test_a_workspace_is_cut_along_each_axis(tmp_path):
+    robot = load("planar-4")
+    low, high = robot.home_anchors.min(axis=0), robot.home_anchors.max(axis=0)
+    region = {"position": {"min": low.tolist(), "max": high.tolist()}}
+    save(sample(robot, StaticEquilibrium(), region, samples=2000, keep="all"), tmp_path / "space.nc")
+    subject = read(str(tmp_path / "space.nc"))
+    positions = subject.cloud.positions
+    with serve(subject, port=0) as url:
+        wire = Wire(url)
+        settle(wire)
+        cut = float(np.median(positions[:, 0]))
+        wire.set(cut, label="x up to [m]")
+        settle(wire)
+        shown = wire.array(wire.scene["/workspace"]["points"]).reshape(-1, 3)
+        assert len(shown) == (positions[:, 0] <= cut).sum() == len(wire.array(wire.scene["/workspace"]["colors"])) // 3
+        assert shown[:, 0].max() <= cut + 1e-6
+        top = wire.element(label="x up to [m]")[1]["max"]
+        wire.set(top, label="x up to [m]")
+        settle(wire)
+        assert len(wire.array(wire.scene["/workspace"]["points"])) == 3 * len(positions)
+        wire.set(False, label="points")
+        settle(wire)
+        assert wire.scene["/workspace"]["visible"] is False
+        wire.close()
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.23456, 7.7), (0.0, 0.0), (999_999.0, 1e6), (-3e-4, 2e-4), (5.0, 5.0)])
+def test_ends_of_a_slider_are_whole_steps_around_its_range(low, high):
+    start, end, step = whole_steps(low, high)
+    assert start <= low
+    assert end >= high
+    assert end > start
+    assert start - low > -1.0001 * step
+    assert end - high < 1.0001 * step
+    assert end / step == pytest.approx(round(end / step), abs=1e-3)

@@ -8,6 +8,7 @@ import numpy as np
 
 from . import words
 from .posing import Posing
+from .sliders import whole_steps
 from .timeline import TimeLine
 
 if TYPE_CHECKING:
@@ -41,12 +42,26 @@ class Panel:
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
             if subject.cloud is not None:
-                points = self._gui.add_checkbox("points", True)
-                points.on_update(lambda _: stage.show_cloud(points.value))
+                self._add_cuts(subject.cloud.positions)
             save = self._gui.add_button("Save picture")
             save.on_click(lambda event: _send_picture(event.client, f"{subject.robot.name}.png"))
         with self._gui.add_folder("Legend"):
             self._gui.add_html(words.legend(subject, stage.cell))
+
+    def _add_cuts(self, positions: np.ndarray) -> None:
+        """Add a switch for the points (n, 3) of a workspace, and a slider for each axis that cuts away those beyond."""
+        points = self._gui.add_checkbox("points", True)
+        cuts = []
+        for name, column in zip("xyz", positions.T if len(positions) else np.zeros((3, 1)), strict=True):
+            low, high, step = whole_steps(float(column.min()), float(column.max()))
+            cuts.append(self._gui.add_slider(f"{name} up to [m]", low, high, step, high))
+
+        def cut(_: Any) -> None:
+            with self._server.atomic():
+                self._stage.show_cloud(points.value, np.array([it.value for it in cuts]))
+
+        for control in (points, *cuts):
+            control.on_update(cut)
 
     def close(self) -> None:
         """Stop playing."""

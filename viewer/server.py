@@ -59,11 +59,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
         stage = Stage(server, subject, geometry, captioned=False)
         panel = Panel(server, subject, geometry, stage)
 
-        @server.on_client_connect
-        def _(client: viser.ClientHandle) -> None:
-            if client.camera.image_width < client.camera.image_height:
-                stage.frame(client.camera, client.camera.image_width, client.camera.image_height)
-
+        server.on_client_connect(stage.mind)
         try:
             # An address of IPv6 has colons of its own.
             yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"

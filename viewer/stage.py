@@ -103,10 +103,15 @@ class Stage:
         if self._caption is not None:
             _write(self._caption, words.caption(instant))
 
-    def show_cloud(self, shown: bool) -> None:
-        """Show or hide the points of a workspace."""
-        if self._cloud is not None:
-            self._cloud.visible = shown
+    def show_cloud(self, shown: bool, most: np.ndarray) -> None:
+        """Show or hide the points of a workspace whose coordinates are at most `most` (3,) in {G} [m]."""
+        if self._cloud is None or self._points is None:
+            return
+        kept = (self._points.positions <= most).all(axis=1)
+        self._cloud.visible = shown and bool(kept.any())
+        if kept.any():
+            self._cloud.points = self._points.positions[kept].astype(np.float32)
+            self._cloud.colors = self._points.colours[kept]
 
     def show_numbers(self, shown: bool) -> None:
         """Show or hide number and tension at the cables."""
@@ -152,6 +157,20 @@ class Stage:
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 
+    def mind(self, client: viser.ClientHandle) -> None:
+        """Frame the robot in a picture that is higher than wide, now and whenever its camera is the initial one.
+
+        The initial camera may reach a browser after this one, and a user can return to it.
+        """
+        camera = client.camera
+        if camera.image_width < camera.image_height:
+            self.frame(camera, camera.image_width, camera.image_height)
+
+            @camera.on_update
+            def _(_: viser.CameraHandle) -> None:
+                if np.abs(camera.look_at - self._centre).max() < 1e-3 * self._size:
+                    self.frame(camera, camera.image_width, camera.image_height)
+
     def _draw_surroundings(self, subject: Subject) -> None:
         scene, cell = self._scene, self.cell
         # Shadows tell little here, and their shaders keep a machine without a GPU busy for seconds.
@@ -185,7 +204,7 @@ class Stage:
             for index, lines in enumerate(subject.replay.obstacles):
                 self._lines(f"/keep_out/{index + 1}/edges", lines, rgb(style.colour(5)))
                 self._body(f"/keep_out/{index + 1}/body", np.concatenate(lines), rgb(style.colour(5)), opacity=0.25)
-        self._cloud = None
+        self._cloud, self._points = None, subject.cloud
         if subject.cloud is not None and len(subject.cloud.positions):
             self._cloud = scene.add_point_cloud(
                 "/workspace",
