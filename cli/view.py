@@ -22,6 +22,9 @@ def view(
             autocompletion=robot_names,
         ),
     ],
+    other: Annotated[
+        str | None, typer.Argument(metavar="[OTHER]", help="A plan or flight file to compare a plan or flight with.")
+    ] = None,
     html: Annotated[
         Path | None, typer.Option("--html", help="HTML file to write instead, which plays without a server.")
     ] = None,
@@ -32,7 +35,7 @@ def view(
     port: Annotated[int, typer.Option(help="Port to listen on; if it is in use, one of the next; 0: any.")] = 8080,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a robot with sliders, a plan or a flight that plays, or a workspace, in the browser (extra viewer)."""
+    """Show a robot to pose, plans or flights that play, or a workspace, in the browser (extra viewer)."""
     import threading
 
     from ..viewer import read, save_page, serve
@@ -40,8 +43,8 @@ def view(
 
     if html is not None:
         check_writable(html)
-    subject = read(target, robot)
-    summary = {"kind": subject.kind, "robot": subject.robot.name}
+    subject = read(target, robot, other)
+    summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})
     if html is not None:
         written = save_page(subject, html)
         if as_json:

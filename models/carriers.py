@@ -99,6 +99,7 @@ class Drawing(NamedTuple):
     body: bool  # at its pose, with its name and path
     axes: bool  # of its frame, since it turns
     boxes: tuple[Box, ...]  # around it in {G} [m]
+    arm: float | None = None  # of its four rotors, from its origin [m]
 
 
 class Carrier(Part):
@@ -314,6 +315,11 @@ class QuadrotorCarrier(Carrier):
                 for letter, wrench, most in zip("xyz", turning, self.torque_max, strict=True)
             ),
         )
+
+    @property
+    def drawing(self) -> Drawing:
+        """Return its axes and four rotors, on arms at which a third of its mass has its inertia about the z axis."""
+        return super().drawing._replace(arm=float(np.sqrt(3 * self.inertia[2] / self.mass)))
 
     def required_effort(
         self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray

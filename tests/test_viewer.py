@@ -13,15 +13,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
+from websockets.datastructures import Headers
 
 from towline.errors import InputError
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.viewer import read, save_page, serve
+from towline.viewer.access import refusal
 from towline.viewer.cloud import cloud
 from towline.viewer.colours import place, rgb, shades
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import arrow, at_rest
+from towline.viewer.shapes import posts, sheaves
 from towline.viewer.sliders import poses, sliders
 from towline.viewer.words import readout
 from towline.workspace import StaticEquilibrium, sample, save
@@ -83,7 +86,7 @@ def test_what_is_shown_at_rest_carries_the_weight(name):
     assert seen.margin == slack > 0
     assert seen.reserve > 0
     assert seen.certificate is None
-    assert arrow(seen, 1.0) is None
+    assert arrow(seen, 1.0, 1.0) is None
 
 
 def test_above_its_anchors_a_load_lacks_a_force_upwards():
@@ -93,7 +96,7 @@ def test_above_its_anchors_a_load_lacks_a_force_upwards():
     seen = rest(robot, above)
     assert seen.status == "infeasible"
     assert np.isnan(seen.tensions).all()
-    start, tip = arrow(seen, size=10.0)
+    start, tip = arrow(seen, 10.0, robot.weight)
     np.testing.assert_allclose(start, seen.points.com)
     np.testing.assert_allclose((tip - start) / np.linalg.norm(tip - start), [0, 0, 1], atol=1e-6)
     assert seen.certificate.shortfall > robot.weight
@@ -107,10 +110,30 @@ def test_a_missing_moment_alone_is_no_arrow():
     """The arrow is as long as the share of force in the direction, and is left out where there is none."""
     robot = load("wang-flying")
     seen = rest(robot, robot.home + np.array([0.4, 0, 0, 0, 0, 0]))
-    force = seen.certificate.direction[:3]
-    assert np.linalg.norm(arrow(seen, 1.0)[1] - seen.points.com) == pytest.approx(0.3 * np.linalg.norm(force))
+    force, shortfall = np.linalg.norm(seen.certificate.direction[:3]), seen.certificate.shortfall
+    # Half of what grows where the shortfall is the typical force, and less than 0.3 of the size however large it is.
+    assert np.linalg.norm(arrow(seen, 1.0, shortfall)[1] - seen.points.com) == pytest.approx(0.3 * 0.625 * force)
+    lengths = [np.linalg.norm(np.diff(arrow(seen, 1.0, shortfall / times), axis=0)) for times in (0.1, 1, 10, 1e9)]
+    assert (np.diff(lengths) > 0).all()
+    assert lengths[-1] == pytest.approx(0.3 * force)
     seen.certificate.direction[:3] = 0
-    assert arrow(seen, 1.0) is None
+    assert arrow(seen, 1.0, 1.0) is None
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "ipanema-2"])
+def test_sheaves_touch_the_anchor_and_the_cable(name):
+    robot = load(name)
+    points = Geometry(robot)(robot.home + robot.dof_mask * [0.1, -0.2, 0.1, 0, 0, 0.1], robot.carrier_home)
+    turning = np.flatnonzero(robot.pulley_radii)
+    rings = sheaves(robot, points)
+    assert len(turning) == 0 or len(rings) % len(turning) == 0
+    for index, ring in zip(turning, np.split(rings[:, 0], max(len(turning), 1)), strict=False):
+        centre, radius = ring.mean(axis=0), robot.pulley_radii[index]
+        for at in (points.anchors[index], points.exits[index]):
+            assert np.linalg.norm(at - centre) == pytest.approx(radius, rel=1e-6)
+        spoke = points.exits[index] - centre
+        assert abs(spoke @ (points.attachments[index] - points.exits[index])) < 1e-9 * radius
+    assert len(posts(robot, -1.0)) == robot.m
 
 
 def test_colours_are_ordered_between_the_limits_and_tell_none_apart():
@@ -262,6 +285,109 @@ def test_nobody_can_have_it_open_a_tunnel():
         server._stop(started)
 
 
+def answer(url, upgrade=True, **changed):
+    """Return the status with which a server answers a request, and its other headers."""
+    told = urlsplit(url)
+    headers = {"Host": told.netloc, "Origin": url} | changed
+    if upgrade:
+        headers |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+        headers |= {"Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol": "viser-v0"}
+    lines = ["GET / HTTP/1.1", *(f"{name}: {value}" for name, value in headers.items() if value is not None), "", ""]
+    with socket.create_connection((told.hostname, told.port), timeout=10) as line:
+        line.sendall("\r\n".join(lines).encode())
+        stream = line.makefile("rb")
+        head = [text.decode().strip() for text in iter(stream.readline, b"\r\n")]
+    return int(head[0].split()[1]), head[1:]
+
+
+def test_only_the_page_of_the_viewer_opens_a_socket():
+    with serve(read("planar-4"), port=0) as url:
+        port = urlsplit(url).port
+        assert answer(url)[0] == 101
+        renamed = f"localhost:{port}"
+        assert answer(url, Host=renamed, Origin=f"http://{renamed}")[0] == 101
+        for origin in (
+            "http://evil.example",
+            f"http://127.0.0.1:{port + 1}",
+            f"https://127.0.0.1:{port}",
+            "null",
+            None,
+        ):
+            assert answer(url, Origin=origin)[0] == 403, origin
+        # A foreign name that leads here: the browser then sends it as Host and as Origin.
+        for host in (f"evil.example:{port}", f"192.0.2.1:{port}", "", f"localhost@evil.example:{port}", "[::1", None):
+            assert answer(url, Host=host, Origin=f"http://{host}")[0] == 403, host
+            assert answer(url, upgrade=False, Host=host, Origin=None)[0] == 403, host
+        assert answer(url, Upgrade="WebSocket", Origin="http://evil.example")[0] == 403
+        status, headers = answer(url, upgrade=False, Origin=None)
+        assert status == 200
+        assert "Content-Security-Policy: frame-ancestors 'self'" in headers
+
+
+@pytest.mark.parametrize(
+    ("listening", "own", "foreign"),
+    [
+        ("0.0.0.0", "192.168.1.7:9000", "evil.example"),
+        ("::", "[fe80::1]:9000", "evil.example:9000"),
+        ("crane.local", "Crane.local:9000", "crane.local.evil.example"),
+        ("0.0.0.0", socket.gethostname(), f"{socket.gethostname()}.evil.example"),
+        ("127.0.0.1", "[::1]:8080", "192.168.1.7:8080"),
+    ],
+)
+def test_the_names_under_which_a_server_answers(listening, own, foreign):
+    def headers(host, origin):
+        return Headers([("Host", host), ("Upgrade", "websocket"), ("Origin", origin)])
+
+    assert refusal(headers(own, f"http://{own}"), listening) is None
+    assert "Host" in refusal(headers(foreign, f"http://{foreign}"), listening)
+    assert "Origin" in refusal(headers(own, f"http://{foreign}"), listening)
+    twice = headers(own, f"http://{own}")
+    twice["Host"] = own
+    assert "Host" in refusal(twice, listening)
+
+
+@pytest.mark.parametrize("name", ["pose", "carrier_pose", "time", "tensions"])
+@pytest.mark.parametrize("number", [1e300, -np.inf])
+def test_numbers_that_no_picture_can_show_are_refused(folder, tmp_path, name, number):
+    saved = xr.load_dataset(folder / "line.nc").copy(deep=True)
+    values = saved[name].to_numpy().copy()
+    values[-1 if number > 0 else 0] = number
+    saved[name] = (saved[name].dims, values)
+    saved.to_netcdf(tmp_path / "absurd.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=f"absurd.nc: {name} must have numbers up to"):
+        read(str(tmp_path / "absurd.nc"))
+
+
+def test_robots_that_no_picture_can_show_are_refused():
+    robot = load("planar-4")
+    wide = [carrier.model_copy(update={"home": (1e100, 0, 0, 0, 0, 0)}) for carrier in robot.carriers]
+    with pytest.raises(InputError, match="planar-4 must have a size of at least"):
+        Geometry(robot.model_copy(update={"carriers": wide}))
+
+
+def test_a_workspace_cannot_name_a_file_to_read(folder, tmp_path):
+    hostile = xr.load_dataset(folder / "all.nc")
+    (tmp_path / "secret.yaml").write_text("password")
+    hostile.attrs |= {"robot": str(tmp_path / "secret.yaml"), "accepted": "\x1b[2J", "samples": [1, 2]}
+    hostile.to_netcdf(tmp_path / "named.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match="--robot must be the file of") as error:
+        read(str(tmp_path / "named.nc"))
+    assert "password" not in str(error.value)
+    assert cloud(hostile, "named.nc").summary.startswith("? of ? samples")
+    hostile["position"][3] = 1e300
+    with pytest.raises(InputError, match="positions must be within"):
+        cloud(hostile, "named.nc")
+
+
+def test_texts_from_files_do_not_reach_the_terminal_as_commands(folder, tmp_path):
+    saved = xr.load_dataset(folder / "line.nc").isel(time=slice(3))
+    saved.attrs["status"] = "\x1b]0;gone\x07\x1b[2J\nfeasible" + 5000 * "x"
+    saved.to_netcdf(tmp_path / "hostile.nc", engine="h5netcdf")
+    title = read(str(tmp_path / "hostile.nc")).title
+    assert title.isprintable()
+    assert len(title) < 300
+
+
 def test_names_from_files_cannot_be_code(folder, tmp_path):
     saved = xr.load_dataset(folder / "line.nc").isel(time=slice(3))
     saved.attrs["status"] = "</title><script>alert(1)</script>"
@@ -269,6 +395,20 @@ def test_names_from_files_cannot_be_code(folder, tmp_path):
     page = save_page(read(str(tmp_path / "hostile.nc")), tmp_path / "page.html").read_text()
     assert "alert(1)" in page
     assert "<script>alert(1)" not in page
+
+
+def test_the_page_lists_the_tensions_of_each_instant(folder, tmp_path):
+    saved = xr.load_dataset(folder / "line.nc")
+    page = save_page(read(str(folder / "line.nc")), tmp_path / "line.html").read_text()
+    frames = json.loads(re.search(r"const FRAMES = (\{.*?\});\n", page)[1])
+    np.testing.assert_allclose(frames["times"], saved["time"], atol=1e-9)
+    np.testing.assert_allclose(frames["tensions"], saved["tensions"], atol=0.0051)
+    assert frames["clocks"][-1] == "t = 2.00 s"
+    assert page.count('class="towline-tension"') == 6
+    infeasible = save_page(read(str(folder / "hover.nc")), tmp_path / "hover.html").read_text()
+    frames = json.loads(re.search(r"const FRAMES = (\{.*?\});\n", infeasible)[1])
+    assert {tension for row in frames["tensions"] for tension in row} == {None}
+    assert save_page(read("wang-ctmrts"), tmp_path / "robot.html").read_text().count('class="towline-tension"') == 3
 
 
 def test_the_command_writes_a_page_and_nothing_else(folder, tmp_path):

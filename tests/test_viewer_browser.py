@@ -106,6 +106,35 @@ def test_a_plan_plays_and_pauses(page, plan_file, tmp_path):
         page.screenshot(path=tmp_path / "plan.png")
 
 
+def test_a_picture_is_saved(page, tmp_path):
+    with serve(read("caroca-pulleys"), port=0) as url:
+        page.goto(url)
+        page.wait_for_selector(".towline-readout")
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save picture").click()
+        assert download.value.suggested_filename == "caroca-pulleys.png"
+        download.value.save_as(tmp_path / "saved.png")
+    pixels = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB"))
+    assert pixels.shape[0] == 480
+    assert (pixels == 255).all(axis=2).mean() > 0.2  # white, not transparent, between what is drawn
+    assert (pixels.max(axis=2) < 100).sum() > 100
+
+
+def test_on_a_phone_the_panel_leaves_the_upper_half_free_and_folds(page, tmp_path):
+    page.set_viewport_size({"width": 400, "height": 800})
+    with serve(read("wang-ctmrts"), port=0) as url:
+        page.goto(url)
+        page.wait_for_selector(".towline-readout")
+        sheet = page.locator(".mantine-Paper-root:has(.towline-readout)").last
+        box = sheet.bounding_box()
+        assert box["y"] >= 0.54 * 800
+        assert box["width"] >= 390
+        page.get_by_text("wang-ctmrts", exact=True).first.click()
+        page.wait_for_timeout(1000)
+        assert sheet.bounding_box()["y"] > 700
+        page.screenshot(path=tmp_path / "phone.png")
+
+
 def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     file = save_page(read(str(plan_file)), tmp_path / "line.html")
     page.goto(Path(file).as_uri())
@@ -114,7 +143,11 @@ def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     assert 0 < float(clock.input_value()) <= 4.1
     assert "t_max = 60 N" in page.locator(".towline-legend").inner_text()
     page.keyboard.press("Space")
+    page.wait_for_timeout(200)  # the table follows the clock, which has tenths
     saved = xr.load_dataset(plan_file)
+    listed = float(page.locator(".towline-time").inner_text().removeprefix("t = ").removesuffix(" s"))
+    assert 0 < listed <= 4
+    np.testing.assert_allclose(tensions(page), saved["tensions"].sel(time=listed, method="nearest"), atol=0.0051)
     drawn = shades(place(saved["tensions"][40].to_numpy(), saved["t_min"].to_numpy(), saved["t_max"].to_numpy()))
 
     def cables_are_drawn():

@@ -9,7 +9,9 @@ import xarray as xr
 
 from ..errors import InputError
 from ..figures import style
+from ..text import quantity
 from .colours import rgb
+from .geometry import FARTHEST
 
 MOST_POINTS = 10_000  # more hide the robot among them
 ACCEPTED, REFUSED = style.colour(2), style.colour(5)  # bluish green and orange: colours that do not need colour vision
@@ -48,6 +50,7 @@ def cloud(dataset: xr.Dataset, where: str) -> Cloud:
     positions = dataset["position"].to_numpy()
     if positions.ndim != 2 or positions.shape[1:] != (3,) or positions.dtype.kind != "f":
         raise InputError(f"{where}: position must be an array of numbers of shape (points, 3), got {positions.shape}")
+    _check_places(positions, where)
     accepted = (
         dataset["accepted"].to_numpy().astype(bool) if "accepted" in dataset else np.ones(len(positions), dtype=bool)
     )
@@ -55,8 +58,21 @@ def cloud(dataset: xr.Dataset, where: str) -> Cloud:
     positions, accepted = positions[shown], accepted[shown]
     colours = np.where(accepted[:, None], rgb(ACCEPTED), rgb(REFUSED)).astype(np.uint8)
     legend = [("accepted", ACCEPTED)] + ([] if accepted.all() else [("not accepted", REFUSED)])
-    kept, tried = int(dataset.attrs.get("accepted", accepted.sum())), dataset.attrs.get("samples", "?")
+    kept, tried = (_count(dataset, name) for name in ("accepted", "samples"))
     return Cloud(positions, colours, legend, f"{kept} of {tried} samples accepted, {len(positions)} points shown")
+
+
+def _count(dataset: xr.Dataset, name: str) -> str:
+    """Return a count among the attributes of a file as text, "?" for anything that is no number."""
+    value = dataset.attrs.get(name)
+    return quantity(int(value)) if isinstance(value, int | np.integer) else "?"
+
+
+def _check_places(positions: np.ndarray, where: str) -> None:
+    """Raise InputError unless all numbers are places that can be drawn."""
+    wrong = ~(np.abs(positions) <= FARTHEST)
+    if wrong.any():
+        raise InputError(f"{where}: positions must be within {FARTHEST:g} m, got {positions[wrong][0]:g}")
 
 
 def _cells(dataset: xr.Dataset, where: str) -> Cloud:
@@ -64,6 +80,10 @@ def _cells(dataset: xr.Dataset, where: str) -> Cloud:
         raise InputError(f"{where} must be a file written by `towline workspace`, got one without positions and cells")
     cells = np.argwhere(dataset["reached"].to_numpy() > 0)
     axes = [dataset[name].to_numpy() for name in ("x", "y", "z")]
+    for axis in axes:
+        if axis.dtype.kind != "f":
+            raise InputError(f"{where}: x, y and z must be arrays of numbers, got {axis.dtype}")
+        _check_places(axis, where)
     positions = np.stack([axis[column] for axis, column in zip(axes, cells.T, strict=True)], axis=1)
     colours = np.tile(np.array(rgb(ACCEPTED), np.uint8), (len(positions), 1))
     summary = f"{len(positions)} cells with accepted samples, shown by their centres"

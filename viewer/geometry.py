@@ -6,10 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import InputError
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.points import placed
 from ..workspace.region import reach_boxes, surrounding_box
+
+FARTHEST = 1e6  # [m] from the origin of {G}: pictures have seven digits
+SMALLEST = 1e-6  # [m]
 
 
 class Points(NamedTuple):
@@ -56,12 +60,23 @@ class Geometry:
     ----------
     extent
         The smallest box around home, anchors and reach boxes.
+
+    Raises
+    ------
+    InputError
+        If the robot is too large, too small or too far away to be drawn.
     """
 
     def __init__(self, robot: Robot):
         self.robot = robot
         low, high = surrounding_box(robot, reach_boxes(robot))
         self.extent = Extent.of(low, high, robot.home_anchors, robot.home_attachments, robot.carrier_home[:, :3])
+        farthest = np.abs([self.extent.low, self.extent.high]).max()
+        if not (farthest <= FARTHEST and self.extent.size >= SMALLEST):
+            raise InputError(
+                f"{robot.name} must have a size of at least {SMALLEST:g} m within {FARTHEST:g} m of the origin to be "
+                f"drawn, got {self.extent.size:.4g} m within {farthest:.4g} m"
+            )
 
     def __call__(self, pose: np.ndarray, carrier_pose: np.ndarray) -> Points:
         """Return the points at poses (..., 6) of the platform and (..., c, 6) of the carriers in {G} [m, rad].

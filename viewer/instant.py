@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..distribution import pose_problem
-from ..models import Dynamics
+from ..models import Dynamics, Robot
 from ..solvers import Certificate, capacity_margin, solve
 from .geometry import Geometry, Points
 
-ARROW = 0.3  # of the robot's size, for a certificate that is all force
+ARROW = 0.3  # of the robot's size, for a certificate that is all force, and a large shortfall
+SHORTEST = 0.25  # of that, for a small one
 FORCELESS = 0.05  # shorter force parts are no arrow: the certificate is about moments
 
 
@@ -86,15 +87,22 @@ def least_distance(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -
     return float(inside.min()), int(inside.argmin())
 
 
-def arrow(instant: Instant, size: float) -> np.ndarray | None:
+def arrow(instant: Instant, size: float, typical: float) -> np.ndarray | None:
     """Return the force part of the certificate's direction as an arrow from the CoM, start and tip (2, 3) in {G} [m].
 
-    Its length is `ARROW` of `size` [m] times the share of force in the direction. Return None if there is no
-    certificate, or almost no force in it.
+    Its length grows with the shortfall, and stays below `ARROW` of `size` [m] times the share of force in the
+    direction, so that it stays in the picture. It is half of that where the shortfall is a `typical` force [N]. Return
+    None if there is no certificate, or almost no force in it.
     """
     if instant.certificate is None:
         return None
     force = instant.certificate.direction[:3]
     if np.linalg.norm(force) < FORCELESS:
         return None
-    return np.stack([instant.points.com, instant.points.com + ARROW * size * force])
+    grown = SHORTEST + (1 - SHORTEST) * instant.certificate.shortfall / (instant.certificate.shortfall + typical)
+    return np.stack([instant.points.com, instant.points.com + ARROW * size * grown * force])
+
+
+def typical_force(robot: Robot) -> float:
+    """Return the weight of the platform [N], or without gravity the mean of the cables' largest tensions."""
+    return robot.weight if robot.weight > 0 else float(robot.t_max.mean())

@@ -2,138 +2,95 @@
 
 from __future__ import annotations
 
-import math
-import threading
-import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from ..errors import TowlineError
-from ..models import Dynamics
+import numpy as np
+
 from . import words
-from .geometry import Geometry
-from .instant import Instant, at_rest
-from .sliders import poses, sliders
+from .posing import Posing
+from .sliders import whole_steps
+from .timeline import TimeLine
 
 if TYPE_CHECKING:
     import viser
 
-    from .replay import Replay
+    from .geometry import Geometry
+    from .instant import Instant
     from .stage import Stage
     from .subject import Subject
 
-RATE = 25.0  # [1/s] of playing
-TICK = 0.01  # [s] of the time line
-SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
+PATIENCE = 60.0  # [s] for a browser to draw a picture
 
 
 class Panel:
     """The controls of a subject on a viser server, until `close`."""
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, stage: Stage):
-        self._subject, self._stage, self._geometry = subject, stage, geometry
-        self._gui: Any = server.gui
-        self._busy = threading.Lock()
-        self._shown: tuple[float, ...] | None = None
-        self._closed = threading.Event()
+        self._subject, self._stage = subject, stage
+        self._server, self._gui = server, cast("Any", server.gui)
+        self._time_line: TimeLine | None = None
         self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
+        self._gui.add_html(words.NARROW)
         if subject.replay is None:
-            self._add_sliders()
+            Posing(server, subject.robot, geometry, self._show, self._refuse)
         else:
-            self._add_time_line(subject.replay)
+            self._time_line = TimeLine(server, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
             if subject.cloud is not None:
-                points = self._gui.add_checkbox("points", True)
-                points.on_update(lambda _: stage.show_cloud(points.value))
+                self._add_cuts(subject.cloud.positions)
+            save = self._gui.add_button("Save picture")
+            save.on_click(lambda event: _send_picture(event.client, f"{subject.robot.name}.png"))
+        with self._gui.add_folder("Legend"):
             self._gui.add_html(words.legend(subject, stage.cell))
+
+    def _add_cuts(self, positions: np.ndarray) -> None:
+        """Add a switch for the points (n, 3) of a workspace, and a slider for each axis that cuts away those beyond."""
+        points = self._gui.add_checkbox("points", True)
+        cuts = []
+        for name, column in zip("xyz", positions.T if len(positions) else np.zeros((3, 1)), strict=True):
+            low, high, step = whole_steps(float(column.min()), float(column.max()))
+            cuts.append(self._gui.add_slider(f"{name} up to [m]", low, high, step, high))
+
+        def cut(_: Any) -> None:
+            with self._server.atomic():
+                self._stage.show_cloud(points.value, np.array([it.value for it in cuts]))
+
+        for control in (points, *cuts):
+            control.on_update(cut)
 
     def close(self) -> None:
         """Stop playing."""
-        self._closed.set()
+        if self._time_line is not None:
+            self._time_line.close()
 
-    def _add_sliders(self) -> None:
-        robot = self._subject.robot
-        dynamics, settings = Dynamics(robot), sliders(robot, self._geometry)
-        handles = []
-        owners = {setting.carrier: None for setting in settings}
-        for owner in owners:
-            name = "Platform" if owner is None else f"Carrier {robot.carriers[owner].name}"
-            # Teams of six would fill the screen.
-            with self._gui.add_folder(name, expand_by_default=owner is None or len(owners) < 3):
-                handles += [
-                    self._gui.add_slider(it.label, it.low, it.high, it.step, it.home)
-                    for it in settings
-                    if it.carrier == owner
-                ]
-        home = self._gui.add_button("Home")
+    def _refuse(self, reason: str) -> None:
+        """Show why there is no instant to draw."""
+        self._readout.content = words.refusal(reason)
 
-        def values() -> tuple[float, ...]:
-            return tuple(float(handle.value) for handle in handles)
-
-        def instant(set_to: tuple[float, ...]) -> Instant:
-            return at_rest(dynamics, self._geometry, *poses(robot, settings, list(set_to)))
-
-        def go_home(_: Any) -> None:
-            for handle, setting in zip(handles, settings, strict=True):
-                handle.value = setting.home
-
-        for handle in handles:
-            handle.on_update(lambda _: self._update(values, instant))
-        home.on_click(go_home)
-        self._update(values, instant)
-
-    def _add_time_line(self, replay: Replay) -> None:
-        first, last = float(replay.times[0]), float(replay.times[-1])
-        with self._gui.add_folder("Time"):
-            play = self._gui.add_button("Play")
-            now = self._gui.add_slider("time [s]", first, _whole(last - first, TICK) + first, TICK, first)
-            speed = self._gui.add_dropdown("speed", SPEEDS, initial_value="1x")
-        playing = threading.Event()
-
-        def turn(on: bool) -> None:
-            (playing.set if on else playing.clear)()
-            play.label = "Pause" if on else "Play"
-
-        def moved(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                turn(False)
-            self._update(lambda: (float(now.value),), lambda at: replay.at(replay.index_at(at[0])))
-
-        def keep_playing() -> None:
-            last_look = time.monotonic()
-            while not self._closed.wait(1 / RATE):
-                passed, last_look = time.monotonic() - last_look, time.monotonic()
-                if playing.is_set():
-                    # viser's speeds are words, "0.5x".
-                    onward = float(now.value) + passed * float(speed.value.rstrip("x"))
-                    now.value = onward if onward <= last else first
-
-        play.on_click(lambda _: turn(not playing.is_set()))
-        now.on_update(moved)
-        self._update(lambda: (first,), lambda at: replay.at(replay.index_at(at[0])))
-        threading.Thread(target=keep_playing, daemon=True).start()
-
-    def _update(self, values: Callable[[], tuple[float, ...]], instant: Callable[[tuple[float, ...]], Instant]) -> None:
-        """Show the current values of the controls; return early if a previous event has already shown them."""
-        with self._busy:
-            wanted = values()
-            if wanted == self._shown:
-                return
-            self._shown = wanted
-            try:
-                found = instant(wanted)
-            except TowlineError as error:
-                self._readout.content = words.refusal(str(error))
-                return
-            self._stage.show(found)
-            self._readout.content = words.readout(found, self._subject.robot)
+    def _show(self, instant: Instant) -> None:
+        """Draw an instant in scene and panel, in one update, so that both agree in every frame."""
+        other = self._subject.other_at(instant)
+        with self._server.atomic():
+            self._stage.show(instant, other)
+            self._readout.content = words.readout(instant, self._subject.robot, other)
 
 
-def _whole(length: float, step: float) -> float:
-    """Return the number of whole steps that cover a length, at least one, so that the end is a round number."""
-    return round(max(math.ceil(length / step - 1e-6), 1) * step, 6)
+def _send_picture(client: viser.ClientHandle | None, name: str) -> None:
+    """Send a browser what it shows of the scene as a file to keep, on white."""
+    if client is None:
+        return
+    import io
+
+    from matplotlib.image import imsave
+
+    width, height = client.camera.image_width, client.camera.image_height
+    picture = client.get_render(height, width, transport_format="png", timeout=PATIENCE) / 255.0
+    opaque = picture[..., 3:]
+    file = io.BytesIO()
+    imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")
+    client.send_file_download(name, file.getvalue(), save_immediately=True)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
+from ..inputs import printable
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
@@ -17,11 +18,13 @@ from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
 from ..solvers import Certificate
-from .geometry import Extent, Geometry
+from .geometry import FARTHEST, Extent, Geometry
 from .instant import Instant, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
+LARGEST = 1e12  # of any number: velocities and tensions of real machines are far below
+LONGEST = 100  # letters of a text of the file
 
 
 class Replay:
@@ -38,6 +41,8 @@ class Replay:
     ----------
     robot, title, times
         Times of the saved instants (n,) [s].
+    tensions
+        (n, m) [N], nan where there are none.
     reference
         Origin of the platform's frame (n, 3) in {G} [m] where a flight should have it; None for a plan.
 
@@ -58,16 +63,19 @@ class Replay:
         self.robot = parse_yaml(dataset.attrs["robot"], Robot, f"{where}, robot")
         self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
         what, status = "flight" if self._task is None else self._task.name, dataset.attrs.get("status", "a plan")
-        self.title = f"{self.robot.name}, {what}: {status}"
+        self.title = f"{self.robot.name}, {printable(what, LONGEST)}: {printable(str(status), LONGEST)}"
         self.geometry = Geometry(self.robot)
-        self.times = _array(dataset, "time", (-1,), where)
+        self.times = _array(dataset, "time", (-1,), where, largest=FARTHEST)
         n, c = len(self.times), len(self.robot.carriers)
-        self._pose, self._velocity, self._acceleration = (
-            _array(dataset, name, (n, 6), where) for name in ("pose", "velocity", "acceleration")
+        self._pose = _array(dataset, "pose", (n, 6), where, largest=FARTHEST)
+        self._velocity, self._acceleration = (
+            _array(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
         )
-        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where)
-        self._tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
-        self.reference = _array(dataset, "reference_pose", (n, 6), where)[:, :3] if self._flown else None
+        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
+        self.tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
+        self.reference = (
+            _array(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
+        )
         self._words = _answers(dataset) if self._flown else None
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
@@ -83,6 +91,11 @@ class Replay:
         """Return the time from the first to the last instant [s]."""
         return float(self.times[-1] - self.times[0])
 
+    @cached_property
+    def margins(self) -> np.ndarray:
+        """Return the smallest distance of a tension from its limits at each instant, (n,) [N]; nan without tensions."""
+        return np.minimum(self.tensions - self._t_min, self.robot.t_max - self.tensions).min(axis=1)
+
     @property
     def path(self) -> np.ndarray:
         """Return the origin of the platform's frame at each instant, (n, 3) in {G} [m]."""
@@ -95,11 +108,11 @@ class Replay:
         return [path for path in paths if np.ptp(path, axis=0).max() > 1e-9]
 
     @property
-    def obstacles(self) -> list[np.ndarray]:
-        """Return lines (k, 3) in {G} [m] that outline the regions to keep out of."""
+    def obstacles(self) -> list[list[np.ndarray]]:
+        """Return lines (k, 3) in {G} [m] that outline each of the regions to keep out of."""
         if self._task is None:
             return []
-        return [line for place in self._task.limits.keep_out if place.frame == "world" for line in outline(place)]
+        return [outline(place) for place in self._task.limits.keep_out if place.frame == "world"]
 
     def index_at(self, time: float) -> int:
         """Return the index of the instant nearest to `time` [s]."""
@@ -111,12 +124,12 @@ class Replay:
         instants = np.linspace(self.times[0], self.times[-1], count)
         return np.unique([self.index_at(time) for time in instants])
 
-    def at(self, index: int) -> Instant:
-        """Return the `index`-th instant with its audited tensions, or with a certificate if there are none."""
-        tensions = self._tensions[index]
+    def at(self, index: int, prove: bool = True) -> Instant:
+        """Return the `index`-th instant with its audited tensions; if there are none, with a certificate if `prove`."""
+        tensions = self.tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
-        certificate = None if there or self._task is None else self._certificate(index)
+        certificate = None if there or self._task is None or not prove else self._certificate(index)
         status = "feasible" if there else "no tensions" if certificate is None else "infeasible"
         return Instant(
             pose=self._pose[index],
@@ -163,10 +176,17 @@ def _answers(dataset: xr.Dataset) -> list[str] | None:
     numbers = dataset["answered"].to_numpy().astype(int)
     if not ((numbers >= 0) & (numbers < len(words))).all():
         return None
-    return [words[number].replace("_", " ") for number in numbers]
+    return [printable(words[number].replace("_", " "), LONGEST) for number in numbers]
 
 
-def _array(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False) -> np.ndarray:
+def _array(
+    dataset: xr.Dataset,
+    name: str,
+    shape: tuple[int, ...],
+    where: str,
+    gaps: bool = False,
+    largest: float = LARGEST,
+) -> np.ndarray:
     """Return a variable as numbers of the expected shape, -1 for any length; `gaps` permits nan."""
     try:
         values = dataset[name].to_numpy().astype(float)
@@ -177,6 +197,7 @@ def _array(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, g
     )
     if not fits:
         raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")
-    if not gaps and not np.isfinite(values).all():
-        raise InputError(f"{where}: {name} must have finite numbers, got nan or infinity")
+    wrong = ~(np.abs(values) <= largest) & ~(gaps & np.isnan(values))
+    if wrong.any():
+        raise InputError(f"{where}: {name} must have numbers up to {largest:g}, got {values[wrong][0]:g}")
     return values

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..models import Dynamics
 from ..writing import whole_file
-from . import words
+from .access import guarded
 from .geometry import Geometry
 from .instant import at_rest
+from .page import aside
 from .panel import Panel
+from .posing import home_at_rest
 from .stage import Stage
 
 if TYPE_CHECKING:
@@ -41,7 +43,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
         From `read`.
     host
         The address to listen on: 127.0.0.1 for this machine only. There is no password: on any other address, everyone
-        who reaches it can look.
+        who reaches it can look. Pages of other sites in a browser cannot, whatever the address.
     port
         The port; if it is in use, one of the next. 0 selects any free port.
 
@@ -56,6 +58,8 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
         geometry = Geometry(subject.robot)
         stage = Stage(server, subject, geometry, captioned=False)
         panel = Panel(server, subject, geometry, stage)
+
+        server.on_client_connect(stage.mind)
         try:
             # An address of IPv6 has colons of its own.
             yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
@@ -97,28 +101,21 @@ def _page(subject: Subject) -> str:
         replay = subject.replay
         if replay is None:
             robot = subject.robot
-            stage.show(at_rest(Dynamics(robot), geometry, robot.home, robot.carrier_home))
-            document = server.get_scene_serializer().as_html()
+            frames = [at_rest(Dynamics(robot), geometry, home_at_rest(robot), robot.carrier_home)]
         else:
-            frames = replay.frames(FRAME_RATE)
-            stage.show(replay.at(int(frames[0])))
-            recording = server.get_scene_serializer()
-            for before, index in pairwise(frames):
-                recording.insert_sleep(float(replay.times[index] - replay.times[before]))
-                stage.show(replay.at(int(index)))
-            document = recording.as_html()
+            frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
+        stage.show(frames[0], subject.other_at(frames[0]))
+        recording = server.get_scene_serializer()
+        for before, instant in pairwise(frames):
+            recording.insert_sleep((instant.time or 0.0) - (before.time or 0.0))
+            stage.show(instant, subject.other_at(instant))
+        document = recording.as_html()
     finally:
         _stop(server)
     title = escape(subject.title)
-    # Above the picture, but the mouse goes through to it.
-    aside = (
-        '<aside style="position:fixed;left:8px;bottom:52px;max-width:260px;z-index:1;pointer-events:none;color:#222;'
-        f'background:#ffffffcc;font-family:system-ui,sans-serif"><div style="padding:4px 12px;font-weight:600">{title}'
-        f"</div>{words.legend(subject, stage.cell)}</aside>"
-    )
     head, _, rest = document.partition("<head>")
     body, end, tail = rest.rpartition("</body>")
-    return f"{head}<head><title>{title}</title>{body}{aside}{end}{tail}"
+    return f"{head}<head><title>{title}</title>{body}{aside(subject, frames, stage.cell)}{end}{tail}"
 
 
 def _check_address(host: str, port: int) -> None:
@@ -148,8 +145,12 @@ def _start(host: str, port: int) -> viser.ViserServer:
         def request_share_url(self, verbose: bool = True) -> str | None:
             return None
 
-    with _quiet():
-        return Unshared(host=host, port=port, verbose=False)
+    with _quiet(), guarded(host) as guards:
+        server = Unshared(host=host, port=port, verbose=False)
+    if not guards:
+        _stop(server)
+        raise InputError("viser must start its server with websockets.serve; install the version of constraints.txt")
+    return server
 
 
 def _stop(server: viser.ViserServer) -> None:

@@ -12,6 +12,7 @@ from .geometry import Geometry
 
 TURN = 1.0  # [rad] to each side of home
 BEYOND = 0.25  # of the robot's extent, to each side: also where it cannot be is worth seeing
+SHORTEST = 1e-6  # [m] of a range
 TILT = 0.6  # [rad] of carriers that have no limit of their own
 
 
@@ -78,6 +79,16 @@ def poses(robot: Robot, settings: list[Slider], values: list[float]) -> tuple[np
         owner = pose if slider.carrier is None else carriers[slider.carrier]
         owner[slider.coordinate] = value
     return pose, carriers
+
+
+def whole_steps(low: float, high: float) -> tuple[float, float, float]:
+    """Return ends of a slider that are whole steps around a range, and the step: a power of ten, a 200th or less."""
+    span = max(high - low, SHORTEST)
+    digits = int(np.ceil(-np.log10(span / 200)))
+    step = 10.0**-digits
+    first = float(np.floor(low / step))
+    last = max(float(np.ceil(high / step)), first + 1.0)
+    return round(first * step, max(digits, 0)), round(last * step, max(digits, 0)), step
 
 
 def _slider(carrier: int | None, coordinate: int, low: float, high: float, home: float) -> Slider:

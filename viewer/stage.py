@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,8 +14,9 @@ from ..figures.robot import box_edges
 from ..text import quantity
 from . import words
 from .colours import place, rgb, shades
-from .geometry import Geometry
-from .instant import Instant, arrow
+from .geometry import Extent, Geometry
+from .instant import Instant, arrow, typical_force
+from .shapes import posts, rotors, sheaves
 
 if TYPE_CHECKING:
     import viser
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from .subject import Subject
 
 FIELD_OF_VIEW = 0.75  # [rad]
+WIDE = 1.4  # width over height of a picture
 CABLE_WIDTH = 4.0  # [pixels]
 THIN = 1.5
 BLACK, GREY = (0, 0, 0), (150, 150, 150)
@@ -49,11 +51,16 @@ class Stage:
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
         self._scene = server.scene
         self._robot = subject.robot
-        self._extent = extent = subject.replay.extent if subject.replay else geometry.extent
+        extent = subject.replay.extent if subject.replay else geometry.extent
+        if subject.other is not None:
+            extent = Extent.of(*extent, *subject.other.extent)
+        self._extent = extent
         self._size, self._centre = extent.size, (extent.low + extent.high) / 2
-        self._look(server)
+        self.frame(server.initial_camera, WIDE, 1.0)
         self._draw_surroundings(subject)
         self._make_actors(captioned)
+        if subject.other is not None:
+            self._make_shadow(subject.other.path)
 
     @property
     def cell(self) -> float:
@@ -62,8 +69,10 @@ class Stage:
         power = 10.0 ** np.floor(np.log10(wanted))
         return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
-    def show(self, instant: Instant) -> None:
-        """Draw an instant."""
+    def show(self, instant: Instant, other: Instant | None = None) -> None:
+        """Draw an instant, and one of another plan or flight as a shadow."""
+        if other is not None:
+            self._shadow(other)
         points = instant.points
         colours = shades(place(instant.tensions, self._robot.t_min, self._robot.t_max))
         exits = np.where(np.isfinite(points.exits), points.exits, points.anchors)
@@ -71,6 +80,11 @@ class Stage:
         for cable, way, colour in zip(self._cables, ways.astype(np.float32), colours, strict=True):
             cable.points = way
             cable.colors = colour
+        if self._sheaves is not None:
+            rings = sheaves(self._robot, points)
+            self._sheaves.visible = len(rings) > 0
+            if len(rings):
+                self._sheaves.points = rings.astype(np.float32)
         self._ends.points = np.concatenate([points.anchors, points.attachments]).astype(np.float32)
         _place(self._platform, instant.pose)
         for handle, pose in zip(self._carriers, instant.carriers, strict=True):
@@ -89,34 +103,73 @@ class Stage:
         if self._caption is not None:
             _write(self._caption, words.caption(instant))
 
-    def show_cloud(self, shown: bool) -> None:
-        """Show or hide the points of a workspace."""
-        if self._cloud is not None:
-            self._cloud.visible = shown
+    def show_cloud(self, shown: bool, most: np.ndarray) -> None:
+        """Show or hide the points of a workspace whose coordinates are at most `most` (3,) in {G} [m]."""
+        if self._cloud is None or self._points is None:
+            return
+        kept = (self._points.positions <= most).all(axis=1)
+        self._cloud.visible = shown and bool(kept.any())
+        if kept.any():
+            self._cloud.points = self._points.positions[kept].astype(np.float32)
+            self._cloud.colors = self._points.colours[kept]
 
     def show_numbers(self, shown: bool) -> None:
         """Show or hide number and tension at the cables."""
         for label in self._numbers:
             label.visible = shown
 
+    def _shadow(self, other: Instant) -> None:
+        """Draw platform and cables of another plan or flight."""
+        _place(self._other_platform, other.pose)
+        exits = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
+        self._other_cables.points = np.stack([exits, other.points.attachments], axis=1).astype(np.float32)
+
     def _point(self, instant: Instant) -> None:
         """Draw the arrow of the certificate."""
-        ends = arrow(instant, self._size)
+        ends = arrow(instant, self._size, typical_force(self._robot))
         self._arrow.visible = self._short.visible = ends is not None
         if ends is not None:
             self._arrow.points = _strokes(*ends).astype(np.float32)
             self._short.position = ends[1]
             _write(self._short, words.shortfall(instant))
 
-    def _look(self, server: viser.ViserServer) -> None:
-        """Point the camera at the whole robot from the front, a little from the side and above."""
-        camera = server.initial_camera
-        along = np.array([0.45, -1.0, 0.45])
-        away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2)
-        camera.position = self._centre + away * along / np.linalg.norm(along)
-        camera.look_at = self._centre
+    def frame(self, camera: Any, width: float, height: float) -> None:
+        """Point a camera at the whole robot from the front, a little from the side and above.
+
+        In a picture that is higher than wide, as on a phone, the camera is farther away, and the robot above the panel.
+
+        Parameters
+        ----------
+        camera
+            Of viser: the initial one, or that of a client.
+        width, height
+            Of its picture [pixels].
+        """
+        free = 1.0 - words.SHEET_SHARE if width < height else 1.0
+        along = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])
+        away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2) / min(width / height, free, 1.0)
+        side = np.cross([0.0, 0.0, 1.0], along)
+        upwards = np.cross(along, side / np.linalg.norm(side))
+        # The middle of what the panel leaves free, above the middle of the picture.
+        centre = self._centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
+        camera.position = centre + away * along
+        camera.look_at = centre
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
+
+    def mind(self, client: viser.ClientHandle) -> None:
+        """Frame the robot in a picture that is higher than wide, now and whenever its camera is the initial one.
+
+        The initial camera may reach a browser after this one, and a user can return to it.
+        """
+        camera = client.camera
+        if camera.image_width < camera.image_height:
+            self.frame(camera, camera.image_width, camera.image_height)
+
+            @camera.on_update
+            def _(_: viser.CameraHandle) -> None:
+                if np.abs(camera.look_at - self._centre).max() < 1e-3 * self._size:
+                    self.frame(camera, camera.image_width, camera.image_height)
 
     def _draw_surroundings(self, subject: Subject) -> None:
         scene, cell = self._scene, self.cell
@@ -138,6 +191,8 @@ class Stage:
             position=floor,
         )
         scene.add_frame("/G", axes_length=0.08 * self._size, axes_radius=0.004 * self._size, origin_radius=0.0)
+        scene.add_label("/G/name", "{G}", anchor="top-right", font_screen_scale=0.8)
+        self._lines("/posts", posts(self._robot, floor[2]), GREY)
         boxes = [box for carrier in self._robot.carriers for box in carrier.drawing.boxes]
         edges = [edge for box in boxes for edge in box_edges(np.array(box.min), np.array(box.max))]
         self._lines("/reach", edges, rgb(style.colour(3)))
@@ -146,8 +201,10 @@ class Stage:
             if subject.replay.reference is not None:
                 self._lines("/reference", [subject.replay.reference], rgb(words.GHOST), THIN)
             self._lines("/carrier_paths", subject.replay.carrier_paths, GREY)
-            self._lines("/keep_out", subject.replay.obstacles, rgb(style.colour(5)))
-        self._cloud = None
+            for index, lines in enumerate(subject.replay.obstacles):
+                self._lines(f"/keep_out/{index + 1}/edges", lines, rgb(style.colour(5)))
+                self._body(f"/keep_out/{index + 1}/body", np.concatenate(lines), rgb(style.colour(5)), opacity=0.25)
+        self._cloud, self._points = None, subject.cloud
         if subject.cloud is not None and len(subject.cloud.positions):
             self._cloud = scene.add_point_cloud(
                 "/workspace",
@@ -179,6 +236,11 @@ class Stage:
         self._ends = scene.add_point_cloud(
             "/ends", ends, BLACK, point_size=0.008 * size, point_shape="circle", precision="float32"
         )
+        self._sheaves = None
+        if robot.pulley_radii.any():
+            self._sheaves = scene.add_line_segments(
+                "/pulleys", nowhere, BLACK, thickness=2 * THIN, thickness_units="screen"
+            )
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
         com = np.array([robot.platform.com], np.float32)
@@ -196,6 +258,8 @@ class Stage:
                 )
             )
             self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)
+            if carrier.drawing.arm is not None:
+                self._lines(f"{name}/rotors", rotors(max(carrier.drawing.arm, 0.03 * size)), BLACK, 2 * THIN)
             scene.add_label(f"{name}/name", carrier.name, anchor="bottom-center", font_screen_scale=0.8)
         self._numbers = [
             scene.add_label(f"/tensions/{index + 1}", "", anchor="center-center", font_screen_scale=0.8)
@@ -213,7 +277,20 @@ class Stage:
         above = np.array([*self._centre[:2], self._extent.high[2] + 0.12 * size])
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
-    def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
+    def _make_shadow(self, path: np.ndarray) -> None:
+        colour = rgb(words.OTHER)
+        self._other_platform = self._scene.add_frame("/other/platform", show_axes=False)
+        self._body("/other/platform/body", self._robot.attachments, colour, opacity=0.35)
+        self._other_cables = self._scene.add_line_segments(
+            "/other/cables",
+            np.zeros((self._robot.m, 2, 3), np.float32),
+            colour,
+            thickness=THIN,
+            thickness_units="screen",
+        )
+        self._lines("/other/path", [path], colour)
+
+    def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int], opacity: float = 0.7) -> None:
         """Draw the convex hull of corners (k, 3) [m] in the frame above `name`, if it has a volume or an area."""
         triangles = [[face[0], *pair] for face in faces(corners) for pair in pairwise(face[1:])]
         if triangles:
@@ -222,7 +299,7 @@ class Stage:
                 corners.astype(np.float32),
                 np.array(triangles, np.uint32),
                 color=colour,
-                opacity=0.7,
+                opacity=opacity,
                 material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
                 flat_shading=True,
                 side="double",

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..models import Robot, load
+from ..inputs import printable
+from ..models import Robot, available, load
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from .cloud import Cloud
+    from .instant import Instant
     from .replay import Replay
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how NetCDF files begin
@@ -33,12 +35,15 @@ class Subject:
         The instants of a plan or a flight, or None.
     cloud
         The points of a workspace, or None.
+    other
+        A plan or a flight of the same robot to compare the replay with, or None.
     """
 
     title: str
     robot: Robot
     replay: Replay | None = None
     cloud: Cloud | None = None
+    other: Replay | None = None
 
     @property
     def kind(self) -> str:
@@ -47,8 +52,14 @@ class Subject:
             return "flight"
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
+    def other_at(self, instant: Instant) -> Instant | None:
+        """Return the instant of the other plan or flight at the same time, or its last one; None without another."""
+        if self.other is None or instant.time is None:
+            return None
+        return self.other.at(self.other.index_at(instant.time), prove=False)
 
-def read(target: str, robot: str | None = None) -> Subject:
+
+def read(target: str, robot: str | None = None, other: str | None = None) -> Subject:
     """Read a robot, a plan, a flight or a workspace.
 
     Parameters
@@ -58,19 +69,34 @@ def read(target: str, robot: str | None = None) -> Subject:
         folder.
     robot
         The robot of a workspace, if it is not in the library: a workspace file has only the name.
+    other
+        A plan or a flight to compare a plan or a flight with.
 
     Raises
     ------
     InputError
         If it is none of these, or belongs to another robot.
     """
+    if other is not None:
+        first, second = read(target, robot), read(other)
+        return _compared(first, second, printable(other))
     path = Path(target)
     if path.suffix == ".zarr" or _is_netcdf(path):
-        return _of_dataset(_open(path), target, robot)
+        return _of_dataset(_open(path), printable(target), robot)
     if robot is not None:
         raise InputError(f"--robot must be left out unless a workspace is shown, got {robot!r} with {target}")
     loaded = load(target)
     return Subject(loaded.name, loaded)
+
+
+def _compared(first: Subject, second: Subject, where: str) -> Subject:
+    if first.replay is None or second.replay is None:
+        wrong = first if first.replay is None else second
+        raise InputError(f"two files to compare must be plans or flights, got the {wrong.kind} {wrong.title}")
+    if (first.robot.name, first.robot.m) != (second.robot.name, second.robot.m):
+        raise InputError(f"{where} must be of {first.robot.name} with {first.robot.m} cables, got {second.robot.name}")
+    title = f"{first.title}; {second.kind} beside it: {second.title.partition(', ')[2]}"
+    return Subject(title, first.robot, replay=first.replay, other=second.replay)
 
 
 def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
@@ -85,13 +111,11 @@ def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
         raise InputError(f"{where} must be {ACCEPTED}, got a dataset that is neither a plan nor a workspace")
     from .cloud import cloud
 
-    name = str(dataset.attrs.get("robot"))
-    try:
-        loaded = load(robot if robot is not None else name)
-    except InputError:
-        if robot is not None:
-            raise
-        raise InputError(f"--robot must be the file of {name!r}, which is not in the library, for {where}") from None
+    name = printable(str(dataset.attrs.get("robot")), 64)
+    # A workspace names its robot: as a path, the name would make this program read any file.
+    if robot is None and name not in available():
+        raise InputError(f"--robot must be the file of {name!r}, which is not in the library, for {where}")
+    loaded = load(name if robot is None else robot)
     if loaded.name != name:
         raise InputError(f"--robot must be the file of {name!r}, whose workspace this is, got {loaded.name!r}")
     return Subject(f"{loaded.name}, workspace", loaded, cloud=cloud(dataset, where))
@@ -111,7 +135,7 @@ def _open(path: Path) -> xr.Dataset:
     import xarray as xr
 
     if not path.exists():
-        raise InputError(f"{path} does not exist; it must be {ACCEPTED}")
+        raise InputError(f"{printable(str(path))} does not exist; it must be {ACCEPTED}")
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path} must be {ACCEPTED}, got a folder")
     try:
@@ -125,4 +149,4 @@ def _open(path: Path) -> xr.Dataset:
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         # HDF5 has its own message of several lines, where others have a few words.
         reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
-        raise InputError(f"{path} must be {ACCEPTED}, got a file that cannot be read ({reason})") from None
+        raise InputError(f"{path} must be {ACCEPTED}, got a file that cannot be read ({printable(reason)})") from None

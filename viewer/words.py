@@ -19,28 +19,44 @@ from .subject import Subject
 
 MUTED = "#595959"
 GHOST = style.colour(2)  # of the reference of a flight
+OTHER = "#444444"  # of the plan or flight that is compared
 STOPS = 9  # of the legend's gradient
 COLUMNS = (("cable", "left", 0), ("tension", "right", 10), ("", "left", 0), ("limits [N]", "left", 10))
+# On screens below 36 em, viser's panel is a sheet of 20 em that covers 60 % of the height.
+SHEET = ".mantine-Paper-root:has(.towline-readout)"
+NARROW = (
+    "<style>@media (max-width:36em){"
+    f"{SHEET}{{width:100%!important;max-height:45%!important}}"
+    f"{SHEET} div[style*='width: 20em']{{width:100%!important}}"
+    "}</style>"
+)
+SHEET_SHARE = 0.45  # of the height, see NARROW
 BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums"
 
 
-def readout(instant: Instant, robot: Robot) -> str:
-    """Return status, margins, the certificate if there are no tensions, and a row for each cable."""
+def readout(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
+    """Return status, margins, the certificate if there are no tensions, and a row for each cable.
+
+    `other` is the instant of a plan or a flight to compare with: its distance and its tensions are added.
+    """
     feasible = instant.certificate is None and np.isfinite(instant.tensions).all()
     colour = style.colour(0) if feasible else style.colour(1)
-    facts = [f'<b style="color:{colour}">{escape(instant.status)}</b>']
+    facts = [f'<b class="towline-status" style="color:{colour}">{escape(instant.status)}</b>']
     if instant.time is not None:
-        facts.append(f"t = {instant.time:.2f} s")
+        facts.append(f'<span class="towline-time">t = {instant.time:.2f} s</span>')
     facts += _margins(instant)
+    if other is not None:
+        apart = float(np.linalg.norm(instant.pose[:3] - other.pose[:3]))
+        facts.append(f"platforms {quantity(apart, 'm')} apart, the other: {escape(other.status)}")
     lines = [f"<div>{fact}</div>" for fact in facts]
     if instant.certificate is not None:
         words = escape(instant.certificate.describe()).replace("\n", "<br>")
         lines.append(f'<div style="border-left:3px solid {colour};padding-left:8px;margin:6px 0">{words}</div>')
-        if arrow(instant, 1.0) is None:
+        if arrow(instant, 1.0, 1.0) is None:
             lines.append(f'<div style="color:{MUTED}">The direction has almost no force, so it has no arrow.</div>')
-    pose = ", ".join(f"{value:.3f}" for value in instant.pose + 0.0)
+    pose = ", ".join(f"{value:.3f}" for value in np.round(instant.pose, 3) + 0.0)
     lines.append(f'<div style="color:{MUTED}">({", ".join(COORDINATES)}) = ({pose}) m, rad</div>')
-    return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{_table(instant, robot)}</div>'
+    return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{table(instant, robot, other)}</div>'
 
 
 def _margins(instant: Instant) -> list[str]:
@@ -53,7 +69,7 @@ def _margins(instant: Instant) -> list[str]:
     return lines
 
 
-def _table(instant: Instant, robot: Robot) -> str:
+def table(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
     """Return a table of the cables: colour, tension, and its place between the limits."""
     places = place(instant.tensions, robot.t_min, robot.t_max)
     rows = []
@@ -62,17 +78,25 @@ def _table(instant: Instant, robot: Robot) -> str:
         hue = f"rgb({', '.join(str(part) for part in shade)})"
         bar = (
             f'<div style="width:64px;height:8px;background:#e8e8e8">'
-            f'<div style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}"></div></div>'
+            f'<div class="towline-bar" style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}">'
+            "</div></div>"
         )
         shown = f"{tension:.2f} N" if there else "none"
+        if other is not None:
+            at_other = other.tensions[index]
+            beside = f"{at_other:.2f} N" if np.isfinite(at_other) else "none"
+            bar = f'<span class="towline-other" style="color:{OTHER}">{beside}</span>'
         limits = f"{robot.t_min[index]:g} to {robot.t_max[index]:g}"
+        # The colour of the cable's curve, where there are curves.
+        edge = "" if instant.time is None else f"border-left:4px solid {style.colour(index)};padding-left:6px"
         rows.append(
-            f'<tr><td>{index + 1}</td><td style="text-align:right;padding:0 10px" '
+            f'<tr><td style="{edge}">{index + 1}</td><td style="text-align:right;padding:0 10px" '
             f'class="towline-tension">{shown}</td><td>{bar}</td>'
             f'<td style="color:{MUTED};padding-left:10px">{limits}</td></tr>'
         )
     heads = "".join(
-        f'<th style="font-weight:600;text-align:{side};padding:0 {pad}px">{name}</th>' for name, side, pad in COLUMNS
+        f'<th style="font-weight:600;text-align:{side};padding:0 {pad}px">{name}</th>'
+        for name, side, pad in (COLUMNS if other is None else (*COLUMNS[:2], ("other", "left", 0), COLUMNS[3]))
     )
     return f'<table style="border-collapse:collapse;margin-top:6px"><tr>{heads}</tr>{"".join(rows)}</table>'
 
@@ -104,6 +128,7 @@ def legend(subject: Subject, cell: float) -> str:
     marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
     marks += [("path of the platform", style.colour(0))] if subject.replay else []
     marks += [("reference of the platform", GHOST)] if subject.kind == "flight" else []
+    marks += [("platform, cables and path of the other", OTHER)] if subject.other else []
     marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
     marks += [("reach of a carrier", style.colour(3))] if any(c.drawing.boxes for c in robot.carriers) else []
     marks += [("direction of the wrench that is missing (its force)", style.colour(1))]

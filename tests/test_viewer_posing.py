@@ -1,0 +1,193 @@
+"""Robots posed by hand: sliders and handles agree, cables keep their lengths, and the nearest feasible pose."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline.distribution import tensions
+from towline.models import Dynamics, load
+from towline.viewer import read, serve
+from towline.viewer.geometry import Geometry
+from towline.viewer.posing import at_rest_with, home_at_rest
+from towline.viewer.sliders import whole_steps
+from towline.workspace import Places, StaticEquilibrium, sample, save
+from towline.workspace.nearest import nearest_feasible
+
+from .viewer_wire import CAMERA, Wire
+
+
+@pytest.fixture
+def wire(request):
+    with serve(read(request.param), port=0) as url:
+        opened = Wire(url)
+        yield opened
+        opened.close()
+
+
+def settle(wire):
+    while wire.read(0.4):
+        pass
+
+
+def pose(wire):
+    numbers = re.search(r"yaw\) = \(([^)]*)\)", wire.readout())[1].split(",")
+    return np.array([float(number) for number in numbers])
+
+
+def drag(wire, name, position, turned):
+    wxyz = turned.as_quat(scalar_first=True).tolist()
+    place = np.asarray(position, dtype=float).tolist()
+    owner = wire.scene[name].get("owner") or ""
+    wire.send(type="TransformControlsUpdateMessage", name=name, wxyz=wxyz, position=place, owner=owner)
+    wire.send(type="TransformControlsDragEndMessage", name=name, owner=owner)
+
+
+@pytest.mark.parametrize("wire", ["cogiro"], indirect=True)
+def test_a_handle_and_the_sliders_agree_and_change_the_tensions(wire):
+    robot = load("cogiro")
+    settle(wire)
+    wanted = robot.home + np.array([0.5, -0.3, 0.2, 0.1, -0.05, 0.2])
+    drag(wire, "/handles/platform", wanted[:3], Rotation.from_euler("ZYX", wanted[:2:-1]))
+    settle(wire)
+    np.testing.assert_allclose(pose(wire), wanted, atol=6e-4)
+    np.testing.assert_allclose(wire.scene["/platform"]["position"], wanted[:3], atol=1e-6)
+    for name, value in zip(("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]"), wanted, strict=True):
+        assert wire.element(label=name)[1]["value"] == pytest.approx(value, abs=1e-6)
+    shown = [float(text) for text in re.findall(r">([\d.]+) N<", wire.readout())]
+    np.testing.assert_allclose(shown, tensions(robot, wanted).tensions, atol=0.0051)
+    wire.set(1.0, label="x [m]")
+    settle(wire)
+    np.testing.assert_allclose(wire.scene["/handles/platform"]["position"], [1.0, *wanted[1:3]], atol=1e-6)
+    drag(wire, "/handles/platform", [1e9, 0, 0], Rotation.identity())
+    settle(wire)
+    assert pose(wire)[0] == pytest.approx(next(v["max"] for v in wire.panel.values() if v.get("label") == "x [m]"))
+
+
+@pytest.mark.parametrize("wire", ["wang-ctmrts"], indirect=True)
+def test_with_three_cables_the_platform_rests_and_follows_its_carriers(wire):
+    """With fixed lengths: where the carriers go together, the platform goes."""
+    robot = load("wang-ctmrts")
+    settle(wire)
+    assert "optimal" in wire.readout()
+    before = pose(wire)
+    lengths, moved = Dynamics(robot).cable_lengths(before, robot.carrier_home), np.array([0.05, 0.03, 0.02, 0, 0, 0])
+    for index in range(3):
+        at = (robot.carrier_home[index] + moved)[:3]
+        drag(wire, f"/handles/{index + 1}", at, Rotation.identity())
+        settle(wire)
+        assert "optimal" in wire.readout()
+    np.testing.assert_allclose(pose(wire), before + moved, atol=2e-3)
+    kept = Dynamics(robot).cable_lengths(pose(wire), robot.carrier_home + moved)
+    np.testing.assert_allclose(kept, lengths, atol=5e-3)
+
+
+@pytest.mark.parametrize("name", ["wang-ctmrts", "wang-ctmrts-4", "multi-quadrotor-3"])
+def test_home_of_a_robot_with_few_cables_is_a_pose_at_rest(name):
+    robot = load(name)
+    rest = home_at_rest(robot)
+    answer = tensions(robot, rest)
+    assert answer.feasible
+    A = Dynamics(robot).wrench_matrix(rest, robot.carrier_home)
+    np.testing.assert_allclose(A @ answer.tensions, [0, 0, robot.weight, 0, 0, 0], atol=1e-5 * robot.weight)
+    away = rest + np.array([0.02, 0.01, 0, 0.05, -0.05, 0.1])
+    lengths = Dynamics(robot).cable_lengths(away, robot.carrier_home)
+    hung = at_rest_with(robot, lengths, away, robot.carrier_home)
+    np.testing.assert_allclose(Dynamics(robot).cable_lengths(hung, robot.carrier_home), lengths, atol=1e-6)
+
+
+def test_the_nearest_feasible_pose_is_on_the_edge_and_no_other_is_much_nearer():
+    robot = load("cogiro")
+    start = robot.home + np.array([9.0, 0, 0, 0, 0, 0])
+    assert not tensions(robot, start).feasible
+    found = nearest_feasible(robot, StaticEquilibrium(), start, robot.carrier_home, 20.0)
+    assert tensions(robot, found).feasible
+
+    def distance(poses):
+        return np.linalg.norm((poses - start) * [1, 1, 1, *(robot.length,) * 3], axis=-1)
+
+    rng = np.random.default_rng(5)
+    others = start + 0.9 * distance(found) * rng.uniform(-1, 1, (20_000, 6)) / [1, 1, 1, *(robot.length,) * 3]
+    others = others[distance(others) < 0.9 * distance(found)]
+    assert len(others) > 1000
+    assert not StaticEquilibrium().evaluate(robot, Places.at_home(robot, others)).any()
+    feasible_already = nearest_feasible(robot, StaticEquilibrium(), robot.home, robot.carrier_home, 20.0)
+    np.testing.assert_array_equal(feasible_already, robot.home)
+
+
+@pytest.mark.parametrize("wire", ["planar-4"], indirect=True)
+def test_the_button_goes_to_the_nearest_feasible_pose(wire):
+    settle(wire)
+    z = wire.element(label="z [m]")[1]
+    wire.set(z["max"], label="z [m]")
+    settle(wire)
+    assert "infeasible" in wire.readout()
+    wire.set(True, label="Nearest feasible pose")
+    settle(wire)
+    assert "optimal" in wire.readout()
+    assert wire.element(label="z [m]")[1]["value"] < z["max"]
+
+
+@pytest.mark.parametrize("name", ["cogiro", "wang-ctmrts", "multi-quadrotor-4", "fast"])
+def test_on_a_phone_the_whole_robot_is_above_the_panel(name):
+    """By a pinhole camera of its own: the panel covers the lower 45 % of 400 x 800 pixels."""
+    robot = load(name)
+    with serve(read(name), port=0) as url:
+        wire = Wire(url, width=400, height=800)
+        settle(wire)
+        # The browser applies the initial camera late.
+        middle = ((geometry := Geometry(robot).extent).low + geometry.high) / 2
+        wire.send(**CAMERA | {"look_at": middle.tolist()}, image_width=400, image_height=800)
+        got = {}
+        while wire.read(0.5):
+            got |= {message["type"]: message for message in wire.messages}
+        wire.close()
+    eye = np.array(got["SetCameraPositionMessage"]["position"])
+    to = np.array(got["SetCameraLookAtMessage"]["look_at"]) - eye
+    fov = CAMERA["fov"]
+    ahead = to / np.linalg.norm(to)
+    right = np.cross(ahead, [0, 0, 1]) / np.linalg.norm(np.cross(ahead, [0, 0, 1]))
+    points = np.vstack([robot.home_anchors, robot.home_attachments]) - eye
+    pixels = points @ np.stack([right, np.cross(ahead, right)]).T / (points @ ahead)[:, None]
+    pixels = [200, 400] + pixels * 400 / np.tan(fov / 2)
+    assert (pixels > 0).all()
+    assert (pixels < [400, 440]).all()
+    assert np.ptp(pixels, axis=0).max() > 100
+
+
+def test_a_workspace_is_cut_along_each_axis(tmp_path):
+    robot = load("planar-4")
+    low, high = robot.home_anchors.min(axis=0), robot.home_anchors.max(axis=0)
+    region = {"position": {"min": low.tolist(), "max": high.tolist()}}
+    save(sample(robot, StaticEquilibrium(), region, samples=2000, keep="all"), tmp_path / "space.nc")
+    subject = read(str(tmp_path / "space.nc"))
+    positions = subject.cloud.positions
+    with serve(subject, port=0) as url:
+        wire = Wire(url)
+        settle(wire)
+        cut = float(np.median(positions[:, 0]))
+        wire.set(cut, label="x up to [m]")
+        settle(wire)
+        shown = wire.array(wire.scene["/workspace"]["points"]).reshape(-1, 3)
+        assert len(shown) == (positions[:, 0] <= cut).sum() == len(wire.array(wire.scene["/workspace"]["colors"])) // 3
+        assert shown[:, 0].max() <= cut + 1e-6
+        top = wire.element(label="x up to [m]")[1]["max"]
+        wire.set(top, label="x up to [m]")
+        settle(wire)
+        assert len(wire.array(wire.scene["/workspace"]["points"])) == 3 * len(positions)
+        wire.set(False, label="points")
+        settle(wire)
+        assert wire.scene["/workspace"]["visible"] is False
+        wire.close()
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.23456, 7.7), (0.0, 0.0), (999_999.0, 1e6), (-3e-4, 2e-4), (5.0, 5.0)])
+def test_ends_of_a_slider_are_whole_steps_around_its_range(low, high):
+    start, end, step = whole_steps(low, high)
+    assert start <= low
+    assert end >= high
+    assert end > start
+    assert start - low > -1.0001 * step
+    assert end - high < 1.0001 * step
+    assert end / step == pytest.approx(round(end / step), abs=1e-3)

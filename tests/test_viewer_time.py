@@ -1,0 +1,156 @@
+"""Time in the viewer: every update has one instant in scene, panel, charts and time line; steps, loop, curves."""
+
+import re
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from towline.errors import InputError
+from towline.models import load
+from towline.ocp import plan
+from towline.viewer import read, serve
+from towline.viewer.curves import Curves, curves
+
+from .viewer_wire import Wire
+
+CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}
+LINE = {"kind": "line", "start": [0, 0, -1], "end": [0.05, 0, -0.9]}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A plan that cannot be, and one that can."""
+    place, robot = tmp_path_factory.mktemp("time"), load("wang-flying")
+    for name, task in (("hover", {"path": CIRCLE}), ("line", {"path": LINE, "duration": 2})):
+        plan(robot, task | {"base": {"kind": "hold"}, "output_rate": 20}).save(place / f"{name}.nc")
+    return place
+
+
+@pytest.fixture
+def wire(request, folder):
+    with serve(read(str(folder / f"{request.param}.nc")), port=0) as url:
+        opened = Wire(url)
+        yield opened
+        opened.close()
+
+
+@pytest.mark.parametrize("wire", ["hover"], indirect=True)
+def test_scene_panel_charts_and_time_line_agree_in_every_update(wire):
+    """A page draws after each update: none may have the shortfall of one instant and the pose of another."""
+    shown = set()
+    for _ in range(50):
+        wire.set("next", label="step")
+        assert wire.read()
+        readout = wire.readout()
+        instant = float(re.search(r"t = ([\d.]+) s", readout)[1])
+        assert f"short by {wire.scene['/shortfall']['text'].removeprefix('short by ')}" in readout
+        pose = [float(number) for number in re.search(r"yaw\) = \(([^)]*)\)", readout)[1].split(",")]
+        np.testing.assert_allclose(wire.scene["/platform"]["position"], pose[:3], atol=6e-4)
+        assert wire.element(label="time [s]")[1]["value"] == pytest.approx(instant, abs=0.0051)
+        for title in ("tensions [N]", "tension margin [N]"):
+            times, *_, cursor = (wire.array(column) for column in wire.element(title=title)[1]["data"])
+            assert times[cursor.argmax()] == pytest.approx(instant, abs=0.051)
+            assert cursor.sum() == 1
+        shown.add(instant)
+    assert len(shown) == 50
+
+
+@pytest.mark.parametrize("wire", ["line"], indirect=True)
+def test_steps_and_ends_and_playing_once_or_again_and_again(wire, folder):
+    saved = xr.load_dataset(folder / "line.nc")["time"].to_numpy()
+
+    def shown():
+        while wire.read(0.3):
+            pass
+        return wire.element(label="time [s]")[1]["value"]
+
+    for word, index in (("last", -1), ("next", -1), ("back", -2), ("first", 0), ("back", 0), ("next", 1)):
+        wire.set(word, label="step")
+        assert shown() == pytest.approx(saved[index], abs=1e-6), word
+    wire.set("4x", label="speed")
+    wire.set(False, label="loop")
+    wire.set("next", label="step")
+    wire.set(True, label="Play")
+    began, seen = time.monotonic(), []
+    while time.monotonic() < began + 3 and not (seen and seen[-1] == pytest.approx(2.0)):
+        wire.read()
+        seen.append(wire.element(label="time [s]")[1]["value"])
+    assert time.monotonic() < began + 2
+    assert (np.diff(seen) >= 0).all()
+    assert shown() == pytest.approx(2.0)
+    wire.set(True, label="loop")
+    wire.set(True, label="Play")
+    for _ in range(40):
+        wire.read()
+        if wire.element(label="time [s]")[1]["value"] < 1.5:
+            return
+    pytest.fail("it does not begin again")
+
+
+def test_curves_have_the_worst_of_every_part(folder):
+    replay = read(str(folder / "line.nc")).replay
+    replay.tensions[23] = np.nan
+    few = curves(replay, points=8)
+    assert len(few.times) <= 10
+    assert (few.times[0], few.times[-1]) == (replay.times[0], replay.times[-1])
+    assert few.infeasible.sum() == 1
+    assert few.times[few.infeasible] == replay.times[23]
+    saved = xr.load_dataset(folder / "line.nc")
+    known = ~few.infeasible
+    slack = np.minimum(saved["tensions"] - saved["t_min"], saved["t_max"] - saved["tensions"]).min("cable")
+    np.testing.assert_allclose(few.margins[known], slack.sel(time=few.times[known]), atol=1e-12)
+    assert len(curves(replay, points=10_000).times) == len(replay.times)
+
+
+def test_curves_at_other_times_end_where_the_motion_ends():
+    two = Curves(np.array([0.0, 2.0]), np.array([[1.0, 5.0], [3.0, 7.0]]), np.array([0.0, 1.0]))
+    other = two.on(np.array([-1.0, 1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(other.tensions, [[np.nan, np.nan], [2, 6], [3, 7], [np.nan, np.nan]])
+    np.testing.assert_allclose(other.margins, [np.nan, 0.5, 1, np.nan])
+
+
+@pytest.fixture(scope="module")
+def compared(folder):
+    """Another plan, slower and elsewhere, beside `line`."""
+    path = {"kind": "line", "start": [0, 0, -1], "end": [-0.05, 0.02, -0.9]}
+    task = {"path": path, "duration": 3, "base": {"kind": "hold"}, "output_rate": 20}
+    plan(load("wang-flying"), task).save(folder / "slow.nc")
+    return read(str(folder / "line.nc"), other=str(folder / "slow.nc"))
+
+
+def test_two_plans_are_compared_at_the_same_time(compared, folder):
+    slow = xr.load_dataset(folder / "slow.nc")
+    with serve(compared, port=0) as url:
+        wire = Wire(url)
+        wire.set(1.2, label="time [s]")
+        while wire.read(0.4):
+            pass
+        saved = slow.sel(time=1.2, method="nearest")
+        np.testing.assert_allclose(wire.scene["/other/platform"]["position"], saved["pose"][:3], atol=1e-6)
+        beside = [float(text) for text in re.findall(r'towline-other"[^>]*>([\d.]+) N', wire.readout())]
+        np.testing.assert_allclose(beside, saved["tensions"], atol=0.0051)
+        own = np.array(wire.scene["/platform"]["position"])
+        apart = float(re.search(r"platforms ([\d.]+) m apart", wire.readout())[1])
+        assert apart == pytest.approx(np.linalg.norm(own - saved["pose"][:3].to_numpy()), rel=1e-3)
+        # Its curve, dashed, in the same chart.
+        _, chart = wire.element(title="tensions [N]")
+        labels = [series["label"] for series in chart["series"]]
+        times, curve = (wire.array(chart["data"][k]) for k in (0, labels.index("cable 3, other")))
+        expected = np.interp(times, slow["time"], slow["tensions"][:, 2])
+        np.testing.assert_allclose(curve, expected, atol=1e-6)
+        wire.close()
+
+
+def test_only_motions_of_one_robot_are_compared(folder):
+    for other, words in (("cogiro", "must be plans or flights, got the robot cogiro"),):
+        with pytest.raises(InputError, match=words):
+            read(str(folder / "line.nc"), other=other)
+        with pytest.raises(InputError, match=words):
+            read(other, other=str(folder / "line.nc"))
+    saved = xr.load_dataset(folder / "line.nc")
+    saved.attrs["robot"] = saved.attrs["robot"].replace("wang-flying", "another")
+    saved.to_netcdf(folder / "another.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"another.nc must be of wang-flying with 6 cables, got another"):
+        read(str(folder / "line.nc"), other=str(folder / "another.nc"))

@@ -1,0 +1,55 @@
+"""Reduce the tensions of a replay to curves that a chart can redraw with every frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .replay import Replay
+
+POINTS = 240  # of a curve, about one for each pixel of the panel
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Tensions and margins of a motion at k of its instants, which include its worst.
+
+    Attributes
+    ----------
+    times
+        (k,) [s], increasing.
+    tensions, margins
+        (k, m) and (k,) [N], nan where there are no tensions.
+    """
+
+    times: np.ndarray
+    tensions: np.ndarray
+    margins: np.ndarray
+
+    @property
+    def infeasible(self) -> np.ndarray:
+        """Return which instants have no tensions, or tensions beyond their limits, (k,)."""
+        return ~(self.margins >= -1e-6 * max(float(np.nanmax(np.abs(self.tensions), initial=0.0)), 1.0))
+
+    def nearest(self, time: float) -> int:
+        """Return the index of the instant nearest to `time` [s]."""
+        return int(np.abs(self.times - time).argmin())
+
+    def on(self, times: np.ndarray) -> Curves:
+        """Return the curves at other times (j,) [s], interpolated, and nan before the first and after the last."""
+        columns = [np.interp(times, self.times, column, np.nan, np.nan) for column in self.tensions.T]
+        return Curves(times, np.stack(columns, 1), np.interp(times, self.times, self.margins, np.nan, np.nan))
+
+
+def curves(replay: Replay, points: int = POINTS) -> Curves:
+    """Return the curves of a replay: the instant with the least margin of each of `points` parts, and both ends."""
+    margins = replay.margins
+    severity = np.where(np.isnan(margins), -np.inf, margins)
+    edges = np.unique(np.linspace(0, len(margins), points + 1).round().astype(int))
+    worst = [low + severity[low:high].argmin() for low, high in pairwise(edges)]
+    shown = np.unique([0, *worst, len(margins) - 1])
+    return Curves(replay.times[shown], replay.tensions[shown], margins[shown])

@@ -1,0 +1,71 @@
+"""Write what stands beside the scene of a page without a server: title, tensions of the shown instant, legend."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import words
+from .colours import place, shades
+from .instant import Instant
+
+if TYPE_CHECKING:
+    from ..models import Robot
+    from .subject import Subject
+
+# The player has no events: its clock, the first input of the page, is read as often as the page plays.
+SCRIPT = """
+const box = document.querySelector("aside details"), all = (name) => box.querySelectorAll(".towline-" + name);
+if (innerWidth < innerHeight) box.open = false;
+let shown = 0;
+if (FRAMES.times.length > 1) setInterval(() => {
+  const clock = document.querySelector("input"), time = clock ? parseFloat(clock.value) : NaN;
+  if (!(time >= 0)) return;
+  let k = FRAMES.times.findIndex((at) => at > time + 1e-6);
+  k = k < 0 ? FRAMES.times.length - 1 : Math.max(k - 1, 0);
+  if (k === shown) return;
+  shown = k;
+  all("status")[0].textContent = FRAMES.statuses[k];
+  all("time")[0].textContent = FRAMES.clocks[k];
+  FRAMES.tensions[k].forEach((tension, i) => {
+    all("tension")[i].textContent = tension === null ? "none" : tension.toFixed(2) + " N";
+    all("bar")[i].style.width = FRAMES.widths[k][i] + "%";
+    all("bar")[i].style.background = FRAMES.colours[k][i];
+  });
+}, 40);
+"""
+
+
+def aside(subject: Subject, frames: list[Instant], cell: float) -> str:
+    """Return the HTML beside a scene that shows these instants one after the other; a title that folds the rest."""
+    start = frames[0]
+    # What follows the clock is replaced by the script; of the rest only the first instant is known.
+    table = words.table(start, subject.robot)
+    status = f'<b class="towline-status">{escape(start.status)}</b>'
+    clock = "" if start.time is None else f'<div class="towline-time">t = {start.time:.2f} s</div>'
+    data = json.dumps(_data(subject.robot, frames)).replace("<", "\\u003c")
+    return (
+        '<aside style="position:fixed;left:8px;bottom:52px;max-width:280px;max-height:80%;overflow:auto;z-index:1;'
+        'pointer-events:none;color:#222;background:#ffffffcc;font-family:system-ui,sans-serif"><details open>'
+        '<summary style="padding:4px 12px;font-weight:600;pointer-events:auto;cursor:pointer">'
+        f'{escape(subject.title)}</summary><div style="{words.BODY}">{status}{clock}{table}</div>'
+        f"{words.legend(subject, cell)}</details></aside><script>const FRAMES = {data};{SCRIPT}</script>"
+    )
+
+
+def _data(robot: Robot, frames: list[Instant]) -> dict[str, Any]:
+    """Return what the table of each frame has."""
+    tensions = np.array([frame.tensions for frame in frames])
+    places = place(tensions, robot.t_min, robot.t_max)
+    times = [0.0 if frame.time is None else frame.time - (frames[0].time or 0.0) for frame in frames]
+    return {
+        "times": times,
+        "clocks": [f"t = {frame.time or 0.0:.2f} s" for frame in frames],
+        "statuses": [frame.status for frame in frames],
+        "tensions": [[round(t, 2) if np.isfinite(t) else None for t in row] for row in tensions.tolist()],
+        "widths": np.nan_to_num(np.round(100 * places)).astype(int).tolist(),
+        "colours": [["#" + bytes(shade).hex() for shade in row] for row in shades(places)],
+    }

@@ -1,0 +1,210 @@
+"""Pose a robot by hand: sliders and handles in the scene that agree, cables that keep their lengths, feasible poses."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError, TowlineError
+from ..models import Dynamics
+from ..models.statics import rest_near
+from ..workspace import StaticEquilibrium
+from ..workspace.nearest import nearest_feasible
+from .geometry import Geometry
+from .instant import Instant, at_rest
+from .sliders import Slider, sliders
+
+if TYPE_CHECKING:
+    import viser
+
+    from ..models import Robot
+
+HANDLE = 0.13  # of the robot's size
+NOTHING = "nothing"
+
+
+class Posing:
+    """The controls of a robot's pose on a viser server.
+
+    Parameters
+    ----------
+    server
+        Its panel gets sliders, its scene handles.
+    robot, geometry
+        The robot, and its geometry.
+    show, refuse
+        Draw an instant, and show why there is none.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        geometry: Geometry,
+        show: Callable[[Instant], None],
+        refuse: Callable[[str], None],
+    ):
+        self._server, self._robot, self._geometry = server, robot, geometry
+        self._show, self._refuse = show, refuse
+        self._dynamics, self._settings = Dynamics(robot), sliders(robot, geometry)
+        self._busy, self._latest = threading.Lock(), 0
+        self._home = home_at_rest(robot)
+        self._pose, self._carriers = self._home.copy(), robot.carrier_home.copy()
+        self._lengths = self._dynamics.cable_lengths(self._pose, self._carriers)
+        gui: Any = server.gui
+        owners = list(dict.fromkeys(setting.carrier for setting in self._settings))
+        names = {owner: "platform" if owner is None else robot.carriers[owner].name for owner in owners}
+        self._sliders: list[Any] = []
+        for owner in owners:
+            name = "Platform" if owner is None else f"Carrier {names[owner]}"
+            # Teams of six would fill the screen.
+            with gui.add_folder(name, expand_by_default=owner is None or len(owners) < 3):
+                self._sliders += [
+                    gui.add_slider(it.label, it.low, it.high, it.step, self._value(it))
+                    for it in self._settings
+                    if it.carrier == owner
+                ]
+        self._hang = gui.add_checkbox(
+            "let it hang",
+            few_cables(robot),
+            disabled=robot.weight == 0,
+            hint="Cables keep their lengths, and the platform comes to rest. Moving the platform sets their lengths.",
+        )
+        nearest = gui.add_button("Nearest feasible pose", disabled=few_cables(robot))
+        home = gui.add_button("Home")
+        drag = gui.add_dropdown("drag", (*names.values(), NOTHING), initial_value=names[owners[0]])
+        self._handles = {owner: self._handle(owner, owner == owners[0]) for owner in owners}
+        for slider, setting in zip(self._sliders, self._settings, strict=True):
+            slider.on_update(lambda event, it=setting: self._slid(event, it))
+        self._hang.on_update(lambda _: self._go(self._pose, self._carriers))
+        nearest.on_click(lambda _: self._approach())
+        home.on_click(lambda _: self._go(self._home, self._robot.carrier_home))
+
+        def choose(_: Any) -> None:
+            for owner, handle in self._handles.items():
+                handle.visible = drag.value == names[owner]
+
+        drag.on_update(choose)
+        self._go(self._pose, self._carriers)
+
+    def _handle(self, owner: int | None, visible: bool) -> Any:
+        """Return the handle in the scene of the platform (None) or a carrier."""
+        free = [it.coordinate for it in self._settings if it.carrier == owner]
+        moves = (0 in free, 1 in free, 2 in free)
+        handle = self._server.scene.add_transform_controls(
+            "/handles/platform" if owner is None else f"/handles/{owner + 1}",
+            scale=HANDLE * self._geometry.extent.size,
+            active_axes=moves,
+            disable_axes=not any(moves),
+            disable_sliders=sum(moves) < 2,
+            disable_rotations=not any(coordinate > 2 for coordinate in free),
+            depth_test=False,
+            opacity=0.6,
+            visible=visible,
+        )
+        handle.on_update(lambda event: self._dragged(owner, event))
+        return handle
+
+    def _slid(self, event: Any, setting: Slider) -> None:
+        if event.client_id is None:  # otherwise `_go` set it
+            return
+        pose, carriers = self._pose.copy(), self._carriers.copy()
+        (pose if setting.carrier is None else carriers[setting.carrier])[setting.coordinate] = event.target.value
+        self._go(pose, carriers, lengthen=setting.carrier is None, held=event.target)
+
+    def _dragged(self, owner: int | None, event: Any) -> None:
+        """Move the platform (None) or a carrier to its handle, as far as its sliders reach."""
+        pose, carriers = self._pose.copy(), self._carriers.copy()
+        place = pose if owner is None else carriers[owner]
+        turned = Rotation.from_quat(event.target.wxyz, scalar_first=True).as_euler("ZYX")[::-1]
+        for setting in self._settings:
+            if setting.carrier == owner:
+                wanted = [*event.target.position, *turned][setting.coordinate]
+                place[setting.coordinate] = min(max(float(wanted), setting.low), setting.high)
+        self._go(pose, carriers, lengthen=owner is None, held=None if event.phase == "end" else self._handles[owner])
+
+    def _approach(self) -> None:
+        """Go to the feasible pose nearest to this one."""
+        found = nearest_feasible(
+            self._robot, StaticEquilibrium(), self._pose, self._carriers, self._geometry.extent.size
+        )
+        if found is None:
+            self._refuse("no feasible pose was sampled around this one")
+        else:
+            self._go(found, self._carriers)
+
+    def _go(self, pose: np.ndarray, carriers: np.ndarray, lengthen: bool = True, held: Any = None) -> None:
+        """Show a pose, or where the platform comes to rest near it, in one update of sliders, handles and scene.
+
+        Parameters
+        ----------
+        pose, carriers
+            (6,) and (c, 6).
+        lengthen
+            Cables get the lengths of this pose; otherwise they keep theirs, if the platform hangs.
+        held
+            The slider or handle that a user holds. It stays where it is, for its next event may be on its way, unless
+            it is a slider and the platform hangs elsewhere.
+        """
+        self._latest = number = self._latest + 1
+        with self._busy:
+            if number != self._latest:  # while this one waited, a later one came
+                return
+            try:
+                if lengthen or not self._hang.value:
+                    self._lengths = self._dynamics.cable_lengths(pose, carriers)
+                if self._hang.value:
+                    pose = at_rest_with(self._robot, self._lengths, pose, carriers)
+                instant = at_rest(self._dynamics, self._geometry, pose, carriers)
+            except TowlineError as error:
+                self._pose, self._carriers = pose.copy(), carriers.copy()
+                self._refuse(str(error))
+                return
+            self._pose, self._carriers = pose.copy(), carriers.copy()
+            with self._server.atomic():
+                for slider, setting in zip(self._sliders, self._settings, strict=True):
+                    if slider is not held or self._hang.value:
+                        slider.value = self._value(setting)
+                for owner, handle in self._handles.items():
+                    if handle is not held:
+                        place = pose if owner is None else carriers[owner]
+                        handle.position = place[:3]
+                        handle.wxyz = Rotation.from_euler("ZYX", place[:2:-1]).as_quat(scalar_first=True)
+                self._show(instant)
+
+    def _value(self, setting: Slider) -> float:
+        """Return the value of a coordinate inside the range of its slider, with two digits more than its steps."""
+        place = self._pose if setting.carrier is None else self._carriers[setting.carrier]
+        value = round(float(place[setting.coordinate]), 2 - math.floor(math.log10(setting.step)))
+        return min(max(value + 0.0, setting.low), setting.high)
+
+
+def few_cables(robot: Robot) -> bool:
+    """Return whether cables leave some motion of the platform free, so that it rests at few poses."""
+    return robot.m < int(robot.dof_mask.sum()) and robot.weight > 0
+
+
+def home_at_rest(robot: Robot) -> np.ndarray:
+    """Return the home pose (6,), or where the platform rests near it with its cables, if they are few."""
+    lengths = Dynamics(robot).cable_lengths(robot.home, robot.carrier_home)
+    rest = rest_near(robot, lengths, robot.home, robot.carrier_home) if few_cables(robot) else None
+    return robot.home if rest is None else rest.pose
+
+
+def at_rest_with(robot: Robot, lengths: np.ndarray, pose: np.ndarray, carriers: np.ndarray) -> np.ndarray:
+    """Return the pose (6,) near `pose` (6,) at which the platform rests with cables of `lengths` (m,) [m].
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    rest = rest_near(robot, lengths, pose, carriers)
+    if rest is None:
+        raise InputError("the platform comes to rest nowhere near this pose with cables of these lengths")
+    return rest.pose

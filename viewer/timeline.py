@@ -1,0 +1,122 @@
+"""Play a replay: a time line with play and pause, steps, speed and loop, and charts with the same cursor."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from .charts import Charts
+from .curves import curves
+from .instant import Instant
+
+if TYPE_CHECKING:
+    import viser
+
+    from .replay import Replay
+
+RATE = 25.0  # [1/s] of playing
+TICK = 0.01  # [s] of the time line
+SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
+
+
+class TimeLine:
+    """The controls of time on a viser server, until `close`.
+
+    Parameters
+    ----------
+    server
+        Its panel gets the controls, its command palette the keys.
+    replay
+        What plays.
+    show
+        Draws an instant.
+    other
+        Is charted beside it, if there is one.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, replay: Replay, show: Callable[[Instant], None], other: Replay | None = None
+    ):
+        self._server, self._replay, self._show = server, replay, show
+        self._playing, self._closed, self._busy = threading.Event(), threading.Event(), threading.Lock()
+        self._index = -1
+        gui: Any = server.gui
+        first, last = float(replay.times[0]), float(replay.times[-1])
+        with gui.add_folder("Time"):
+            self._now = gui.add_slider("time [s]", first, _whole(last - first, TICK) + first, TICK, first)
+            self._play = gui.add_button("Play", hint="K")
+            self._step = gui.add_button_group("step", ("first", "back", "next", "last"))
+            self._loop = gui.add_checkbox("loop", True)
+            self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1x")
+            self._charts = Charts(gui, curves(replay), None if other is None else curves(other))
+        self._now.on_update(self._dragged)
+        self._play.on_click(lambda _: self._turn(not self._playing.is_set()))
+        steps = {
+            "first": lambda: 0,
+            "back": lambda: self._index - 1,
+            "next": lambda: self._index + 1,
+            "last": lambda: len(replay.times) - 1,
+        }
+        self._step.on_click(lambda _: self._jump(steps[self._step.value]))
+        keys = {"first": "home", "back": "J", "next": "L", "last": "end"}
+        for word, key in keys.items():
+            command = gui.add_command(f"Time: {word}", hotkey=key)
+            command.on_trigger(lambda _, step=steps[word]: self._jump(step))
+        gui.add_command("Time: play or pause", hotkey="K").on_trigger(lambda _: self._turn(not self._playing.is_set()))
+        self._go(0)
+        threading.Thread(target=self._keep_playing, daemon=True).start()
+
+    def close(self) -> None:
+        """Stop playing."""
+        self._closed.set()
+
+    def _turn(self, on: bool) -> None:
+        (self._playing.set if on else self._playing.clear)()
+        self._play.label = "Pause" if on else "Play"
+
+    def _jump(self, index: Callable[[], int]) -> None:
+        self._turn(False)
+        self._go(index())
+
+    def _dragged(self, event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:  # otherwise it was moved by `_go`, which shows the instant itself
+            self._turn(False)
+            self._go(self._replay.index_at(float(self._now.value)), at=float(self._now.value))
+
+    def _go(self, index: int, at: float | None = None) -> None:
+        """Show an instant in scene, panel, charts and on the time line in one update.
+
+        `at` is where the time line is to be [s], between two instants; default: at the instant.
+        """
+        with self._busy:
+            index = min(max(index, 0), len(self._replay.times) - 1)
+            instant = self._replay.at(index)
+            with self._server.atomic():
+                self._now.value = float(self._replay.times[index]) if at is None else at
+                if index != self._index:
+                    self._index = index
+                    self._charts.move(float(self._replay.times[index]))
+                    self._show(instant)
+
+    def _keep_playing(self) -> None:
+        first, last = float(self._replay.times[0]), float(self._replay.times[-1])
+        last_look = time.monotonic()
+        while not self._closed.wait(1 / RATE):
+            passed, last_look = time.monotonic() - last_look, time.monotonic()
+            if not self._playing.is_set():
+                continue
+            # viser's speeds are words, "0.5x".
+            onward = float(self._now.value) + passed * float(self._speed.value.rstrip("x"))
+            if onward > last:
+                onward = first if self._loop.value else last
+                if not self._loop.value:
+                    self._turn(False)
+            self._go(self._replay.index_at(onward), at=onward)
+
+
+def _whole(length: float, step: float) -> float:
+    """Return the number of whole steps that cover a length, at least one, so that the end is a round number."""
+    return round(max(math.ceil(length / step - 1e-6), 1) * step, 6)

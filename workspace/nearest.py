@@ -1,0 +1,56 @@
+"""Search for the feasible pose that is nearest to one that is not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..models import Robot
+from .condition import Condition
+from .places import Places
+
+SCATTERED = 4000  # poses of the first look, at distances of all magnitudes
+ROUNDS, AROUND, BETWEEN = 10, 400, 40  # then about the best one so far, and on the line to it
+SHRINK = 0.6  # of the surroundings, each round
+NEAREST = 1e-4  # of the size, of the first look
+
+
+def nearest_feasible(
+    robot: Robot, condition: Condition, pose: np.ndarray, carriers: np.ndarray, size: float
+) -> np.ndarray | None:
+    """Return the pose nearest to `pose` at which a condition holds, to some percent of the distance, or None.
+
+    The search samples poses; it may miss a feasible set that is thin or has several parts. Distances are metres, and
+    radians times `Robot.length`.
+
+    Parameters
+    ----------
+    pose, carriers
+        (6,) and (c, 6) in {G} [m, rad]. Carriers stay.
+    size
+        How far to search [m].
+    """
+    rng, free = np.random.default_rng(0), robot.dof_mask.astype(bool)
+    unit = np.where(np.arange(6) < 3, 1.0, 1.0 / robot.length) * free
+
+    def holding(poses: np.ndarray) -> np.ndarray:
+        """Return those of some poses at which the condition holds, the nearest first."""
+        places = Places(poses, np.broadcast_to(carriers, (len(poses), *carriers.shape)))
+        there = poses[condition.evaluate(robot, places)]
+        return there[np.argsort(distances(there))]
+
+    def distances(poses: np.ndarray) -> np.ndarray:
+        return np.linalg.norm((poses - pose)[:, free] / unit[free], axis=1)
+
+    directions = rng.normal(size=(SCATTERED, 6)) * unit
+    directions /= np.linalg.norm(directions[:, free] / unit[free], axis=1, keepdims=True)
+    reach = size * np.geomspace(NEAREST, 1.0, SCATTERED)[:, None]
+    best = holding(np.vstack([pose, robot.home, pose + reach * directions]))[:1]
+    if not len(best):
+        return None
+    spread = float(distances(best)[0])
+    for _ in range(ROUNDS):
+        near = best + spread * rng.normal(size=(AROUND, 6)) / np.sqrt(free.sum()) * unit
+        best = holding(np.vstack([best, near]))[:1]
+        best = holding(pose + np.linspace(0.0, 1.0, BETWEEN)[:, None] * (best - pose))[:1]
+        spread *= SHRINK
+    return best[0]
