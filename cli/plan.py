@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
+from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json, print_written
 from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
@@ -106,6 +107,9 @@ def plan(
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
+    check_ending("--out", target, ".nc")
+    if report is not None:
+        check_ending("--report", report, ".html", ".htm")
     if animate is not None:
         from ..figures.animation import check_film
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from ..inputs import one_of
+from ..inputs import check_ending, one_of, shown
 from ..processors import one_thread_each
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
@@ -119,6 +120,7 @@ def simulate(
         target = out if out is not None else Path(f"{plan.stem}-flight{'' if runs is None else 's'}.nc")
         if target.resolve() == plan.resolve():
             raise InputError(f"--out must be another file than the plan, got {target}")
+        check_ending("--out", target, ".nc")
         if animate is not None:
             from ..figures.animation import check_film
 
@@ -136,15 +138,23 @@ def simulate(
             "tolerance": tolerance,
             "seed": seed,
         }
-        if runs is None:
-            film = None if animate is None else (animate, speed, fps)
-            passed = _fly_once(loaded, plan, conditions, target, figures, film, as_json)
-        else:
-            conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
-            conditions |= {"resume": resume is not None}
-            passed = _fly_often(loaded, plan, conditions, target, figures, as_json)
+        try:
+            if runs is None:
+                film = None if animate is None else (animate, speed, fps)
+                passed = _fly_once(loaded, plan, conditions, target, figures, film, as_json)
+            else:
+                conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
+                conditions |= {"resume": resume is not None}
+                passed = _fly_often(loaded, plan, conditions, target, figures, as_json)
+        except InputError as error:
+            raise _of_option(error, fault or []) from None
     if not passed:
         raise typer.Exit(1)
+
+
+def _of_option(error: InputError, faults: list[str]) -> InputError:
+    """Return an error whose message names an option, where it named an item of the argument `faults`."""
+    return InputError(re.sub(r"^faults\[(\d+)\]", lambda item: f"--fault {shown(faults[int(item[1])])}", str(error)))
 
 
 def _fly_once(
