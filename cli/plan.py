@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from ..inputs import check_ending
+from ..inputs import check_ending, shown
 from .options import JsonOption, RobotArgument, print_json, print_written
 from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
@@ -93,7 +93,7 @@ def plan(
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
                 instead = "the task's key robust serves all plans" if name == "--robust" else "--keep saves the plans"
-                raise InputError(f"{name} must be left out with --vary, got {value}; {instead}")
+                raise InputError(f"{name} must be left out with --vary, got {shown(str(value))}; {instead}")
         sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep), out, figures, as_json)
         return
     own = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}

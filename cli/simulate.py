@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..inputs import check_ending, one_of, shown
+from ..inputs import check_ending, one_of, printable, shown
 from ..processors import one_thread_each
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
@@ -115,8 +116,8 @@ def simulate(
         from ..writing import check_writable
 
         loaded = load(robot)
-        if not plan.is_file():
-            raise InputError(f"{plan}: no such file")
+        if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
+            raise InputError(f"{printable(str(plan))}: no such file")
         target = out if out is not None else Path(f"{plan.stem}-flight{'' if runs is None else 's'}.nc")
         if target.resolve() == plan.resolve():
             raise InputError(f"--out must be another file than the plan, got {target}")

@@ -145,7 +145,7 @@ def fly(
         else:
             command = command._replace(answered=np.full(np.shape(command.answered), HOLD, dtype=np.int8))
         # Only shapes are compared in each period, since all checks take longer than a step: NumPy broadcasts silently.
-        shapes = [np.shape(part) for part in command] if isinstance(command, Command) else None
+        shapes = [np.shape(part) for part in command if part is not None] if isinstance(command, Command) else None
         if shapes is None or shapes != expected:
             check_command(command, robot, flights, time)
             expected = shapes
