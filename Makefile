@@ -8,7 +8,7 @@ INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-versi
 # What the extension is built from, where there is a C compiler.
 CORE := setup.py $(wildcard solvers/core/*.[ch])
 
-.PHONY: demo test setup lint types kernels unit docs errata pictures clean
+.PHONY: demo test setup lint types kernels unit docs lowest newest errata pictures clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
@@ -43,6 +43,10 @@ unit: .venv/dev.stamp
 docs: .venv/dev.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
+# A selection of the tests with the oldest versions of the dependencies that pyproject.toml accepts, or with the newest.
+lowest newest:
+	PYTHON=$(PYTHON) .ci/versions $@
+
 # The site's two pages of errata, from the papers computed again.
 errata: .venv/core.stamp
 	for paper in flying ctmrts; do \
@@ -58,6 +62,8 @@ pictures: .venv/core.stamp
 	printf 'name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.6, 0.4, 1.6]}\nduration: 3\n' > build/lift.yaml
 	cd build && ../$(BIN)/towline plan ipanema-1 lift.yaml --vary margin=0:40:5 --vary duration=0.2:1.2:0.1 \
 		--figures ../docs/pictures
+	cd build && ../$(BIN)/towline robots cogiro --figure ../docs/pictures/cogiro.png
+	cd build && ../$(BIN)/towline workspace cogiro --samples 20000 --figure ../docs/pictures/cogiro-workspace.png
 
 clean:
 	rm -rf .venv towline-demo build site *.egg-info solvers/core/*.so

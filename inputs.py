@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 
 __all__ = [
+    "check_ending",
     "file_path",
     "finite_array",
     "flag",
@@ -90,6 +91,13 @@ def file_path(name: str, value: object, accepted: str = "a path") -> Path:
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"{name} must be {accepted}, got {shown(value)}")
     return Path(text)
+
+
+def check_ending(name: str, path: Path, *accepted: str) -> Path:
+    """Return a path, or raise InputError unless its name has one of the `accepted` endings, such as ".nc"."""
+    if path.suffix.lower() not in accepted:
+        raise InputError(f"{name} must end in {' or '.join(accepted)}, got {shown(str(path))}")
+    return path
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:

@@ -83,7 +83,7 @@ def joined(modules: Iterable[Path], entry: str, inlined: Collection[str] = ()) -
     """
     lines: list[str] = []
     for module in modules:
-        for node in ast.parse(module.read_text()).body:
+        for node in ast.parse(module.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef):
                 node.body = [part for part in node.body if not _is_text(part)]
                 mark = "@inlined" if node.name in inlined else "@part"
@@ -132,7 +132,7 @@ def _from_disk(source: str, name: str, signature: str, known: Mapping[str, Any])
             for damaged in [seal, *_machine_code(folder)]:
                 damaged.unlink(missing_ok=True)
             with whole_file(file) as place:
-                place.write_text(source)
+                place.write_text(source, encoding="utf-8")
                 os.utime(place, (_LONG_AGO, _LONG_AGO))
         kernel = _compile(source, name, signature, known, file)
         if not seal.exists():

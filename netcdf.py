@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import gc
 import io
+import sys
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .errors import InputError
+from .inputs import printable
 from .writing import whole_file
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Contents", "Variable", "save_netcdf"]
+__all__ = ["Contents", "Variable", "load_netcdf", "save_netcdf"]
 
 
 class Variable(NamedTuple):
@@ -95,3 +99,27 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
     with whole_file(path) as temporary:
         temporary.write_bytes(content.getvalue())
     return path
+
+
+def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
+    """Load a NetCDF file into memory.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read: `refusal`, and the reason in brackets.
+    """
+    import xarray as xr
+
+    # A damaged file leaves a half-opened one behind, whose closing prints a traceback as soon as it is collected.
+    hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
+    try:
+        try:
+            return xr.load_dataset(path, engine="h5netcdf")
+        except Exception as error:  # it may fail at any place of three libraries
+            # HDF5 has its own message of several lines, where others have a few words.
+            reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
+    raise InputError(f"{refusal} ({reason})")

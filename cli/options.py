@@ -101,6 +101,8 @@ def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.n
     """
     import numpy as np
 
+    from ..inputs import shown
+
     accepted = f"{count} finite number{'s' if count > 1 else ''}" + (
         f" for each of {rows} carriers, separated by ';'" if rows else ""
     )
@@ -108,8 +110,8 @@ def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.n
     try:
         values = [[float(word) for word in part.replace(",", " ").split()] for part in parts]
     except ValueError:
-        raise InputError(f"{option} must be {accepted}, got {text!r}") from None
+        raise InputError(f"{option} must be {accepted}, got {shown(text)}") from None
     fits = all(len(row) == count for row in values) and (rows is None or len(values) == rows)
     if not fits or not np.isfinite(np.array(values)).all():
-        raise InputError(f"{option} must be {accepted}, got {text!r}")
+        raise InputError(f"{option} must be {accepted}, got {shown(text)}")
     return np.array(values) if rows else np.array(values[0])

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from ..inputs import one_of
+from ..inputs import check_ending, one_of, shown
 from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
 from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
@@ -97,7 +97,7 @@ def plan(
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
                 instead = "the task's key robust serves all plans" if name == "--robust" else "--keep saves the plans"
-                raise InputError(f"{name} must be left out with --vary, got {value}; {instead}")
+                raise InputError(f"{name} must be left out with --vary, got {shown(str(value))}; {instead}")
         sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep, form), out, figures, as_json)
         return
     own = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
@@ -111,6 +111,9 @@ def plan(
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
+    check_ending("--out", target, ".nc")
+    if report is not None:
+        check_ending("--report", report, ".html", ".htm")
     if animate is not None:
         from ..figures.animation import check_film
 

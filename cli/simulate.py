@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from ..inputs import one_of
+from ..inputs import check_ending, one_of, printable, shown
 from ..processors import one_thread_each
 from .options import FormatOption, JsonOption, RobotArgument, numbers, print_json, print_written
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
@@ -118,11 +120,12 @@ def simulate(
         from ..writing import check_writable
 
         loaded = load(robot)
-        if not plan.is_file():
-            raise InputError(f"{plan}: no such file")
+        if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
+            raise InputError(f"{printable(str(plan))}: no such file")
         target = out if out is not None else Path(f"{plan.stem}-flight{'' if runs is None else 's'}.nc")
         if target.resolve() == plan.resolve():
             raise InputError(f"--out must be another file than the plan, got {target}")
+        check_ending("--out", target, ".nc")
         if animate is not None:
             from ..figures.animation import check_film
 
@@ -140,15 +143,23 @@ def simulate(
             "tolerance": tolerance,
             "seed": seed,
         }
-        if runs is None:
-            film = None if animate is None else (animate, speed, fps)
-            passed = _fly_once(loaded, plan, conditions, target, (figures, form), film, as_json)
-        else:
-            conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
-            conditions |= {"resume": resume is not None}
-            passed = _fly_often(loaded, plan, conditions, target, (figures, form), as_json)
+        try:
+            if runs is None:
+                film = None if animate is None else (animate, speed, fps)
+                passed = _fly_once(loaded, plan, conditions, target, (figures, form), film, as_json)
+            else:
+                conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
+                conditions |= {"resume": resume is not None}
+                passed = _fly_often(loaded, plan, conditions, target, (figures, form), as_json)
+        except InputError as error:
+            raise _of_option(error, fault or []) from None
     if not passed:
         raise typer.Exit(1)
+
+
+def _of_option(error: InputError, faults: list[str]) -> InputError:
+    """Return an error whose message names an option, where it named an item of the argument `faults`."""
+    return InputError(re.sub(r"^faults\[(\d+)\]", lambda item: f"--fault {shown(faults[int(item[1])])}", str(error)))
 
 
 def _fly_once(

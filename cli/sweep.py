@@ -8,6 +8,7 @@ from pathlib import Path
 import typer
 
 from ..errors import InputError
+from ..inputs import check_ending
 from ..processors import one_thread_each
 from .options import print_json
 from .resuming import checkpoint_of, resumable
@@ -50,6 +51,7 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-sweep.nc")
     if target.suffix == ".csv":
         raise InputError(f"--out must be a NetCDF file, beside which the CSV is written, got {target}")
+    check_ending("--out", target, ".nc")
     picture = None if figures is None else figures / f"sweep.{options.form}"
     if picture is not None:
         check_figure(read_axes(vary))

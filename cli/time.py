@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json, print_written
 
 
@@ -39,7 +40,7 @@ def time(
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-timed.yaml")
-    check_writable(target)
+    check_writable(check_ending("--out", target, ".yaml", ".yml"))
     timing = time_along(loaded, read, grid=grid)
     file = timing.save_task(target, f"{read.name[:54]}-timed") if timing.feasible else None
     if as_json:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..inputs import check_ending
 from .options import JsonOption, print_json, robot_names
 from .stopping import unlisten
 
@@ -42,7 +43,7 @@ def view(
     from ..writing import check_writable
 
     if html is not None:
-        check_writable(html)
+        check_writable(check_ending("--html", html, ".html", ".htm"))
     subject = read(target, robot, other)
     summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})
     if html is not None:

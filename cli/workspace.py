@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
+from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
 from .resuming import checkpoint_of, checkpoint_option, resume_option, scheduler_option
 from .watching import counting
@@ -119,6 +120,9 @@ def workspace(
     required = for_robots(_condition(condition), robust)
     region = _region(box, attitude, carriers, lengths)
     target = out if out is not None else Path(f"{loaded.name}-workspace.nc")
+    check_ending("--out", target, ".nc", ".zarr")
+    if mesh is not None:
+        check_ending("--mesh", mesh, ".stl")
     stored = checkpoint_of(checkpoint, resume)
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh must be of a region in which only positions vary, got {mesh} of another")

@@ -26,6 +26,7 @@ def _plain_number(value: Any) -> Any:
 Finite = Annotated[float, BeforeValidator(_plain_number), Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NonNegative = Annotated[float, BeforeValidator(_plain_number), Field(ge=0, le=LARGEST, allow_inf_nan=False)]
+Whole = Annotated[int, BeforeValidator(_plain_number)]
 Share = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, lt=1, allow_inf_nan=False)]
 Vector3 = tuple[Finite, Finite, Finite]
 Pose = tuple[Finite, Finite, Finite, Finite, Finite, Finite]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..inputs import file_path
+from ..inputs import check_ending, file_path
 from ..netcdf import save_netcdf
 from ..solvers import Certificate
 from ..writing import whole_file
@@ -217,7 +217,7 @@ class Plan:
         """
         from .reports.trajectory import trajectory
 
-        return save_netcdf(trajectory(self), file_path("file", file))
+        return save_netcdf(trajectory(self), check_ending("file", file_path("file", file), ".nc"))
 
     def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
         """Save the figures in `folder`, as wide as a journal's column (88 mm), and return their paths.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control import ANSWERS, Reference
-from ..inputs import file_path
+from ..inputs import check_ending, file_path
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
@@ -247,7 +247,7 @@ class Flight:
         InputError
             If the file cannot be written.
         """
-        return save_netcdf(self._contents(), file_path("file", file))
+        return save_netcdf(self._contents(), check_ending("file", file_path("file", file), ".nc"))
 
     def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
         """Save the figures in `folder`, as wide as a journal's column (88 mm), and return their paths.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control import ANSWERS, Controller
-from ..inputs import file_path
+from ..inputs import check_ending, file_path
 from ..models.parsing import parse_yaml, to_yaml
 from ..models.plant import Plant
 from ..models.robot import Robot
@@ -132,4 +132,4 @@ def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     InputError
         If the file cannot be written.
     """
-    return save_netcdf(Contents.of(dataset), file_path("file", file))
+    return save_netcdf(Contents.of(dataset), check_ending("file", file_path("file", file), ".nc"))

@@ -13,6 +13,7 @@ from ..inputs import file_path, number, real_array, shown
 from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
+from ..netcdf import load_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,8 +75,6 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
 
 
 def _loaded(file: str | os.PathLike[str]) -> xr.Dataset:
-    import xarray as xr
-
     path = file_path("reference", file)
     try:
         there = path.is_file()
@@ -83,12 +82,7 @@ def _loaded(file: str | os.PathLike[str]) -> xr.Dataset:
         there = False
     if not there:
         raise InputError(f"reference must be {ACCEPTED}, got {shown(str(path))}: no such file")
-    try:
-        return xr.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        # HDF5 has its own message of several lines, where others have a few words.
-        reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
-        raise InputError(f"reference must be {ACCEPTED}, got {shown(str(path))} ({reason})") from None
+    return load_netcdf(path, f"reference must be {ACCEPTED}, got {shown(str(path))}")
 
 
 def _still(times: np.ndarray, pose: np.ndarray) -> Motion:

@@ -1,5 +1,6 @@
 """Datasets as NetCDF files: what xarray reads is what xarray would have written."""
 
+import gc
 import subprocess
 import sys
 
@@ -8,7 +9,7 @@ import pytest
 import xarray as xr
 
 from towline.errors import InputError
-from towline.netcdf import Contents, Variable, save_netcdf
+from towline.netcdf import Contents, Variable, load_netcdf, save_netcdf
 
 CONTENTS = Contents(
     {
@@ -63,3 +64,22 @@ print(*sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"xarray", "pandas", "dask", "scipy", "casadi"} & set(done.stdout.split())
+
+
+@pytest.mark.filterwarnings("error")
+def test_damaged_files_are_refused_in_one_line_and_leave_no_traceback(tmp_path, capfd):
+    """Closing a file that h5netcdf could open only half prints a traceback as soon as it is collected."""
+    whole, draw, refusals = save_netcdf(CONTENTS, tmp_path / "whole.nc").read_bytes(), np.random.default_rng(5), []
+    for _ in range(25):
+        content = bytearray(whole[: int(draw.integers(0, 3 * len(whole)))])
+        for at in draw.integers(0, max(len(content), 1), 30 if content else 0):
+            content[at] = draw.integers(256)
+        (tmp_path / "damaged.nc").write_bytes(content)
+        try:
+            load_netcdf(tmp_path / "damaged.nc", "file must be a plan")
+        except InputError as error:
+            refusals.append(str(error))
+    assert len(refusals) > 15
+    assert all(line.startswith("file must be a plan (") and line.isprintable() for line in refusals)
+    gc.collect()
+    assert capfd.readouterr() == ("", "")

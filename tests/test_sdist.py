@@ -102,6 +102,16 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     assert {name for name in files - modules if not core.fullmatch(name)} == data
 
 
+def test_the_description_on_a_package_index_has_no_path_of_the_clone(sdist, wheel):
+    release = f"{PROJECT['project']['urls']['Repository']}/raw/v{PROJECT['project']['version']}"
+    for metadata in (sdist / "PKG-INFO", next(wheel.glob("*.dist-info/METADATA"))):
+        text = metadata.read_text(encoding="utf-8")
+        assert "Description-Content-Type: text/markdown" in text
+        assert f"]({release}/docs/pictures/circle.png)" in text
+        assert not re.search(r'(\]\(|src=")(docs|notebooks|examples)/', text)
+        assert f"Project-URL: Repository, {PROJECT['project']['urls']['Repository']}" in text
+
+
 def test_one_wheel_serves_all_pythons_from_the_oldest(wheel):
     (tag,) = re.findall(r"^Tag: (.*)$", next(wheel.glob("*.dist-info/WHEEL")).read_text(), re.MULTILINE)
     oldest = PROJECT["project"]["requires-python"].removeprefix(">=").replace(".", "")

@@ -85,6 +85,7 @@ PAGES = [
     for file in (
         ROOT / "README.md",
         ROOT / "CHANGELOG.md",
+        ROOT / "CONTRIBUTING.md",
         ROOT / "mkdocs.yml",
         ROOT / "Makefile",
         *(ROOT / "docs").rglob("*.md"),

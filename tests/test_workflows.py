@@ -46,6 +46,22 @@ def test_tests_run_for_every_change_on_all_pythons_of_the_project():
     assert scripts_of("tests", "tests") == "bash .ci/run"
 
 
+def test_a_selection_runs_on_the_other_platforms_and_with_other_versions_of_the_dependencies():
+    platforms, versions = (TESTS["jobs"][job]["strategy"]["matrix"] for job in ("platforms", "versions"))
+    assert platforms["python"] == TESTS["jobs"]["tests"]["strategy"]["matrix"]["python"]
+    assert {runner.partition("-")[0] for runner in platforms["runner"]} == {"macos", "windows"}
+    oldest, newest = platforms["python"][0], platforms["python"][-1]
+    assert versions["include"] == [
+        {"versions": "lowest", "python": oldest},
+        {"versions": "newest", "python": newest},
+    ]
+    assert scripts_of("tests", "versions") == "bash .ci/versions ${{ matrix.versions }}"
+
+
+def test_a_release_has_the_addresses_of_its_repository():
+    assert '["urls"]["Repository"]' in scripts_of("release", "sdist")
+
+
 def test_the_oldest_python_builds_the_wheel_and_all_test_it():
     pythons = TESTS["jobs"]["tests"]["strategy"]["matrix"]["python"]
     assert WHEELS["build"] == [f"cp{python.replace('.', '')}-*" for python in pythons]
@@ -123,6 +139,8 @@ def test_the_files_that_they_name_exist():
     changed = RELEASE["on"]["pull_request"]["paths"]
     tested = [word.removeprefix("{project}/") for line in WHEELS["test-command"] for word in shlex.split(line)]
     tested += scripts_of("release", "sdist").split()
+    tested += scripts_of("tests", "platforms").split()
+    tested += (ROOT / ".ci" / "versions").read_text().split()
     tested = [word for word in tested if word.startswith("tests/")]
     assert len(tested) > 4
     for pattern in [*changed, *tested]:

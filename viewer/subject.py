@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..inputs import printable
 from ..models import Robot, available, load
+from ..netcdf import load_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,15 +139,14 @@ def _open(path: Path) -> xr.Dataset:
         raise InputError(f"{printable(str(path))} does not exist; it must be {ACCEPTED}")
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path} must be {ACCEPTED}, got a folder")
+    refusal = f"{printable(str(path))} must be {ACCEPTED}, got a file that cannot be read"
+    if path.suffix != ".zarr":
+        return load_netcdf(path, refusal)
     try:
-        if path.suffix == ".zarr":
-            return xr.open_zarr(path).load()
-        return xr.load_dataset(path, engine="h5netcdf")
+        return xr.open_zarr(path).load()
     except ImportError:
         raise InputError(
             f"zarr is not installed; install the extra cluster to read {path}: pip install 'towline[cluster]'"
         ) from None
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        # HDF5 has its own message of several lines, where others have a few words.
-        reason = (getattr(error, "strerror", None) or str(error) or "empty").splitlines()[0]
-        raise InputError(f"{path} must be {ACCEPTED}, got a file that cannot be read ({printable(reason)})") from None
+    except Exception as error:  # a damaged folder may fail at any place of two libraries
+        raise InputError(f"{refusal} ({printable((str(error) or 'empty').splitlines()[0])})") from None

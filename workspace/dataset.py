@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs import file_path, required
+from ..inputs import check_ending, file_path, required
 from ..netcdf import Contents, save_netcdf
 from ..writing import whole_folder
 from .counts import Counts
@@ -70,7 +70,7 @@ def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     if path.suffix == ".zarr":
         return _save_zarr(lasting, path)
     compressed = [str(name) for name, variable in lasting.data_vars.items() if variable.size > CHUNK]
-    return save_netcdf(Contents.of(lasting), path, compressed)
+    return save_netcdf(Contents.of(lasting), check_ending("file", path, ".nc", ".zarr"), compressed)
 
 
 def _save_zarr(result: xr.Dataset, path: Path) -> Path:

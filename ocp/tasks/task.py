@@ -12,7 +12,7 @@ from typing_extensions import override
 from ...errors import InputError
 from ...inputs import file_path
 from ...models.parsing import read_yaml, validate
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3, Whole
 from ...models.ranges import PositiveRange
 from .initial import Final, Initial
 from .paths import AnyPath
@@ -174,7 +174,7 @@ class Task(Part):
         "forces; [0, 0, 0] is still air, with drag on a moving platform",
     )
     limits: TaskLimits = TaskLimits()
-    steps: int = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
+    steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
     scheme: SchemeName = Field(
         default="linear",
         description="acceleration within an interval: constant; linear; hermite and gauss: quadratic, with more points "

@@ -1,0 +1,71 @@
+"""Wrong values that once passed in silence: endings of files, numbers as text, poses that are none, options by name."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from towline import InputError, load, plan, read_task
+from towline.cli.main import app
+from towline.workspace import Places
+
+REST = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.3}
+FILE = "name: rest\npath: {kind: rest, pose: [0, 0, -1]}\nduration: 0.3\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rest.yaml").write_text(FILE)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("plan wang-flying rest.yaml --out x.txt", "--out must end in .nc, got 'x.txt'"),
+        ("plan wang-flying rest.yaml --out x", "--out must end in .nc, got 'x'"),
+        ("plan wang-flying rest.yaml --report x.txt", "--report must end in .html or .htm, got 'x.txt'"),
+        ("plan wang-flying rest.yaml --vary margin=0:1:1 --out x.txt", "--out must end in .nc, got 'x.txt'"),
+        ("simulate wang-flying rest.yaml --out x.txt", "--out must end in .nc, got 'x.txt'"),
+        ("time wang-flying rest.yaml --out x.txt", "--out must end in .yaml or .yml, got 'x.txt'"),
+        ("workspace wang-flying --out x.txt", "--out must end in .nc or .zarr, got 'x.txt'"),
+        ("workspace wang-flying --mesh x.txt", "--mesh must end in .stl, got 'x.txt'"),
+        ("view wang-flying --html x.txt", "--html must end in .html or .htm, got 'x.txt'"),
+    ],
+)
+def test_a_file_is_what_its_name_ends_in(folder, command, message):
+    done = CliRunner().invoke(app, command.split())
+    assert isinstance(done.exception, InputError)
+    assert str(done.exception) == message
+    assert [path.name for path in folder.iterdir()] == ["rest.yaml"]
+
+
+def test_results_are_saved_under_names_that_end_in_nc(folder):
+    result = plan("wang-flying", REST)
+    with pytest.raises(InputError, match=r"^file must end in \.nc, got 'x\.txt'$"):
+        result.save("x.txt")
+    assert result.save("x.NC").exists()
+
+
+@pytest.mark.parametrize("steps", ["10", True, 10.5, [10], np.array([10, 20])])
+def test_steps_are_a_whole_number_and_no_text(steps):
+    with pytest.raises(InputError, match="steps") as error:
+        read_task(REST | {"steps": steps})
+    assert str(error.value).isprintable()
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_places_are_finite(wrong):
+    robot = load("wang-flying")
+    poses = np.tile(robot.home, (3, 1))
+    poses[1, 2] = wrong
+    with pytest.raises(InputError, match=rf"^pose must have finite numbers, got \[.*{wrong}.*\] in row 1$"):
+        Places.at_home(robot, poses)
+
+
+@pytest.mark.parametrize("fault", ["cut 9 at 0.1", "cut 1", "cut 1 at 7"])
+def test_a_wrong_fault_is_named_as_the_option_with_its_text(folder, fault):
+    plan("wang-flying", REST).save("rest.nc")
+    done = CliRunner().invoke(app, ["simulate", "wang-flying", "rest.nc", "--fault", "cut 2 at 0.1", "--fault", fault])
+    assert isinstance(done.exception, InputError)
+    assert str(done.exception).startswith(f"--fault {fault!r} must ")
