@@ -26,7 +26,7 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
     times
         Of the samples, (N,) [s]; default: they are counted.
     """
-    canvas = style.figure(6.2, 5.0)
+    canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"
     top, bottom = style.panels_below(canvas, along, ("residual, file [mm]", "calibrated [mm]"))
     at = np.arange(len(before)) if times is None else times
@@ -36,15 +36,17 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
             ax.plot(
                 at[::step],
                 1e3 * values[::step, cable],
-                ".",
-                markersize=2.5,
+                linestyle="none",
+                marker=style.marker(cable),
+                markersize=2.0,
+                markeredgewidth=0.0,
                 color=style.colour(cable),
                 label=f"cable {cable + 1}",
                 rasterized=True,
             )
         rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
-        ax.set_title(f"root mean square {rms:.3g} mm", fontsize=9, loc="left")
-    style.legend_below(canvas, top)
+        style.heading(ax, f"root mean square {rms:.3g} mm")
+    style.legend_below(canvas, top, scale=2.0)
     return canvas
 
 
@@ -64,9 +66,9 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
     """
     from matplotlib.patches import Ellipse
 
-    columns = min(len(file), 4)
+    columns = 2 if len(file) <= 4 else 3
     rows = -(-len(file) // columns)
-    canvas = style.figure(0.9 + 1.7 * columns, 0.9 + 1.7 * rows)
+    canvas = style.figure(height=0.9 + (3.0 / columns + 0.15) * rows)
     moved = 1e3 * (found - file)
     spans = 1e3 * WITHIN_95 * np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
     reach = 1.15 * max(float((np.abs(moved) + spans).max()), 1e-3)
@@ -80,17 +82,19 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
             sizes = 2e3 * WITHIN_95 * np.sqrt(np.maximum(values, 0.0))
             angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
             shade, centre = style.colour(index), (float(place[0]), float(place[up]))
-            label = f"calibrated, {'xyz'[up]} over x, 95 % ellipse"
-            ax.plot(*centre, ".", color=shade, markersize=4, label=label)
+            label = f"calibrated, {'xyz'[up]} against x, 95 % ellipse"
+            ax.plot(*centre, style.marker(index), color=shade, markersize=2.5, label=label)
             ax.add_patch(Ellipse(centre, sizes[1], sizes[0], angle=angle, facecolor=shade, alpha=0.35))
             if true is not None:
                 there = 1e3 * (true - file)[cable]
-                ax.plot(there[0], there[up], "x", color=shade, markersize=5, label=f"true, {'xyz'[up]} against x")
+                ax.plot(
+                    there[0], there[up], "x1"[index], color=shade, markersize=5, label=f"true, {'xyz'[up]} against x"
+                )
         ax.plot(0, 0, "+", color="#000000", markersize=7, label="file")
         ax.set_xlim(-reach, reach)
         ax.set_ylim(-reach, reach)
         ax.set_aspect("equal", adjustable="box")
-        ax.set_title(f"anchor {cable + 1}", fontsize=8)
+        ax.set_title(f"anchor {cable + 1}", fontsize=style.NOTE)
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(style.few_ticks())
     style.legend_below(canvas, canvas.axes[0])
@@ -107,7 +111,7 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
     """
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    canvas = style.figure(6.4, 4.0)
+    canvas = style.figure(height=3.0)
     ax = style.axes(canvas, "cable", "standard deviation [mm]")
     every = np.concatenate([np.asarray(values, dtype=float) for values in sigmas.values()])
     finite = 1e3 * every[np.isfinite(every) & (every > 0)]
@@ -117,10 +121,10 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
     for index, ((kind, values), shift) in enumerate(zip(sigmas.items(), shifts, strict=True)):
         at = np.arange(1, len(values) + 1) + shift
         known = np.isfinite(values)
-        style_of: dict[str, Any] = {"color": style.colour(index), "linestyle": "none", "marker": "os^vDP*X"[index % 8]}
-        ax.plot(at[known], 1e3 * values[known], markersize=5, label=kind, **style_of)
+        style_of: dict[str, Any] = {"color": style.colour(index), "linestyle": "none", "marker": style.marker(index)}
+        ax.plot(at[known], 1e3 * values[known], markersize=4, label=kind, **style_of)
         ax.plot(
-            at[np.isinf(values)], np.full(np.isinf(values).sum(), beyond), markersize=5, fillstyle="none", **style_of
+            at[np.isinf(values)], np.full(np.isinf(values).sum(), beyond), markersize=4, fillstyle="none", **style_of
         )
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#882255"]
 # On and off, in widths of the line: eight, one for each colour, so that curves differ where there is no colour.
 DASHES = ((), (5, 1.6), (1.2, 1.2), (6, 1.4, 1.2, 1.4), (10, 2), (2.6, 1.2), (6, 1.2, 1.2, 1.2, 1.2, 1.2), (1.2, 2.6))
+MARKERS = "os^vDP*X"
 LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 0.8}
 COLUMN = 88 / 25.4  # width of a journal's column [inches]
 TEXT, NOTE = 8.0, 7.0  # sizes of letters [points]: labels of axes; numbers, legends, titles and notes
@@ -52,6 +53,11 @@ def look(index: int) -> dict[str, Any]:
         "linestyle": line_style(index),
         "linewidth": 1.2 if line_style(index) != "-" else 1.8,
     }
+
+
+def marker(index: int) -> str:
+    """Return the marker of the index-th series of points: eight, one for each colour."""
+    return MARKERS[index % len(MARKERS)]
 
 
 def typeset(unit: str) -> str:
@@ -167,8 +173,11 @@ def far_limit(ax: Axes, text: str) -> None:
     ax.plot([], [], **LIMIT, label=text)
 
 
-def legend_below(canvas: Figure, *panels: Axes) -> None:
-    """Draw one legend for all panels at the bottom, in rows of equal length that fit the width of the figure."""
+def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> None:
+    """Draw one legend for all panels at the bottom, in rows of equal length that fit the width of the figure.
+
+    Its markers are `scale` times those of the curves.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     shown = {}
@@ -188,6 +197,7 @@ def legend_below(canvas: Figure, *panels: Axes) -> None:
             loc="outside lower center",
             frameon=False,
             handlelength=2.6,
+            markerscale=scale,
             columnspacing=1.2,
             borderpad=0.2,
         )

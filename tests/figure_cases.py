@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from towline import load
-from towline.figures import flight, limits, plan, robot, sweep, workspace
+from towline.figures import calibration, flight, limits, plan, robot, sweep, workspace
 from towline.figures.animation import Scene
 from towline.figures.convergence import convergence
 from towline.figures.curve_in_space import curve_in_space
@@ -189,6 +189,29 @@ def limited() -> list[limits.Limited]:
     ]
 
 
+def residuals(cables: int, times: np.ndarray | None = None) -> Figure:
+    """Draw residuals of a robot whose anchors are 20 mm off, and 1 mm of noise."""
+    draws = np.random.default_rng(1).normal(size=(2, 400, cables)) * 1e-3
+    return calibration.residuals(0.02 * np.sin(np.arange(cables)) + draws[0], draws[1], times)
+
+
+def corrected(cables: int, known: bool) -> Figure:
+    """Draw anchors that are some 20 mm off the file's, with ellipsoids of 2 mm."""
+    rng = np.random.default_rng(2)
+    file, shift, roots = rng.normal(size=(cables, 3)), rng.normal(size=(2, cables, 3)), rng.normal(size=(cables, 3, 3))
+    covariances = 4e-6 * roots @ roots.swapaxes(1, 2)
+    true = file + 0.02 * shift[0]
+    return calibration.anchors(file, true + 0.002 * shift[1], covariances, true if known else None)
+
+
+def deviations(cables: int, opened: bool) -> Figure:
+    """Draw standard deviations of anchors, attachments, offsets and pulleys, of which some may be open."""
+    kinds = [f"{place} {axis}" for place in ("anchor", "attachment") for axis in "xyz"] + ["offset", "pulley radius"]
+    sigmas = 10 ** np.random.default_rng(3).uniform(-4, -2, (len(kinds), cables))
+    sigmas[0, 1:3] = np.inf if opened else 1e-3
+    return calibration.observability(dict(zip(kinds, sigmas, strict=True)))
+
+
 def _curves() -> Figure:
     panels = [
         Panel("tension [N]", {f"cable {k}": 3 + np.sin(ROUND + k // 2) for k in range(8)}, bounds={"t_min": 1.0}),
@@ -226,6 +249,13 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "flight-tensions": lambda: flight.tensions(flown()),
     "flight-tensions-8": lambda: flight.tensions(flown(cables=8, wind=False)),
     "errors": lambda: flight.errors(flights()),
+    "residuals": lambda: residuals(8, np.arange(400) / 100),
+    "residuals-3": lambda: residuals(3),
+    "anchors-3": lambda: corrected(3, known=True),
+    "anchors-8": lambda: corrected(8, known=False),
+    "anchors-12": lambda: corrected(12, known=True),
+    "observability": lambda: deviations(8, opened=False),
+    "observability-open": lambda: deviations(12, opened=True),
     "curves": _curves,
     "curve-in-space": lambda: curve_in_space({"platform": _ball(30, 1.0), "quadrotor": _ball(30, 2.0)}),
     "from-above": lambda: from_above({"as printed": (2 * SQUARE, SQUARE), "as computed": (2 * SQUARE, -SQUARE)}),
