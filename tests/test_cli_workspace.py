@@ -126,7 +126,7 @@ def test_checkpoint_then_resume(folder):
         (("--checkpoint", "mass.yaml"), "got mass.yaml, which exists"),
         (("--resume", "mass.yaml"), "got mass.yaml, which is no checkpoint of towline"),
         (("--resume", "a", "--checkpoint", "b"), "--checkpoint must not be given with --resume"),
-        (("--resume", "a", "--out", "a"), "--out must be another file than the checkpoint"),
+        (("--resume", "a.nc", "--out", "a.nc"), "--out must be another file than the checkpoint"),
         (("--out", "a.nc", "--figure", "a.nc"), "--figure must be another file than --out"),
         (("--samples", "1e300"), "got 1e+300"),
         (("--condition", '{"kind": ["margin"]}'), "got ['margin']"),

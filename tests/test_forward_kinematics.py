@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -166,6 +166,7 @@ def test_numpy_and_machine_code_agree():
     np.testing.assert_allclose(*results, atol=1e-12)
 
 
+@settings(deadline=None)
 @given(st.floats(-50, 50), st.floats(1e-6, 1e6))
 def test_angles_of_the_kernel_are_those_of_numpy(turn, size):
     cosine, sine = cosine_and_sine(np.float64(turn))
@@ -175,6 +176,7 @@ def test_angles_of_the_kernel_are_those_of_numpy(turn, size):
     assert angle(y, x) == pytest.approx(np.arctan2(y, x), abs=1e-15)
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_a_pose_nearby_comes_back(shift):
     robot = load("cogiro")

@@ -19,7 +19,9 @@ base: {kind: free}
 tube: {position: free, attitude: free}
 objective: {time: 1}
 """
+# Python turns an interrupt while a compiled module is imported into an ImportError: SciPy's are imported first.
 SCRIPT = """\
+import scipy.interpolate
 from towline.models import load
 from towline.ocp import plan
 

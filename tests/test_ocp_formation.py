@@ -102,9 +102,9 @@ def test_quadrotors_are_guessed_to_tilt_as_their_cables_pull():
 def test_a_time_limit_ends_a_search():
     robot = load("multi-quadrotor-4")
     for limit in (0.5, 4.0):
-        before = time.perf_counter()
+        before = time.process_time()  # not the time on a clock, most of which other programs may have
         found = plan(robot, there_and_back(steps=100, time_limit=limit))
-        took = time.perf_counter() - before
+        took = time.process_time() - before
         assert found.status == "not-found"
         assert took < limit + 6.0  # the step that was under way, on a slow machine
         assert found.message == "time limit"

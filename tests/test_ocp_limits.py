@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -23,6 +23,7 @@ def along(start, end):
     return start + SHARES[:, None] * (end - start)
 
 
+@settings(deadline=None)
 @given(ends=points)
 def test_cables_are_as_far_apart_as_their_points(ends):
     p, p_end, q, q_end = ends
@@ -36,6 +37,7 @@ def test_cables_are_as_far_apart_as_their_points(ends):
     assert told >= apart - max(lengths) / 200 - 1e-4
 
 
+@settings(deadline=None)
 @given(ends=points)
 def test_obstacles_are_as_far_as_their_points_say(ends):
     p, p_end, centre, corner = ends
@@ -64,6 +66,7 @@ def test_obstacles_are_as_far_as_their_points_say(ends):
         assert deepest - step <= told <= truth + 2e-6
 
 
+@settings(deadline=None)
 @given(ends=points)
 def test_a_program_can_follow_the_distance_of_a_cable_from_a_box(ends):
     """Its derivatives are those of differences, though a search finds where the cable is nearest."""

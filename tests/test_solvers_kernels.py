@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from towline import tolerances
@@ -57,6 +57,7 @@ numbers = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1e-6)
 many = st.lists(numbers, min_size=16, max_size=16).map(np.array)
 
 
+@settings(deadline=None)
 @given(x=many, y=many, a=numbers)
 def test_vectors_compute_as_numpy_does(arithmetic, x, y, a):
     result = np.empty(12 * 16)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from towline import InputError, load, plan, read_task
+from towline import InputError, plan, read_task
 from towline.cli.main import app
-from towline.workspace import Places
 
 REST = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.3}
 FILE = "name: rest\npath: {kind: rest, pose: [0, 0, -1]}\nduration: 0.3\n"
@@ -52,15 +51,6 @@ def test_steps_are_a_whole_number_and_no_text(steps):
     with pytest.raises(InputError, match="steps") as error:
         read_task(REST | {"steps": steps})
     assert str(error.value).isprintable()
-
-
-@pytest.mark.parametrize("wrong", [np.nan, np.inf])
-def test_places_are_finite(wrong):
-    robot = load("wang-flying")
-    poses = np.tile(robot.home, (3, 1))
-    poses[1, 2] = wrong
-    with pytest.raises(InputError, match=rf"^pose must have finite numbers, got \[.*{wrong}.*\] in row 1$"):
-        Places.at_home(robot, poses)
 
 
 @pytest.mark.parametrize("fault", ["cut 9 at 0.1", "cut 1", "cut 1 at 7"])

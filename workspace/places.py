@@ -33,18 +33,17 @@ class Places:
     def at_home(cls, robot: Robot, pose: ArrayLike) -> Places:
         """Return the places of poses (n, 6) or (6,) in {G} [m, rad] with every carrier at home.
 
+        A pose with a number that is not finite is a place where no condition holds.
+
         Raises
         ------
         InputError
-            If an argument has a wrong type or shape, or a number is not finite.
+            If an argument has a wrong type or shape.
         """
         home = required("robot", robot, Robot).carrier_home
         poses = np.atleast_2d(real_array("pose", pose).astype(float, copy=False))
         if poses.ndim != 2 or poses.shape[1] != 6:
             raise InputError(f"pose must have the shape (n, 6), got {np.shape(pose)}")
-        if not np.isfinite(poses).all():
-            row = int(np.argmin(np.isfinite(poses).all(axis=1)))
-            raise InputError(f"pose must have finite numbers, got {shown(poses[row].tolist())} in row {row}")
         return cls(poses, np.broadcast_to(home, (len(poses), *home.shape)))
 
     def __len__(self) -> int:
