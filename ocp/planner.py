@@ -33,6 +33,7 @@ from .durations import Durations, durations
 from .global_path.space import Space
 from .global_path.start import motion_past
 from .homotopy import from_easier
+from .nlp.interrupts import heeding
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
 from .refinement import refine
@@ -114,7 +115,8 @@ def plan(
     if initial is not None:
         scenario = lay_out(as_robot(robot), read.model_copy(update={"initial": None}))
         read = read.model_copy(update={"initial": initial_of(scenario, initial)})
-    return Planner(robot, read).plan(progress, start)
+    with heeding():
+        return Planner(robot, read).plan(progress, start)
 
 
 class Planner:
@@ -170,12 +172,13 @@ class Planner:
         """
         check_progress(progress)
         self._search = search = Search(self.scenario, self._solvers, progress)
-        guess = None if start is None else deviation_from(self.scenario, start)
-        plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))
-        if plan.feasible and plan.deviation is not None and search.mesh is not None:
-            self._last = search.mesh, plan.deviation
-        if self._share is not None:
-            plan = for_robots(plan, self._share, partial(self._plan_again, search))
+        with heeding():
+            guess = None if start is None else deviation_from(self.scenario, start)
+            plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))
+            if plan.feasible and plan.deviation is not None and search.mesh is not None:
+                self._last = search.mesh, plan.deviation
+            if self._share is not None:
+                plan = for_robots(plan, self._share, partial(self._plan_again, search))
         self._search = None
         self._flown = plan if plan.feasible else None
         return plan
@@ -227,8 +230,9 @@ class Planner:
             raise InputError("replan must be called after a plan that is feasible, got none")
         if isinstance(self._flown, Plan):
             self._flown = Replanner(self._flown, partial(_climb, last=None))
-        self._search, guess = self._flown.search(state, time, settle, progress)
-        plan = self._flown.plan(self._search, guess, time)
+        with heeding():
+            self._search, guess = self._flown.search(state, time, settle, progress)
+            plan = self._flown.plan(self._search, guess, time)
         self._search = None
         return plan
 

@@ -13,6 +13,7 @@ from ..text import quantity
 from .audits.audit import Audit, audit
 from .nlp.grid import Grid
 from .nlp.guess import initial_guess, usual_guess
+from .nlp.interrupts import raise_if_swallowed
 from .nlp.linear import LinearDistances
 from .nlp.near import Near, has_places
 from .nlp.program import Program, build
@@ -88,6 +89,7 @@ class Search:
     @contextmanager
     def stage(self, name: str) -> Iterator[RunningStage]:
         """Record what happens inside as a stage."""
+        raise_if_swallowed()
         start, running = time.perf_counter(), RunningStage()
         yield running
         self.stages.append(Stage(name, running.message, time.perf_counter() - start))

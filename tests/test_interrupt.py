@@ -1,5 +1,6 @@
 """Ctrl-C as a user sends it: a real signal from outside, to Python's `plan` and to the command, at any moment."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -7,7 +8,11 @@ import sys
 import time
 from pathlib import Path
 
+import casadi as ca
 import pytest
+
+from towline.ocp.nlp.interrupts import heeding
+from towline.ocp.nlp.waiting import wait_for
 
 TOWLINE = Path(sys.executable).with_name("towline")
 PROMPT = 1.0  # [s]
@@ -19,9 +24,7 @@ base: {kind: free}
 tube: {position: free, attitude: free}
 objective: {time: 1}
 """
-# Python turns an interrupt while a compiled module is imported into an ImportError: SciPy's are imported first.
 SCRIPT = """\
-import scipy.interpolate
 from towline.models import load
 from towline.ocp import plan
 
@@ -70,6 +73,43 @@ def test_an_interrupt_from_outside_ends_plan(folder, moment):
     # What still computed ends. If the interrupt hit the making of a dataclass, Python still dies of it in the end.
     assert process.wait(60) in (0, -signal.SIGINT)
     assert process.stderr.read() == ""
+
+
+class Operand:
+    """An operand of CasADi during whose conversion Ctrl-C is pressed."""
+
+    @property
+    def shape(self):
+        signal.raise_signal(signal.SIGINT)
+        return ()
+
+
+def multiplied():
+    """Multiply it; CasADi takes the interrupt as a wrong type, whatever other kind of number it then tries."""
+    with contextlib.suppress(NotImplementedError, TypeError):
+        _ = ca.SX(1) * Operand()
+
+
+def interrupted(then):
+    """Multiply with attention to interrupts, and go on."""
+    with heeding():
+        multiplied()
+        if then == "a wait":
+            wait_for(lambda: pytest.fail("it went on"))
+        if then == "another error":
+            raise ImportError("initialization failed")
+
+
+@pytest.mark.parametrize("then", ["the end", "a wait", "another error"])
+def test_an_interrupt_that_casadi_swallows_is_raised_again(then, request):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    multiplied()  # no KeyboardInterrupt: if this fails, CasADi no longer swallows it, and `heeding` can go
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(then)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with heeding():
+        wait_for(lambda: None)  # the interrupt is over
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5, 4.0, 7.0])

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias, TypeVar
 
+from .interrupts import raise_if_swallowed
+
 __all__ = ["Errands", "wait_for"]
 
 POLL = 0.1  # [s]: on Windows an interrupt is raised only between two checks
@@ -34,6 +36,7 @@ def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Resu
     KeyboardInterrupt
         If an interrupt arrives meanwhile. Exceptions of `work` or of an errand are raised as well.
     """
+    raise_if_swallowed()
     queue: Errands = SimpleQueue() if errands is None else errands
     results: list[Result] = []
     failures: list[BaseException] = []

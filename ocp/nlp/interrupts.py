@@ -1,0 +1,67 @@
+"""Raise Ctrl-C again where it was swallowed: `heeding` around the work, `raise_if_swallowed` within it.
+
+CasADi calls Python while it converts the operands of an expression, and takes any exception there, an interrupt too, as
+"not of this type". To make a robot's expressions takes up to a second, and planning would go on as if nothing had
+happened.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+__all__ = ["heeding", "raise_if_swallowed"]
+
+_arrived = threading.Event()
+
+
+@contextmanager
+def heeding() -> Iterator[None]:
+    """Remember an interrupt that arrives within, and raise it at the latest at the end.
+
+    Where the program has a handler of its own, or in another thread than the main one, nothing changes.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If one was swallowed.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    _arrived.clear()
+    signal.signal(signal.SIGINT, _remember)
+    try:
+        yield
+    except KeyboardInterrupt:
+        _arrived.clear()
+        raise
+    except Exception:  # what an interrupt became, such as the failed import of a compiled module
+        raise_if_swallowed()
+        raise
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    raise_if_swallowed()
+
+
+def raise_if_swallowed() -> None:
+    """Raise the interrupt that arrived, if any.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If one arrived that nobody raised since.
+    """
+    if _arrived.is_set():
+        _arrived.clear()
+        raise KeyboardInterrupt
+
+
+def _remember(signum: int, frame: FrameType | None) -> NoReturn:
+    _arrived.set()
+    raise KeyboardInterrupt
