@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+FLATTEST = 1e-3  # height of a panel over its largest value: below, curves that are constant would show rounding
+
+
 class Panel(NamedTuple):
     """A panel with curves.
 
@@ -74,5 +77,10 @@ def curves(
         for (text, place), dashes in zip((marks or {}).items(), cycle((":", "-.")), strict=False):
             ax.axvline(place, color="#666666", linestyle=dashes, linewidth=1.2, label=text)
         ax.margins(x=0.01)
+        if not panel.logarithmic:
+            low, high = ax.get_ylim()
+            missing = FLATTEST * max(abs(low), abs(high)) - (high - low)
+            if missing > 0:
+                ax.set_ylim(low - missing / 2, high + missing / 2)
     style.legend_below(canvas, *canvas.axes)
     return canvas

@@ -18,7 +18,8 @@ __all__ = ["ABOVE", "FRONT", "SIDE", "View", "views_of"]
 
 AIR = 0.05  # of an extent, beyond its ends
 FLAT = 0.22  # of the largest extent: thinner objects have panels so thick
-BESIDE, BETWEEN, ROW = 0.55, 0.45, 0.5  # inches: labels left of panels, between two, and below and above one
+BESIDE, BETWEEN, ROW = 0.55, 0.45, 0.55  # inches: labels left of panels, between two, and below and above one
+APART = 0.25  # inches from tick to tick, at least
 TALLEST = 4.6  # inches, of the panels together: higher objects are drawn smaller
 
 
@@ -74,8 +75,8 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
         ax.set_xlim(*(middle[view.across] + np.array([-0.5, 0.5]) * extent[view.across]))
         ax.set_ylim(*(middle[view.up] + np.array([-0.5, 0.5]) * extent[view.up]))
         ax.tick_params(labelbottom=lowest, labelleft=not column)
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_locator(style.few_ticks())
+        for axis, k in ((ax.xaxis, view.across), (ax.yaxis, view.up)):
+            axis.set_major_locator(style.few_ticks(int(np.clip(scale * extent[k] / APART, 2, 4))))
         panels.append(ax)
     return canvas, panels
 

@@ -61,8 +61,8 @@ def marker(index: int) -> str:
 
 
 def typeset(unit: str) -> str:
-    """Return a unit, or text with units, with its powers raised: m/s^2 becomes m/s²."""
-    return unit.replace("^2", "²").replace("^3", "³")
+    """Return a unit, or text with units, as it is printed: m/s^2 becomes m/s², and [um] becomes [µm]."""
+    return unit.replace("^2", "²").replace("^3", "³").replace("[um]", "[µm]")
 
 
 def figure(width: float = COLUMN, height: float = 2.5) -> Figure:
@@ -98,8 +98,9 @@ def heading(ax: Axes, text: str, share: float = 1.0) -> None:
     """Write a title above axes that have a `share` of a column's width, on the left, in lines that fit."""
     from textwrap import fill
 
-    points = 72.0 * COLUMN * share - BESIDE
-    ax.set_title(fill(text, max(int(points / LETTER), 10), break_long_words=False), fontsize=NOTE, loc="left")
+    letters = max(int((72.0 * COLUMN * share - BESIDE) / LETTER), 10)
+    lines = [fill(line, letters, break_long_words=False) for line in text.splitlines()]
+    ax.set_title("\n".join(lines), fontsize=NOTE, loc="left")
 
 
 def panels_below(
@@ -144,11 +145,11 @@ def equal_scales(ax: Any, points: np.ndarray, zoom: float = 0.85) -> None:
     ax.set_box_aspect((1, 1, 1), zoom=zoom)
 
 
-def few_ticks() -> MaxNLocator:
-    """Set few enough tick marks that a small 3-D axis stays legible."""
+def few_ticks(most: int = 4) -> MaxNLocator:
+    """Set few enough tick marks that a small axis stays legible."""
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(4, prune="both")
+    return MaxNLocator(most, prune="both")
 
 
 def limit_line(ax: Axes, value: float, text: str, place: float = 1.0, above: bool = True) -> None:

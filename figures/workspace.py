@@ -33,7 +33,7 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
     for ax, view in zip(panels, VIEWS, strict=True):
         axes = [view.across, view.up]
         _panel(ax, {label: some[:, axes] for label, some in points.items()}, None if marks is None else marks[:, axes])
-    style.legend_below(canvas, panels[0])
+    style.legend_below(canvas, panels[0], scale=2.0)
     return canvas
 
 

@@ -15,6 +15,7 @@ from towline.studies.flying import procedure as steps_of_f
 from towline.studies.flying import radius as largest
 from towline.studies.towing import equations, loop, ranges, tensions
 
+from .legible import check_grey, check_size, check_texts, renderer_of
 from .numbered import IN_THE_TEXT, NUMBERED, STEPS, TEXTS, numbers_of, unnamed
 
 RING = np.radians(60 * np.arange(6))
@@ -24,25 +25,35 @@ MASS, GRAVITY, RATE = 1.2, 9.81, 0.2 * np.pi
 
 
 def claims_of(*chapters):
-    return {claim.id: claim for chapter in chapters for claim in chapter.chapter().claims}
+    return {claim.id: claim for chapter in chapters for claim in chapter.claims}
 
 
 # --- what is numbered
 
 
 @pytest.fixture(scope="module")
-def flying():
-    return claims_of(structure, element, balance, steps_of_f)
+def chapters_of_f():
+    return [study.chapter() for study in (structure, element, balance, steps_of_f)]
 
 
 @pytest.fixture(scope="module")
-def towing():
+def flying(chapters_of_f):
+    return claims_of(*chapters_of_f)
+
+
+@pytest.fixture(scope="module")
+def chapters_of_c():
     """Paper C's claims, with fewer loops in its workspaces: which claims there are does not depend on their number."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ranges, "loops", lambda drive, full=ranges.loops: full(drive, count=4000))
         patch.setattr(ranges, "SECTIONS", [0.5, 0.6, 0.7])  # where few loops reach
         patch.setattr(ranges, "volume_of", lambda drive, samples, full=ranges.volume_of: full(drive, 200, 16))
-        return claims_of(equations, tensions, loop, ranges)
+        return [study.chapter() for study in (equations, tensions, loop, ranges)]
+
+
+@pytest.fixture(scope="module")
+def towing(chapters_of_c):
+    return claims_of(*chapters_of_c)
 
 
 def test_a_place_names_numbers_one_by_one():
@@ -65,6 +76,18 @@ def test_the_numbers_are_those_of_the_papers(paper):
     text = TEXTS[paper].read_text()
     for kind, pattern in {**IN_THE_TEXT, "step": STEPS[paper]}.items():
         assert set(re.findall(pattern, text, re.MULTILINE)) == {str(number) for number in NUMBERED[paper][kind]}, kind
+
+
+def test_figures_are_legible_in_a_column(chapters_of_f, chapters_of_c):
+    figures = {
+        name: drawing.figure for chapter in chapters_of_f + chapters_of_c for name, drawing in chapter.drawings.items()
+    }
+    assert len(figures) >= 8
+    for figure in figures.values():
+        renderer = renderer_of(figure)
+        check_size(figure, renderer)
+        check_texts(figure, renderer)
+        check_grey(figure)
 
 
 # --- paper F, by code apart
