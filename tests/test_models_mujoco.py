@@ -13,7 +13,6 @@ from towline.models.robot import Pulley
 mujoco = pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
 
 STATES = 200
-LARGEST_ERROR = 1e-7  # relative; with MuJoCo from 4.0 on 1e-8, before it keeps fewer digits
 POINT_ANCHORED = [name for name in available() if all(cable.pulley is None for cable in load(name).cables)]
 
 
@@ -138,7 +137,7 @@ def test_wrench_matrix_and_required_wrench(name):
         worst = max(worst, difference(A, -jacobian.T))
         lengths = dynamics.cable_lengths(pose, carriers)
         worst = max(worst, difference(lengths, np.array(engine.data.ten_length)))
-    assert worst < LARGEST_ERROR
+    assert worst < 1e-8
 
 
 @pytest.mark.parametrize("name", POINT_ANCHORED)
@@ -183,7 +182,7 @@ def test_forward_accelerations(name):
             found = carrier_accelerations[i]
             mine = np.concatenate([found[:3], body_rates(carriers[i], carrier_velocity[i], found)[1]])
             worst = max(worst, difference(mine, theirs[v : v + 6]))
-    assert worst < LARGEST_ERROR
+    assert worst < 1e-8
 
 
 def test_what_mujoco_cannot_express_is_one_line():

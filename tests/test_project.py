@@ -15,6 +15,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 REPOSITORY, VERSION = PROJECT["urls"]["Repository"], PROJECT["version"]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TARGET = re.compile(r"\]\(([^)\s]+)\)|<img src=\"([^\"]+)\"")
+TEXTS = (".github", "benchmarks", "docs", "examples", "tests")
 SCHEMAS = {
     "citation-file-format": "CITATION.cff",
     "github-issue-forms": ".github/ISSUE_TEMPLATE/[!c]*.yml",
@@ -55,9 +56,16 @@ def test_addresses_stay_as_they_are():
     assert with_addresses(text, REPOSITORY, VERSION) == text
 
 
-def test_all_addresses_are_of_one_repository():
-    assert {"Repository", "Documentation", "Changelog", "Issues"} <= set(PROJECT["urls"])
-    assert all(address.startswith(REPOSITORY) for address in PROJECT["urls"].values())
+def test_the_address_of_the_repository_has_one_place():
+    """The others beside it and that of the citation begin with `Repository`, and no other file has it."""
+    others = {"Documentation": "/tree/main/docs", "Changelog": "/blob/main/CHANGELOG.md", "Issues": "/issues"}
+    assert PROJECT["urls"] == {"Repository": REPOSITORY} | {name: REPOSITORY + path for name, path in others.items()}
+    owner = REPOSITORY.rpartition("/")[0]
+    texts = [*ROOT.glob("*.*"), *(path for folder in TEXTS for path in (ROOT / folder).rglob("*.*"))]
+    texts = [path for path in texts if path.suffix in (".cff", ".md", ".py", ".toml", ".txt", ".yml")]
+    named = {path.name for path in texts if f"{owner}/" in path.read_text(encoding="utf-8")}
+    assert len(texts) > 100
+    assert named == {"pyproject.toml", "CITATION.cff"}
 
 
 def test_the_citation_is_of_this_project():

@@ -1,5 +1,6 @@
 """Check the workflows of GitHub Actions, which run nowhere else: their schema, and what a release relies on."""
 
+import os
 import re
 import shlex
 import subprocess
@@ -19,6 +20,7 @@ WHEELS = PROJECT["tool"]["cibuildwheel"]
 TEXTS = {path.stem: path.read_text() for path in sorted(FOLDER.glob("*.yml"))}
 WORKFLOWS = {name: YAML(typ="safe").load(text) for name, text in TEXTS.items()}
 JOBS = [(name, job) for name, workflow in WORKFLOWS.items() for job in workflow["jobs"]]
+ADDRESS = PROJECT["project"]["urls"]["Repository"]
 RELEASE, TESTS = WORKFLOWS["release"], WORKFLOWS["tests"]
 
 
@@ -58,8 +60,34 @@ def test_a_selection_runs_on_the_other_platforms_and_with_other_versions_of_the_
     assert scripts_of("tests", "versions") == "bash .ci/versions ${{ matrix.versions }}"
 
 
-def test_a_release_has_the_addresses_of_its_repository():
-    assert '["urls"]["Repository"]' in scripts_of("release", "sdist")
+def refusal(tmp_path, name, **variables):
+    """Run the Python of a step of the release, where these files and variables are; return how it refuses."""
+    (step,) = [step for step in steps_of("release", "sdist") if step.get("name") == name]
+    assert step["if"] == "startsWith(github.ref, 'refs/tags/')"
+    (code,) = re.findall(r"python - <<'END'\n(.*?)END\n", step["run"], re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=os.environ | variables, capture_output=True, text=True
+    )
+    assert (done.returncode == 0) == (done.stderr == "")
+    return done.stderr
+
+
+@pytest.mark.parametrize("other", [None, "pyproject.toml", "CITATION.cff"])
+def test_a_release_is_refused_if_an_address_is_of_another_repository(other, tmp_path):
+    for name in ("pyproject.toml", "CITATION.cff"):
+        text = (ROOT / name).read_text(encoding="utf-8").replace(ADDRESS, "https://git.example/us/ours")
+        if name == other:
+            text = text.replace("/us/ours", "/us/ours-too")
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    variables = {"GITHUB_SERVER_URL": "https://git.example", "GITHUB_REPOSITORY": "us/ours"}
+    message = refusal(tmp_path, "The addresses are this repository's", **variables)
+    assert message == "" if other is None else f"in {other} must be https://git.example/us/ours" in message
+
+
+def test_a_release_is_refused_if_the_tag_is_of_another_version(tmp_path):
+    (tmp_path / "pyproject.toml").write_text('[project]\nversion = "1.2.3"\n')
+    assert refusal(tmp_path, "The tag is the version", GITHUB_REF_NAME="v1.2.3") == ""
+    assert "must be v1.2.3, got v1.2.4" in refusal(tmp_path, "The tag is the version", GITHUB_REF_NAME="v1.2.4")
 
 
 def test_the_oldest_python_builds_the_wheel_and_all_test_it():
@@ -89,7 +117,6 @@ def test_only_a_tag_publishes_and_only_after_all_else_passed():
 
 def test_the_version_that_the_tag_must_have_is_the_one_of_the_package():
     assert towline.__version__ == PROJECT["project"]["version"]
-    assert '["project"]["version"]' in scripts_of("release", "sdist")
 
 
 def test_what_is_built_is_what_is_published():
