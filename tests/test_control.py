@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from towline.benchmarks.control_steps import random_steps
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State, mechanics
+from towline.control.computed_torque import reach_of
 from towline.control.reaction import write_columns
 from towline.distribution import tensions as distribute
 from towline.errors import InputError
@@ -361,3 +362,12 @@ def test_random_steps_of_closed_loops_keep_every_promise(name):
     assert steps.answered.sum() == 3000
     assert steps.proofs > 1000
     assert steps.answered[ANSWERS.index("hold")] > 300
+
+
+def test_only_what_is_free_may_deviate():
+    """The attitude of a quadrotor follows from its thrust, whatever its reach."""
+    flying, mobile = (reach_of(load(name), (0.5, 0.3)) for name in ("multi-quadrotor-4", "wang-ctmrts"))
+    np.testing.assert_array_equal(flying, np.tile([0.5, 0.5, 0.5, 0, 0, 0], (4, 1)))
+    assert (mobile[:, :3] == 0.5).any(axis=1).all()
+    with pytest.raises(InputError, match="reach must be a distance"):
+        reach_of(load("cogiro"), (0.5, 1.5))
