@@ -363,10 +363,10 @@ def test_halves_with_too_few_readings_predict_nothing():
 
 
 def test_the_report_lists_the_largest_changes_of_lengths():
-    """A scale that is off by 2 % makes more of a cable's length than anchors that moved by millimetres."""
+    """A scale that is off by 0.2 % makes more of a cable's length than anchors that moved by millimetres."""
     built = as_built(100, 0, anchors=2e-3, noise=1e-4, offsets=0.0)
     readings = built.readings.copy()
-    readings[:, 4] /= 1.02
+    readings[:, 4] /= 1.002
     result = calibrate("cogiro", Measurements(readings, built.poses), ("anchors", "scales"), outliers=False)
     report = result.report()
     assert "cables[4].scale" in report
