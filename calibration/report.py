@@ -72,8 +72,11 @@ def _of_noise(result: Calibration) -> list[str]:
 
 
 def _of_parameters(result: Calibration) -> list[str]:
+    from .run import length_of
+
     lines = ["  parameters, with standard deviations and their change from the file:"]
-    by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (1e3 if one.unit == "m" else 1))
+    length = length_of(result.robot)  # on which a scale acts
+    by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
     shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
     lines += [f"    {_one(one)}" for one in result.parameters if one.name in shown]
     if len(result.parameters) > len(shown):

@@ -285,6 +285,15 @@ def test_some_poses_may_be_unknown():
     assert sum(one.sigma**2 for one in result.parameters) < 0.5 * sum(one.sigma**2 for one in few.parameters)
 
 
+def test_information_is_the_inverse_of_the_covariance():
+    """In metres, of what is identifiable, noise three times the stated one included."""
+    built = as_built(100, 0, noise=3 * NOISE)
+    result = calibrate("cogiro", built.measurements(), outliers=False)
+    assert result.noise == pytest.approx(3 * NOISE, rel=0.1)
+    assert len(result.identifiable) == len(result.parameters)
+    np.testing.assert_allclose(result.information @ result.covariance, np.eye(len(result.parameters)), atol=1e-6)
+
+
 def test_a_clock_offset_is_found():
     robot, draw = load("cogiro"), np.random.default_rng(0)
     times = np.arange(0, 20, 0.02) + draw.uniform(-0.003, 0.003, 1000)
@@ -319,6 +328,16 @@ def test_neighbours_that_are_alike_make_parameters_less_certain():
     assert not independent.slips
 
 
+def test_readings_taken_four_times_are_as_good_as_one():
+    """The covariance is four times that of independent readings, known from 25 blocks in 32 directions."""
+    ratios = []
+    for seed in range(6):
+        built = as_built(400, seed)
+        again = Measurements(np.repeat(built.readings, 4, axis=0), np.repeat(built.poses, 4, axis=0))
+        ratios.append(calibrate("cogiro", again, outliers=False).alike)
+    assert np.mean(ratios) == pytest.approx(4, rel=0.045)
+
+
 def test_left_out_samples_decide_whether_parameters_help():
     """With unknown poses and few samples many parameters fit better and predict worse."""
     built = as_built(72, 0, offsets=0.0)
@@ -332,6 +351,29 @@ def test_left_out_samples_decide_whether_parameters_help():
     known = calibrate("cogiro", as_built(60, 0).measurements(), outliers=False).held_out
     assert known.after < 1.5e-3 < 0.02 < known.before
     assert known.best == ("anchors", "offsets")
+
+
+def test_halves_with_too_few_readings_predict_nothing():
+    """Three samples of eight cables do not determine 32 parameters; the six of both halves do."""
+    result = calibrate("cogiro", as_built(6, 0).measurements(), outliers=False)
+    assert len(result.parameters) == 32
+    left = {one.free: one.left_out for one in result.held_out.sets}
+    assert left["anchors", "offsets"] == np.inf
+    assert np.isfinite([left["offsets",], left[ANCHORS]]).all()
+
+
+def test_the_report_lists_the_largest_changes_of_lengths():
+    """A scale that is off by 0.2 % makes more of a cable's length than anchors that moved by millimetres."""
+    built = as_built(100, 0, anchors=2e-3, noise=1e-4, offsets=0.0)
+    readings = built.readings.copy()
+    readings[:, 4] /= 1.002
+    result = calibrate("cogiro", Measurements(readings, built.poses), ("anchors", "scales"), outliers=False)
+    report = result.report()
+    assert "cables[4].scale" in report
+    assert "with smaller changes" in report
+    changes = {one.name: abs(one.correction) for one in result.parameters if one.unit == "m"}
+    listed = [name in report for name in changes]
+    assert min(np.array(list(changes.values()))[listed]) > max(np.array(list(changes.values()))[np.invert(listed)])
 
 
 def test_auto_takes_what_helps():
@@ -365,6 +407,15 @@ def test_wrong_readings_and_slips_are_found(known):
     report = result.report()
     assert "winch 6 slipped: from sample 120" in report
     assert "cable 4 at sample 17" in report
+
+
+@pytest.mark.parametrize("seed", [5, 6, 9])
+def test_more_noise_than_stated_is_no_slip(seed):
+    """Where poses are unknown they absorb most of the noise, and residuals are small beside it."""
+    result = calibrate("cogiro", as_built(200, seed, noise=3 * NOISE, offsets=0.0).measurements(known=False), ANCHORS)
+    assert result.noise == pytest.approx(3 * NOISE, rel=0.1)
+    assert not result.slips
+    assert not result.outliers
 
 
 def test_chosen_poses_tell_more_than_random_ones():

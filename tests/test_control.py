@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from towline.benchmarks.control_steps import random_steps
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State, mechanics
+from towline.control.computed_torque import reach_of
 from towline.control.reaction import write_columns
 from towline.distribution import tensions as distribute
 from towline.errors import InputError
@@ -361,3 +362,30 @@ def test_random_steps_of_closed_loops_keep_every_promise(name):
     assert steps.answered.sum() == 3000
     assert steps.proofs > 1000
     assert steps.answered[ANSWERS.index("hold")] > 300
+
+
+def test_only_what_is_free_may_deviate():
+    """The attitude of a quadrotor follows from its thrust, whatever its reach."""
+    flying, mobile = (reach_of(load(name), (0.5, 0.3)) for name in ("multi-quadrotor-4", "wang-ctmrts"))
+    np.testing.assert_array_equal(flying, np.tile([0.5, 0.5, 0.5, 0, 0, 0], (4, 1)))
+    assert (mobile[:, :3] == 0.5).any(axis=1).all()
+    with pytest.raises(InputError, match="reach must be a distance"):
+        reach_of(load("cogiro"), (0.5, 1.5))
+
+
+@pytest.mark.parametrize("roll", [0.3, -1.0, 1.5, 1.6, -1.6, 1.9, 3.0])
+def test_a_quadrotor_turns_its_thrust_back_the_short_way(roll):
+    """Its home has the thrust that it needs; beyond a right angle to that it turns as hard as at one."""
+    robot, attitude = load("multi-quadrotor-3"), 5.0
+    controller = ComputedTorque(robot, attitude=attitude)
+    state, reference = at_home(robot)
+    carriers = state.carrier_pose.copy()
+    carriers[:, 3:] = roll, 0.0, 0.0
+    command = controller.step(0.0, State(state.pose, state.velocity, carriers, state.carrier_velocity), reference)
+    for carrier, pose, torque in zip(robot.carriers, robot.carrier_home, command.actuation[:, 1:], strict=True):
+        needed = Rotation.from_euler("ZYX", pose[:2:-1]).as_matrix()[:, 2]
+        has = Rotation.from_euler("ZYX", [0, 0, roll]).as_matrix()
+        axis = np.cross(has[:, 2], needed)
+        axis /= np.linalg.norm(axis) if has[:, 2] @ needed < 0 else 1.0
+        expected = attitude**2 * np.diag(carrier.inertia[:3]) @ has.T @ axis
+        np.testing.assert_allclose(torque[:2], expected[:2], atol=1e-6)

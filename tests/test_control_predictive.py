@@ -9,6 +9,7 @@ import pytest
 from towline import plan
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
 from towline.control.machine import carriers_of, directions, stages
+from towline.control.moved import Freed
 from towline.control.surroundings import Surroundings, _distance
 from towline.control.tethers import AXES, TETHER_COLUMNS
 from towline.control.weights import Weights, terminal
@@ -487,3 +488,14 @@ def test_a_batch_is_refused():
     many = State(*(None if part is None else np.stack([part, part]) for part in state))
     with pytest.raises(InputError, match="state must be of one robot, got 2"):
         Predictive(robot).step(0.0, many, reference)
+
+
+def test_carriers_come_to_rest_no_harder_than_they_can():
+    reach = np.array([[True, True, True, False, False, False]])
+    moved, stage, strongest, orders = Freed(reach, 2.0), 0.1, 2.0, np.zeros((1, 3, 6))
+    moved.now(0.0, np.zeros((2, 12)), np.array([[0.0, 1.0, -3.0], [0.0, 0.1, -0.5], [0.0, 0.0, 0.0]])[:, :3])
+    for _ in range(4):
+        moved.rest(stage, orders)
+        assert np.abs(orders[0, 2, :3]).max() <= strongest
+        moved.now(stage, np.zeros((2, 12)), np.zeros((3, 3)))
+    np.testing.assert_allclose(moved.now(stage, np.zeros((2, 12)), np.zeros((3, 3)))[1], 0, atol=1e-12)

@@ -7,6 +7,7 @@ import pytest
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from towline import available, load
+from towline.figures import projection
 from towline.figures import robot as figure
 from towline.figures.hull import faces, outline
 
@@ -93,3 +94,13 @@ def test_flat_bodies_lines_and_points():
     assert outline(np.array([[1.0, 1], [0, 0], [3, 3]])).tolist() == [[0, 0], [3, 3]]
     assert outline(np.ones((3, 2))).tolist() == [[1, 1]]
     assert len(outline(square[:, :2])) == 4
+
+
+@pytest.mark.parametrize("size", [(4, 4, 1), (1, 0.5, 3)])
+def test_a_metre_across_is_a_metre_up_in_all_views(size):
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * size
+    canvas, panels = projection.views_of(corners, [projection.ABOVE, projection.FRONT, projection.SIDE])
+    canvas.draw_without_rendering()
+    metres = [ax.transData.transform([[0, 0], [1, 1]]) for ax in panels]
+    lengths = np.abs([end - start for start, end in metres])
+    np.testing.assert_allclose(lengths, lengths[0, 0], rtol=1e-3)

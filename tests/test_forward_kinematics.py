@@ -417,6 +417,7 @@ def test_a_single_estimate_takes_microseconds():
         ({"lengths": [1, 2, 3]}, r"lengths must have the shape \(..., 8\)"),
         ({"lengths": np.full(8, -1.0)}, "lengths must be numbers > 0"),
         ({"lengths": np.full(8, np.nan)}, "lengths must be finite"),
+        ({"lengths": [8, 8, 8, 8, 8, 8, 8, 2e9]}, r"lengths must be numbers up to 1e\+09 \[m\], got 2e\+09"),
         ({"start": np.zeros(5)}, "start must have the shape"),
         ({"sigma": 0}, "sigma must be numbers > 0"),
         ({"sigma": [1e-3, 1e-3]}, r"sigma must be a number > 0 or of shape \(8,\)"),

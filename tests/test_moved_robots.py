@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, Robot, load, tensions
+from towline.calibration import next_poses
+from towline.calibration.run import length_of
 from towline.distribution import pose_problem
 from towline.models import points
 from towline.models.diagnosis import diagnose
@@ -48,3 +50,18 @@ def test_default_homes_move_with_the_anchors():
     robot = load("cogiro")
     level = points.default_home(robot.anchors, robot.attachments)
     np.testing.assert_allclose(points.default_home(robot.anchors + AWAY, robot.attachments) - level, [*AWAY, 0, 0, 0])
+
+
+def test_a_calibration_has_the_scale_of_the_cables():
+    here, there = load("cogiro"), moved(load("cogiro"))
+    assert length_of(here) == pytest.approx(Dynamics(here).cable_lengths(here.home).mean())
+    assert length_of(there) == pytest.approx(length_of(here))
+
+
+@pytest.mark.parametrize("name", ["cogiro", "planar-4"])
+def test_the_poses_to_measure_next_move_with_the_robot(name):
+    here, there = load(name), moved(load(name))
+    poses = next_poses(here, count=4)
+    np.testing.assert_allclose(next_poses(there, count=4) - poses, np.tile([*AWAY, 0, 0, 0], (4, 1)), atol=1e-9)
+    assert np.ptp(poses[:, :3], axis=0).max() > 0.5 * length_of(here), "they are all over the robot's workspace"
+    assert 0.2 < np.abs(poses[:, 3:]).max() <= 0.3

@@ -7,12 +7,13 @@ from scipy.optimize import linprog
 from towline import load, plan
 from towline.control import Command, ComputedTorque, Controller, State
 from towline.errors import InputError
-from towline.models import Dynamics
+from towline.models import Dynamics, Robot
 from towline.models.plant import Plant
 from towline.models.plant.periods import Periods
 from towline.ocp import Task
 from towline.simulation import simulate
 from towline.simulation.machine import sense_rows, write_lengths
+from towline.simulation.steps import steps_in
 from towline.simulation.trajectory import read_trajectory
 
 
@@ -388,6 +389,65 @@ def test_what_a_wind_may_return_is_checked(wind):
     with pytest.raises(InputError, match="wind must") as error:
         simulate("wang-flying", load("wang-flying").home, wind=wind, duration=0.01)
     assert "\n" not in str(error.value)
+
+
+def test_a_bias_alone_is_sensed():
+    """The controller holds what it measures at the reference, so that the platform stands beside it by the bias."""
+    robot, size = load("cogiro"), 0.01
+    ends = []
+    for seed in range(3):
+        flight = simulate(robot, robot.home, noise={"position_bias": size}, seed=seed, duration=1.5)
+        ends.append(flight.trajectory["pose"].values[-1, :3] - robot.home[:3])
+        drawn = np.random.default_rng([seed, 1]).normal(size=3) * size
+        np.testing.assert_allclose(ends[-1], -drawn, atol=5e-4)
+
+
+@pytest.mark.parametrize(("share", "allowed"), [(0.8e-3, True), (1.2e-3, False)])
+def test_tensions_may_exceed_their_limit_by_a_thousandth_of_their_range(share, allowed):
+    data = load("cogiro").model_dump(mode="json")
+    for cable in data["cables"]:
+        cable["t_min"] = 0.6 * cable["t_max"]
+    robot = Robot.model_validate(data)
+    flight = simulate(robot, robot.home, duration=0.01)
+    flight.record.tensions[:] = 0.5 * (robot.t_min + robot.t_max)
+    flight.record.tensions[3, 2] = robot.t_max[2] + share * (robot.t_max[2] - robot.t_min[2])
+    assert any("in cable 3 at t = 0.003 s" in line for line in flight.failures) != allowed
+
+
+def test_a_period_has_steps_for_the_fastest_spring():
+    """A mass on a vertical cable below a quadrotor: they swing against each other with their reduced mass."""
+    load_mass, carrier_mass, stiffness, period = 2.0, 0.5, 1e5, 0.2
+    quadrotor = load("multi-quadrotor-3").model_dump(mode="json")["carriers"][0]
+    quadrotor |= {"name": "top", "mass": carrier_mass, "home": [0, 0, 0, 0, 0, 0]}
+    cable = {"carrier": "top", "anchor": [0, 0, 0], "attachment": [0, 0, 0], "t_min": 0, "t_max": 100}
+    robot = Robot.model_validate(
+        {
+            "name": "pendulum",
+            "source": "a test",
+            "gravity": [0, 0, -9.81],
+            "platform": {"mass": load_mass, "dof": ["x", "y", "z"], "home": [0, 0, -1, 0, 0, 0]},
+            "carriers": [quadrotor],
+            "cables": [cable | {"stiffness": stiffness, "damping": 0}],
+        }
+    )
+    frequency = np.sqrt(stiffness / 1.0 * (1 / load_mass + 1 / carrier_mass))
+    assert steps_in(period, Plant(robot)) == np.ceil(period * frequency)
+
+
+def test_actuators_are_listed_where_only_some_carriers_have_any():
+    data = load("wang-flying-quadrotor").model_dump(mode="json")
+    data["carriers"].append({"name": "post", "kind": "ground"})
+    robot = Robot.model_validate(data)
+    actuation = simulate(robot, robot.home, duration=0.01).trajectory["actuation"]
+    assert actuation["actuator"].values.tolist() == ["thrust", "torque x", "torque y", "torque z"]
+    weight = (robot.platform.mass + robot.carriers[0].mass) * 9.81
+    assert actuation.sel(carrier="quad", actuator="thrust")[-1] == pytest.approx(weight, rel=1e-3)
+
+
+def test_a_wind_too_fast_is_named():
+    storm = lambda times, seed: np.tile([3.0, -2e3, 1.0], (len(times), 1))  # noqa: E731
+    with pytest.raises(InputError, match=r"up to 1000 m/s, got -2000$"):
+        simulate("wang-flying", load("wang-flying").home, wind=storm, duration=0.01)
 
 
 def test_a_motion_that_no_numbers_hold_never_passes():

@@ -225,6 +225,9 @@ def test_what_cannot_be_shown_is_one_line(folder):
     saved.drop_vars("tensions").to_netcdf(folder / "half.nc", engine="h5netcdf")
     saved.isel(cable=slice(3)).to_netcdf(folder / "few.nc", engine="h5netcdf")
     saved[["status"] if "status" in saved else ["t_min"]].to_netcdf(folder / "other.nc", engine="h5netcdf")
+    times = saved["time"].to_numpy().copy()
+    times[-1] = times[-2]
+    saved.assign_coords(time=times).to_netcdf(folder / "twice.nc", engine="h5netcdf")
     hostile = xr.load_dataset(folder / "none.nc")
     hostile.attrs["robot"] = "mine"
     (folder / "folder.nc").mkdir()
@@ -238,6 +241,7 @@ def test_what_cannot_be_shown_is_one_line(folder):
         "folder.nc": "got a folder",
         "half.nc": "without 'tensions'",
         "few.nc": "tensions must have the shape",
+        "twice.nc": "time must have increasing values",
         "other.nc": "neither a plan nor a workspace",
         "mine.nc": "--robot",
     }

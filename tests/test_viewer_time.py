@@ -111,6 +111,12 @@ def test_curves_at_other_times_end_where_the_motion_ends():
     np.testing.assert_allclose(other.margins, [np.nan, 0.5, 1, np.nan])
 
 
+def test_the_cursor_of_curves_is_at_the_nearest_instant():
+    times = np.array([0.0, 0.4, 1.0, 3.0])
+    some = Curves(times, np.ones((4, 2)), np.ones(4))
+    assert [some.nearest(time) for time in (-1, 0.1, 0.3, 0.6, 2.1, 9)] == [0, 0, 1, 1, 3, 3]
+
+
 @pytest.fixture(scope="module")
 def compared(folder):
     """Another plan, slower and elsewhere, beside `line`."""
