@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..figures.tension_colours import place, shades
 from . import words
-from .colours import place, shades
 from .instant import Instant
 
 if TYPE_CHECKING:

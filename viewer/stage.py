@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from ..figures import style
 from ..figures.hull import faces
 from ..figures.robot import box_edges
+from ..figures.tension_colours import place, rgb, shades
 from ..text import quantity
 from . import words
-from .colours import place, rgb, shades
 from .geometry import Extent, Geometry
 from .instant import Instant, arrow, typical_force
 from .shapes import posts, rotors, sheaves
@@ -30,6 +31,7 @@ THIN = 1.5
 BLACK, GREY = (0, 0, 0), (150, 150, 150)
 HEAD = 0.25  # of an arrow's length
 BARBS = 12
+AIMS = 50  # of a camera, that are remembered
 CELLS = 10  # of the grid along the robot's size, about
 
 
@@ -158,18 +160,28 @@ class Stage:
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 
     def mind(self, client: viser.ClientHandle) -> None:
-        """Frame the robot in a picture that is higher than wide, now and whenever its camera is the initial one.
+        """Frame the robot in a picture that is higher than wide, now and whenever a screen is turned.
 
-        The initial camera may reach a browser after this one, and a user can return to it.
+        The initial camera may reach a browser after this one, and a user can return to it. A camera that a user has
+        pointed elsewhere stays.
         """
         camera = client.camera
-        if camera.image_width < camera.image_height:
-            self.frame(camera, camera.image_width, camera.image_height)
+        framed, aims = (WIDE, 1.0), deque([self._centre], AIMS)
 
-            @camera.on_update
-            def _(_: viser.CameraHandle) -> None:
-                if np.abs(camera.look_at - self._centre).max() < 1e-3 * self._size:
-                    self.frame(camera, camera.image_width, camera.image_height)
+        def fit() -> None:
+            nonlocal framed
+            shape, looked_at = (float(camera.image_width), float(camera.image_height)), camera.look_at
+            # An update may be older than the framing before it, so the places before count too.
+            untouched = min(np.abs(looked_at - aim).max() for aim in (self._centre, *aims)) < 1e-3 * self._size
+            initial = np.abs(looked_at - self._centre).max() < 1e-3 * self._size
+            upright, was_upright = shape[0] < shape[1], framed[0] < framed[1]
+            if untouched and ((upright and initial) or (shape != framed and (upright or was_upright))):
+                framed = shape
+                self.frame(camera, *shape)
+                aims.append(np.array(camera.look_at))
+
+        fit()
+        camera.on_update(lambda _: fit())
 
     def _draw_surroundings(self, subject: Subject) -> None:
         scene, cell = self._scene, self.cell
