@@ -3,21 +3,18 @@
 Screenshots are left in pytest's temporary folder.
 """
 
-import io
 import re
 import shutil
 import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import ThreadingHTTPServer
 from importlib.metadata import version
 from pathlib import Path
-from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
-from scipy.ndimage import maximum_filter
 
 from towline.distribution import pose_problem
 from towline.figures.tension_colours import place, shades
@@ -29,8 +26,9 @@ from towline.viewer import read, save_page, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import at_rest
 from towline.viewer.posing import home_at_rest
-from towline.viewer.stage import WIDE, Stage
 from towline.workspace import StaticEquilibrium, sample, save
+
+from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 if CHROMIUM is None:
@@ -38,7 +36,6 @@ if CHROMIUM is None:
 playwright = pytest.importorskip("playwright.sync_api", reason="to run these: pip install playwright")
 
 PATIENCE = 30_000  # [ms] drawing is in software here
-CHART_ROWS = slice(640, 690)  # of 700, which are inside the chart of tensions however long the text above it is
 WEBGL = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -101,44 +98,6 @@ def open_viewer(page, url, width, height):
     page.goto(url)
     page.wait_for_selector(".towline-readout")
     page.get_by_role("alert").get_by_role("button").click()
-
-
-def pixels(page, subject, points):
-    """Return where the initial camera shows points (k, 3) in the picture, (k, 2), by a pinhole camera."""
-    extent = subject.replay.extent if subject.replay else Geometry(subject.robot).extent
-    about = SimpleNamespace(_size=extent.size, _centre=(extent.low + extent.high) / 2)
-    box = page.locator("canvas").first.bounding_box()
-    shape = (WIDE, 1.0) if box["width"] > box["height"] else (box["width"], box["height"])
-    camera = SimpleNamespace()
-    Stage.frame(about, camera, *shape)
-    ahead = (camera.look_at - camera.position) / np.linalg.norm(camera.look_at - camera.position)
-    right = np.cross(ahead, [0, 0, 1]) / np.linalg.norm(np.cross(ahead, [0, 0, 1]))
-    away = points - camera.position
-    flat = away @ np.stack([right, np.cross(ahead, right)]).T / (away @ ahead)[:, None]
-    middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
-    return middle + flat * box["height"] / 2 / np.tan(camera.fov / 2)
-
-
-def picture(page, file=None):
-    return np.asarray(Image.open(io.BytesIO(page.screenshot(path=file))).convert("RGB")).astype(int)
-
-
-def dark_near(shot, spots, reach=4):
-    """Return for each of some pixels (..., 2) whether black dots, such as the ends of cables, are within reach."""
-    dark = maximum_filter(shot.max(axis=2) < 60, 2 * reach + 1)
-    columns, rows = np.moveaxis(np.round(spots).astype(int), -1, 0)
-    inside = (columns >= 0) & (columns < dark.shape[1]) & (rows >= 0) & (rows < dark.shape[0])
-    return inside & dark[np.where(inside, rows, 0), np.where(inside, columns, 0)]
-
-
-def cursor_column(page, shot):
-    """Return the column of the line that marks now in the chart of tensions, by its pixels."""
-    box = page.locator(".u-over").first.bounding_box()
-    left, right = int(box["x"]) - 2, int(box["x"] + box["width"]) + 3
-    rows = shot[CHART_ROWS, left:right].max(axis=2).mean(axis=0)
-    darkest = int(rows.argmin())
-    near = np.arange(max(darkest - 2, 0), min(darkest + 3, len(rows)))
-    return left + np.average(near, weights=np.clip(200 - rows[near], 0, None) + 1e-9)
 
 
 def test_a_slider_moves_the_platform_and_its_tensions(page, tmp_path):
@@ -224,8 +183,8 @@ def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     drawn = shades(place(saved["tensions"][40].to_numpy(), saved["t_min"].to_numpy(), saved["t_max"].to_numpy()))
 
     def cables_are_drawn():
-        pixels = np.asarray(Image.open(io.BytesIO(page.screenshot(path=tmp_path / "page.png"))).convert("RGB"))
-        return (np.abs(pixels.astype(int) - drawn[0].astype(int)).max(axis=2) < 16).sum() > 200
+        shot = picture(page, tmp_path / "page.png")
+        return (np.abs(shot - drawn[0].astype(int)).max(axis=2) < 16).sum() > 200
 
     for _ in range(60):  # what appears fades in
         if cables_are_drawn():
@@ -251,7 +210,7 @@ def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_
                 page.wait_for_timeout(250)
                 corners, anchors = (pixels(page, subject, ends) for ends in (points.attachments, points.anchors))
                 shot = picture(page, tmp_path / f"{width}.png")
-                if np.concatenate([dark_near(shot, corners), dark_near(shot, anchors)]).mean() > 0.6:
+                if dark_near(shot, anchors).mean() > 0.6:  # names cover some
                     break
             else:
                 pytest.fail(f"the ends of the cables are elsewhere in {width} x {height}")
@@ -358,17 +317,6 @@ def test_two_plans_are_compared(page, folder, tmp_path):
 @pytest.fixture
 def foreign_page():
     """The address of an empty page that another server of this machine serves."""
-
-    class Empty(BaseHTTPRequestHandler):
-        def do_GET(self):
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html")
-            self.end_headers()
-            self.wfile.write(b"<html></html>")
-
-        def log_message(self, *_):
-            """Print nothing."""
-
     server = ThreadingHTTPServer(("127.0.0.1", 0), Empty)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield f"http://127.0.0.1:{server.server_port}/"
@@ -395,3 +343,21 @@ def test_a_page_of_another_site_cannot_open_the_socket(browser, foreign_page):
         assert told["own"][0] == "open"
         assert told["other"][0] == "refused"
         assert "403" in told["other"][1]
+
+
+def test_on_a_phone_the_page_from_disk_shows_the_whole_robot(page, tmp_path):
+    subject = read("cogiro")
+    page.set_viewport_size({"width": 400, "height": 800})
+    page.goto(save_page(subject, tmp_path / "cogiro.html").as_uri())
+    robot, spots = subject.robot, None
+    for _ in range(40):
+        page.wait_for_timeout(250)
+        if page.locator("canvas").count():
+            spots = pixels(page, subject, np.vstack([robot.home_anchors, robot.home_attachments]), free=1.0)
+            if dark_near(picture(page, tmp_path / "phone.png"), spots).mean() > 0.6:
+                break
+    else:
+        pytest.fail("the ends of the cables are elsewhere")
+    assert (spots > 0).all()
+    assert (spots < [400, 800]).all()
+    assert np.ptp(spots[:, 0]) > 150

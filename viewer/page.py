@@ -39,6 +39,30 @@ if (FRAMES.times.length > 1) setInterval(() => {
 """
 
 
+# viser's player takes its camera from the address of the page; files differ from their addresses only after a "?".
+CAMERA = """
+if (innerWidth < innerHeight) {
+  const aspect = innerWidth / innerHeight, place = CENTRE.map((x, i) => x + ALONG[i] * NEAREST / aspect);
+  history.replaceState(null, "", `?initialCameraPosition=${place}&initialCameraLookAt=${CENTRE}` + location.hash);
+}
+"""
+
+
+def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
+    """Return the script that moves the initial camera away from the robot on a screen that is higher than wide.
+
+    Parameters
+    ----------
+    centre, along
+        Where it looks, and the direction from there to the camera, (3,) in {G} [m].
+    nearest
+        Its distance on a screen that is wider than high [m].
+    """
+    values = {"CENTRE": centre.tolist(), "ALONG": along.tolist(), "NEAREST": nearest}
+    constants = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
+    return f"<script>{{ const {constants};{CAMERA}}}</script>"
+
+
 def aside(subject: Subject, frames: list[Instant], cell: float) -> str:
     """Return the HTML beside a scene that shows these instants one after the other; a title that folds the rest."""
     start = frames[0]
