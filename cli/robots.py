@@ -156,6 +156,8 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
         names=[carrier.name for carrier in robot.carriers],
         boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
         tensions=at_home.tensions,
+        t_min=robot.t_min,
+        t_max=robot.t_max,
         positions=positions,
         feasible=feasible,
     )

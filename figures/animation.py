@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,15 +17,12 @@ from ..inputs import number
 from . import film, style
 from .hull import faces
 from .robot import box_edges
-
-if TYPE_CHECKING:
-    from matplotlib.colors import Colormap, Normalize
+from .tension_colours import mark, place, scale, shades
 
 SIZE = (7.0, 5.2)  # [inches]
 DPI = 100  # an even number of pixels in each direction, which MP4 requires
 MOST_FRAMES = 3000
 SLOWEST, FASTEST = 1e-6, 1e6  # seconds of the motion in one of the film
-NO_TENSIONS = "#999999"
 
 
 class Timing(NamedTuple):
@@ -128,7 +125,6 @@ class _Stage:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         self._scene, self._when = scene, when
-        self._map, self._norm = _tension_colours(scene)
         self._figure = style.figure(*SIZE)
         self._figure.set_dpi(DPI)
         self._canvas = FigureCanvasAgg(self._figure)
@@ -146,11 +142,12 @@ class _Stage:
         self._platform.set_points(scene.attachments[k])
         for body, cables in zip(self._bodies, scene.bodies, strict=True):
             body.set_points(scene.anchors[k, cables])
-        for label, place in zip(self._labels, scene.carriers[k], strict=True):
-            label.set_position_3d(place)
+        for label, at in zip(self._labels, scene.carriers[k], strict=True):
+            label.set_position_3d(at)
         self._cables.set_segments(np.stack([scene.anchors[k], scene.attachments[k]], axis=1))
         there = np.isfinite(scene.tensions[k]).all()
-        self._cables.set_color(self._map(self._norm(scene.tensions[k])) if there else NO_TENSIONS)
+        tensions = scene.tensions[k] if there else np.full_like(scene.tensions[k], np.nan)
+        self._cables.set_color(shades(place(tensions, scene.t_min, scene.t_max)) / 255.0)
         self._cables.set_linestyle("-" if there else "--")
         self._clock.set_text(f"t = {self._when.times[k]:.2f} s" + ("" if there else "\nno tensions\ninside the limits"))
         for artist in (self._trail, *self._shapes(), self._cables, *self._labels):
@@ -165,7 +162,6 @@ class _Stage:
 
     def _draw_surroundings(self) -> None:
         """Draw axes, paths of platform and carriers, boxes, and the colour bar with the limits."""
-        from matplotlib import cm
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
         scene, ax = self._scene, self._axes
@@ -193,16 +189,8 @@ class _Stage:
         ax.legend(handles=named, fontsize="x-small", loc="upper left")
         speed = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
         ax.set_title(f"{scene.title} ({speed})", fontsize=10)
-        bar = self._figure.colorbar(
-            cm.ScalarMappable(self._norm, self._map), ax=ax, shrink=0.7, pad=0.12, label="tension [N]"
-        )
-        lines = []
-        for name, limits in (("t_min", scene.t_min), ("t_max", scene.t_max)):
-            for limit in np.unique(limits):
-                if self._norm.vmin <= limit <= self._norm.vmax:
-                    bar.ax.axhline(limit, color="#000000", linestyle="--", linewidth=1.4)
-                lines.append(f"{name} = {limit:g} N")
-        bar.ax.set_title("\n".join(lines) if len(lines) <= 4 else "dashed: limits", fontsize=8)
+        bar = self._figure.colorbar(scale(), ax=ax, shrink=0.7, pad=0.12, label="tension [N] from t_min to t_max")
+        mark(bar, scene.t_min, scene.t_max, 8)
 
     def _make_actors(self) -> None:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
@@ -214,8 +202,8 @@ class _Stage:
         segments = np.stack([scene.anchors[0], scene.attachments[0]], axis=1)
         self._cables: Any = ax.add_collection3d(Line3DCollection(segments, linewidths=2.2, animated=True))
         self._labels = [
-            ax.text(*place, f" {name}", fontsize=8, animated=True)
-            for place, name in zip(scene.carriers[0], scene.names, strict=True)
+            ax.text(*at, f" {name}", fontsize=8, animated=True)
+            for at, name in zip(scene.carriers[0], scene.names, strict=True)
         ]
         self._clock = self._figure.text(0.98, 0.03, "", fontsize=10, ha="right", animated=True)
 
@@ -250,20 +238,3 @@ def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndar
         if (points.max(axis=0) > low).all() and (points.min(axis=0) < high).all():
             inside += [np.clip(line, low, high) for line in lines]
     return inside
-
-
-def _tension_colours(scene: Scene) -> tuple[Colormap, Normalize]:
-    """Return a colour scale for the tensions that exist; limits far from them would make all colours similar."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, Normalize
-
-    there = scene.tensions[np.isfinite(scene.tensions)]
-    low, high = float(scene.t_min.min()), float(scene.t_max.max())
-    if there.size:
-        least, most = float(there.min()), float(there.max())
-        near = max(most - least, 0.1 * most)
-        low = low if least - low <= near else least
-        high = high if high - most <= near else most
-    # The palest colours of the map are invisible as thin lines on white.
-    visible = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 256)))
-    return visible, Normalize(low, max(high, low + 1e-3))

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import style
 from .hull import faces
+from .tension_colours import mark, place, scale, shades
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,6 +31,8 @@ class RobotSketch:
         Corners (low, high) of reach boxes.
     tensions
         (m,) [N], or None for grey cables.
+    t_min, t_max
+        (m,) [N].
     positions, feasible
         (k, 3) positions of the platform, and (k,) whether it can rest there.
     """
@@ -42,23 +45,23 @@ class RobotSketch:
     names: list[str]
     boxes: list[tuple[np.ndarray, np.ndarray]]
     tensions: np.ndarray | None
+    t_min: np.ndarray
+    t_max: np.ndarray
     positions: np.ndarray
     feasible: np.ndarray
 
 
 def draw(sketch: RobotSketch) -> Figure:
     """Draw a robot."""
-    from matplotlib import cm, colormaps, colors
-
     canvas = style.figure(height=3.2)
     ax = style.axes_in_space(canvas)
     inside = sketch.positions[sketch.feasible]
     if len(inside):
         ax.scatter(*inside.T, s=5, color=style.colour(2), alpha=0.5, linewidths=0, label="can rest here")
     tensions = sketch.tensions
-    scale = colors.Normalize(0, float(tensions.max()) or 1.0) if tensions is not None else None
-    for index, (anchor, attachment) in enumerate(zip(sketch.anchors, sketch.attachments, strict=True)):
-        shade = "#999999" if tensions is None or scale is None else colormaps["viridis_r"](scale(tensions[index]))
+    known = np.full(len(sketch.anchors), np.nan) if tensions is None else tensions
+    colours = shades(place(known, sketch.t_min, sketch.t_max)) / 255.0
+    for anchor, attachment, shade in zip(sketch.anchors, sketch.attachments, colours, strict=True):
         ax.plot(*np.stack([anchor, attachment]).T, color=shade, linewidth=1.0)
     ax.scatter(*sketch.anchors.T, s=8, marker="^", color="#000000", label="anchors")
     ax.scatter(*sketch.com, s=14, color=style.colour(1), label="CoM")
@@ -71,8 +74,9 @@ def draw(sketch: RobotSketch) -> Figure:
     style.equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
     ax.set_title(sketch.title, fontsize=style.TEXT)
     style.legend_below(canvas, ax)
-    if scale is not None:
-        style.colour_bar(canvas, cm.ScalarMappable(scale, "viridis_r"), ax, "tension [N]", shrink=0.6, pad=0.14)
+    if tensions is not None:
+        bar = style.colour_bar(canvas, scale(), ax, "tension [N] from t_min to t_max", shrink=0.6, pad=0.14)
+        mark(bar, sketch.t_min, sketch.t_max, style.NOTE)
     return canvas
 
 

@@ -15,6 +15,7 @@ from ..writing import whole_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
@@ -207,11 +208,12 @@ def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> None:
         legend.remove()
 
 
-def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes], label: str, **place: Any) -> None:
-    """Draw the scale of colours beside panels."""
+def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes], label: str, **place: Any) -> Colorbar:
+    """Return the scale of colours, drawn beside panels."""
     bar = canvas.colorbar(shades, ax=panels, **place)
     bar.set_label(label, fontsize=NOTE)
     bar.ax.tick_params(labelsize=NOTE)
+    return bar
 
 
 def check_format(name: str) -> str:

@@ -101,6 +101,8 @@ def sketch(name: str) -> robot.RobotSketch:
         names=[carrier.name for carrier in model.carriers],
         boxes=[(np.array(box.min), np.array(box.max)) for c in model.carriers for box in c.drawing.boxes],
         tensions=np.linspace(1, 40, len(model.cables)),
+        t_min=model.t_min,
+        t_max=model.t_max,
         positions=model.home_com + 0.1 * np.eye(3),
         feasible=np.array([True, True, False]),
     )

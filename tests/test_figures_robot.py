@@ -22,6 +22,8 @@ def sketch(robot):
         names=[carrier.name for carrier in robot.carriers],
         boxes=[],
         tensions=None,
+        t_min=robot.t_min,
+        t_max=robot.t_max,
         positions=np.zeros((0, 3)),
         feasible=np.zeros(0, bool),
     )

@@ -16,12 +16,12 @@ from scipy.spatial.transform import Rotation
 from websockets.datastructures import Headers
 
 from towline.errors import InputError
+from towline.figures.tension_colours import place, rgb, shades
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.viewer import read, save_page, serve
 from towline.viewer.access import refusal
 from towline.viewer.cloud import cloud
-from towline.viewer.colours import place, rgb, shades
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import arrow, at_rest
 from towline.viewer.shapes import posts, sheaves

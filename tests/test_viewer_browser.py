@@ -1,12 +1,15 @@
-"""The viewer and its page in headless Chromium: no errors, sliders move the platform, plans play.
+"""The viewer and its page in headless Chromium: no errors, sliders and mouse move the platform, plans play.
 
 Screenshots are left in pytest's temporary folder.
 """
 
-import io
 import re
 import shutil
+import threading
+from http.server import ThreadingHTTPServer
+from importlib.metadata import version
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -14,11 +17,18 @@ import xarray as xr
 from PIL import Image
 
 from towline.distribution import pose_problem
+from towline.figures.tension_colours import place, shades
 from towline.models import Dynamics, load
 from towline.ocp import plan
+from towline.simulation import simulate
 from towline.solvers import solve
 from towline.viewer import read, save_page, serve
-from towline.viewer.colours import place, shades
+from towline.viewer.geometry import Geometry
+from towline.viewer.instant import at_rest
+from towline.viewer.posing import home_at_rest
+from towline.workspace import StaticEquilibrium, sample, save
+
+from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 if CHROMIUM is None:
@@ -53,11 +63,25 @@ def page(browser):
 
 
 @pytest.fixture(scope="module")
-def plan_file(tmp_path_factory):
-    file = tmp_path_factory.mktemp("plan") / "line.nc"
+def folder(tmp_path_factory):
+    """Two plans, a flight of one of them, a plan that cannot be, and a workspace."""
+    place, robot = tmp_path_factory.mktemp("files"), load("wang-flying")
     line = {"kind": "line", "start": [0, 0, -1], "end": [0.05, 0, -0.9]}
-    task = {"path": line, "duration": 4, "base": {"kind": "hold"}, "output_rate": 20}
-    return plan(load("wang-flying"), task).save(file)
+    circle = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}
+    common = {"base": {"kind": "hold"}, "output_rate": 20}
+    found = plan(robot, {"path": line, "duration": 4, **common})
+    found.save(place / "line.nc")
+    simulate(robot, found).save(place / "flight.nc")
+    plan(robot, {"path": line | {"end": [-0.05, 0.02, -0.9]}, "duration": 3, **common}).save(place / "slow.nc")
+    plan(robot, {"path": circle, **common}).save(place / "circle.nc")
+    region = {"position": {"min": [-0.6, -0.6, -1.2], "max": [0.6, 0.6, 0]}}
+    save(sample(robot, StaticEquilibrium(), region, samples=2000, keep="all"), place / "space.nc")
+    return place
+
+
+@pytest.fixture(scope="module")
+def plan_file(folder):
+    return folder / "line.nc"
 
 
 def tensions(page):
@@ -66,6 +90,14 @@ def tensions(page):
 
 def shown_time(page):
     return float(re.search(r"t = ([\d.]+) s", page.locator(".towline-readout").inner_text())[1])
+
+
+def open_viewer(page, url, width, height):
+    """Open a viewer, and close its hint that this machine draws in software."""
+    page.set_viewport_size({"width": width, "height": height})
+    page.goto(url)
+    page.wait_for_selector(".towline-readout")
+    page.get_by_role("alert").get_by_role("button").click()
 
 
 def test_a_slider_moves_the_platform_and_its_tensions(page, tmp_path):
@@ -151,11 +183,181 @@ def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     drawn = shades(place(saved["tensions"][40].to_numpy(), saved["t_min"].to_numpy(), saved["t_max"].to_numpy()))
 
     def cables_are_drawn():
-        pixels = np.asarray(Image.open(io.BytesIO(page.screenshot(path=tmp_path / "page.png"))).convert("RGB"))
-        return (np.abs(pixels.astype(int) - drawn[0].astype(int)).max(axis=2) < 16).sum() > 200
+        shot = picture(page, tmp_path / "page.png")
+        return (np.abs(shot - drawn[0].astype(int)).max(axis=2) < 16).sum() > 200
 
     for _ in range(60):  # what appears fades in
         if cables_are_drawn():
             return
         page.wait_for_timeout(250)
     pytest.fail(f"nothing in the picture has the colour of the first cable, {drawn[0]}")
+
+
+@pytest.mark.parametrize(
+    "name", ["cogiro", "wang-ctmrts", "multi-quadrotor-4", "fast", "line.nc", "flight.nc", "space.nc"]
+)
+def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_path):
+    """On a desk and on a phone: at every corner of the platform a click would reach the scene."""
+    subject = read(str(folder / name) if name.endswith(".nc") else name)
+    robot = subject.robot
+    with serve(subject, port=0) as url:
+        open_viewer(page, url, 1600, 1000)
+        pose = home_at_rest(robot) if subject.replay is None else subject.replay.at(0).pose
+        points = at_rest(Dynamics(robot), Geometry(robot), pose, robot.carrier_home).points
+        for width, height in ((1600, 1000), (400, 800)):
+            page.set_viewport_size({"width": width, "height": height})
+            for _ in range(40):  # until the camera has turned
+                page.wait_for_timeout(250)
+                corners, anchors = (pixels(page, subject, ends) for ends in (points.attachments, points.anchors))
+                shot = picture(page, tmp_path / f"{width}.png")
+                if dark_near(shot, anchors).mean() > 0.6:  # names cover some
+                    break
+            else:
+                pytest.fail(f"the ends of the cables are elsewhere in {width} x {height}")
+            for x, y in corners:
+                assert 0 < x < width
+                assert 0 < y < height
+                assert page.evaluate("([x, y]) => document.elementFromPoint(x, y).tagName", [x, y]) == "CANVAS"
+            assert np.ptp(anchors, axis=0).max() > 100
+
+
+def test_the_mouse_drags_the_platform_and_its_tensions_change(page, tmp_path):
+    subject = read("cogiro")
+    robot = subject.robot
+    with serve(subject, port=0) as url:
+        open_viewer(page, url, 1200, 700)
+        before = tensions(page)
+        page.wait_for_timeout(1500)  # what appears fades in
+        reach = 0.13 * Geometry(robot).extent.size
+        ends = robot.home[:3] + np.array([[0, 0, 0.9 * reach], [0, 0, 0.9 * reach + 0.8]])
+        (x, y), (to_x, to_y) = pixels(page, subject, ends)
+        page.mouse.move(x, y)
+        page.wait_for_timeout(500)  # the handle notices the mouse when it draws
+        page.mouse.down()
+        page.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=4)
+        page.mouse.move(to_x, to_y, steps=4)
+        page.mouse.up()
+        playwright.expect(page.locator(".towline-readout")).not_to_contain_text("(0.000, 0.000, 2.000")
+        page.wait_for_timeout(1000)
+        pose = re.search(r"\(([-\d., ]+)\) m, rad", page.locator(".towline-readout").inner_text())[1]
+        moved = np.array([float(number) for number in pose.split(",")])
+        np.testing.assert_allclose(np.delete(moved - robot.home, 2), 0, atol=1e-9)
+        assert moved[2] == pytest.approx(robot.home[2] + 0.8, abs=0.1)
+        held = solve(pose_problem(Dynamics(robot), moved)).tensions
+        np.testing.assert_allclose(tensions(page), held, rtol=2e-3)  # the pose is shown in whole millimetres
+        assert np.abs(np.array(tensions(page)) - before).min() > 1
+        page.screenshot(path=tmp_path / "dragged.png")
+
+
+def test_keys_step_and_play(page, folder):
+    with serve(read(str(folder / "line.nc")), port=0) as url:
+        open_viewer(page, url, 640, 480)
+        clock = page.locator(".towline-time")
+        for key, shown in (("l", 0.05), ("l", 0.1), ("j", 0.05), ("End", 4), ("l", 4), ("Home", 0), ("j", 0)):
+            page.keyboard.press(key)
+            playwright.expect(clock).to_have_text(f"t = {shown:.2f} s")
+        page.keyboard.press("k")
+        playwright.expect(clock).not_to_have_text("t = 0.00 s")
+        playwright.expect(page.get_by_role("button", name="Pause")).to_be_visible()
+        page.keyboard.press("k")
+        playwright.expect(page.get_by_role("button", name="Play")).to_be_visible()
+        stopped = shown_time(page)
+        page.wait_for_timeout(300)
+        assert shown_time(page) == stopped
+
+
+def test_the_time_cursor_moves_scene_and_chart_together(page, folder, tmp_path):
+    """By pixels: the platform is where the motion has it at the time of the line in the chart."""
+    subject = read(str(folder / "circle.nc"))
+    times = subject.replay.times
+    ends = np.array([subject.replay.at(k, prove=False).points.attachments for k in range(len(times))])
+    with serve(subject, port=0) as url:
+        open_viewer(page, url, 1200, 700)
+        places = pixels(page, subject, ends.reshape(-1, 3)).reshape(*ends.shape[:2], 2)
+        now, columns = page.locator("input[type=text]").first, []
+
+        def agree(index):
+            """Return whether of all instants this one fits the picture best."""
+            shot = picture(page, tmp_path / "circle.png")
+            share = dark_near(shot, places, 2).mean(axis=1)
+            best = np.flatnonzero(share == share.max())
+            if share.max() < 0.6 or np.abs(best - index).min() > 1:
+                return False
+            columns.append(cursor_column(page, shot))
+            return True
+
+        instants = (0, 60, 120, 180)
+        for index in instants:
+            now.fill(f"{times[index]:.2f}")
+            now.press("Enter")
+            playwright.expect(page.locator(".towline-time")).to_have_text(f"t = {times[index]:.2f} s")
+            for _ in range(40):
+                if agree(index):
+                    break
+                page.wait_for_timeout(150)
+            else:
+                pytest.fail(f"the scene does not show t = {times[index]:.2f} s")
+        shares = (np.array(columns) - columns[0]) / (columns[-1] - columns[0])
+        np.testing.assert_allclose(shares, np.array(instants) / instants[-1], atol=0.02)
+        assert columns[-1] - columns[0] > 150
+
+
+def test_two_plans_are_compared(page, folder, tmp_path):
+    with serve(read(str(folder / "line.nc"), other=str(folder / "slow.nc")), port=0) as url:
+        open_viewer(page, url, 1200, 700)
+        page.keyboard.press("End")
+        playwright.expect(page.locator(".towline-time")).to_have_text("t = 4.00 s")
+        last = xr.load_dataset(folder / "slow.nc")["tensions"][-1]
+        beside = [float(text.removesuffix(" N")) for text in page.locator(".towline-other").all_inner_texts()]
+        np.testing.assert_allclose(beside, last, atol=0.0051)
+        playwright.expect(page.locator(".towline-readout")).to_contain_text("platforms 0.102 m apart")
+        page.screenshot(path=tmp_path / "compared.png")
+
+
+@pytest.fixture
+def foreign_page():
+    """The address of an empty page that another server of this machine serves."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Empty)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+    server.server_close()
+
+
+def test_a_page_of_another_site_cannot_open_the_socket(browser, foreign_page):
+    """The same words in the page of the viewer itself open it."""
+    with serve(read("planar-4"), port=0) as url:
+        socket = f"ws://{urlsplit(url).netloc}"
+        script = f"""() => new Promise((done) => {{
+            const socket = new WebSocket("{socket}", "viser-v{version("viser")}");
+            socket.onopen = () => done("open");
+            socket.onerror = () => done("refused");
+        }})"""
+        told = {}
+        for name, address in (("own", url), ("other", foreign_page)):
+            page, messages = browser.new_page(), []
+            page.on("console", lambda message, to=messages: to.append(message.text))
+            page.goto(address)
+            told[name] = page.evaluate(script), " ".join(messages)
+            page.close()
+        assert told["own"][0] == "open"
+        assert told["other"][0] == "refused"
+        assert "403" in told["other"][1]
+
+
+def test_on_a_phone_the_page_from_disk_shows_the_whole_robot(page, tmp_path):
+    subject = read("cogiro")
+    page.set_viewport_size({"width": 400, "height": 800})
+    page.goto(save_page(subject, tmp_path / "cogiro.html").as_uri())
+    robot, spots = subject.robot, None
+    for _ in range(40):
+        page.wait_for_timeout(250)
+        if page.locator("canvas").count():
+            spots = pixels(page, subject, np.vstack([robot.home_anchors, robot.home_attachments]), free=1.0)
+            if dark_near(picture(page, tmp_path / "phone.png"), spots).mean() > 0.6:
+                break
+    else:
+        pytest.fail("the ends of the cables are elsewhere")
+    assert (spots > 0).all()
+    assert (spots < [400, 800]).all()
+    assert np.ptp(spots[:, 0]) > 150

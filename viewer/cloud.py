@@ -9,8 +9,8 @@ import xarray as xr
 
 from ..errors import InputError
 from ..figures import style
+from ..figures.tension_colours import rgb
 from ..text import quantity
-from .colours import rgb
 from .geometry import FARTHEST
 
 MOST_POINTS = 10_000  # more hide the robot among them

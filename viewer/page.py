@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..figures.tension_colours import place, shades
 from . import words
-from .colours import place, shades
 from .instant import Instant
 
 if TYPE_CHECKING:
@@ -37,6 +37,30 @@ if (FRAMES.times.length > 1) setInterval(() => {
   });
 }, 40);
 """
+
+
+# viser's player takes its camera from the address of the page; files differ from their addresses only after a "?".
+CAMERA = """
+if (innerWidth < innerHeight) {
+  const aspect = innerWidth / innerHeight, place = CENTRE.map((x, i) => x + ALONG[i] * NEAREST / aspect);
+  history.replaceState(null, "", `?initialCameraPosition=${place}&initialCameraLookAt=${CENTRE}` + location.hash);
+}
+"""
+
+
+def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
+    """Return the script that moves the initial camera away from the robot on a screen that is higher than wide.
+
+    Parameters
+    ----------
+    centre, along
+        Where it looks, and the direction from there to the camera, (3,) in {G} [m].
+    nearest
+        Its distance on a screen that is wider than high [m].
+    """
+    values = {"CENTRE": centre.tolist(), "ALONG": along.tolist(), "NEAREST": nearest}
+    constants = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
+    return f"<script>{{ const {constants};{CAMERA}}}</script>"
 
 
 def aside(subject: Subject, frames: list[Instant], cell: float) -> str:

@@ -18,10 +18,10 @@ from ..writing import whole_file
 from .access import guarded
 from .geometry import Geometry
 from .instant import at_rest
-from .page import aside
+from .page import aside, camera
 from .panel import Panel
 from .posing import home_at_rest
-from .stage import Stage
+from .stage import ALONG, Stage
 
 if TYPE_CHECKING:
     import viser
@@ -115,7 +115,8 @@ def _page(subject: Subject) -> str:
     title = escape(subject.title)
     head, _, rest = document.partition("<head>")
     body, end, tail = rest.rpartition("</body>")
-    return f"{head}<head><title>{title}</title>{body}{aside(subject, frames, stage.cell)}{end}{tail}"
+    own = f"<title>{title}</title>{camera(stage.centre, ALONG, stage.nearest)}"
+    return f"{head}<head>{own}{body}{aside(subject, frames, stage.cell)}{end}{tail}"
 
 
 def _check_address(host: str, port: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from ..figures import style
 from ..figures.hull import faces
 from ..figures.robot import box_edges
+from ..figures.tension_colours import place, rgb, shades
 from ..text import quantity
 from . import words
-from .colours import place, rgb, shades
 from .geometry import Extent, Geometry
 from .instant import Instant, arrow, typical_force
 from .shapes import posts, rotors, sheaves
@@ -28,8 +29,11 @@ WIDE = 1.4  # width over height of a picture
 CABLE_WIDTH = 4.0  # [pixels]
 THIN = 1.5
 BLACK, GREY = (0, 0, 0), (150, 150, 150)
+DOT = 0.008  # of the robot's size: diameter of the ends of cables
 HEAD = 0.25  # of an arrow's length
 BARBS = 12
+AIMS = 50  # of a camera, that are remembered
+ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
 CELLS = 10  # of the grid along the robot's size, about
 
 
@@ -46,6 +50,13 @@ class Stage:
         The geometry of its robot.
     captioned
         Show time, status and margin in the scene, for a page without a panel.
+
+    Attributes
+    ----------
+    centre
+        Where the initial camera looks, (3,) in {G} [m].
+    nearest
+        The distance from there at which the robot fits into a picture that is wider than high [m].
     """
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
@@ -55,7 +66,8 @@ class Stage:
         if subject.other is not None:
             extent = Extent.of(*extent, *subject.other.extent)
         self._extent = extent
-        self._size, self._centre = extent.size, (extent.low + extent.high) / 2
+        self._size, self.centre = extent.size, (extent.low + extent.high) / 2
+        self.nearest = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2)
         self.frame(server.initial_camera, WIDE, 1.0)
         self._draw_surroundings(subject)
         self._make_actors(captioned)
@@ -85,7 +97,8 @@ class Stage:
             self._sheaves.visible = len(rings) > 0
             if len(rings):
                 self._sheaves.points = rings.astype(np.float32)
-        self._ends.points = np.concatenate([points.anchors, points.attachments]).astype(np.float32)
+        for dots, ends in zip(self._ends, (points.anchors, points.attachments), strict=True):
+            dots.points = ends.astype(np.float32)
         _place(self._platform, instant.pose)
         for handle, pose in zip(self._carriers, instant.carriers, strict=True):
             if handle is not None:
@@ -146,30 +159,39 @@ class Stage:
             Of its picture [pixels].
         """
         free = 1.0 - words.SHEET_SHARE if width < height else 1.0
-        along = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])
-        away = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2) / min(width / height, free, 1.0)
-        side = np.cross([0.0, 0.0, 1.0], along)
-        upwards = np.cross(along, side / np.linalg.norm(side))
+        away = self.nearest / min(width / height, free, 1.0)
+        side = np.cross([0.0, 0.0, 1.0], ALONG)
+        upwards = np.cross(ALONG, side / np.linalg.norm(side))
         # The middle of what the panel leaves free, above the middle of the picture.
-        centre = self._centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
-        camera.position = centre + away * along
+        centre = self.centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
+        camera.position = centre + away * ALONG
         camera.look_at = centre
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 
     def mind(self, client: viser.ClientHandle) -> None:
-        """Frame the robot in a picture that is higher than wide, now and whenever its camera is the initial one.
+        """Frame the robot in a picture that is higher than wide, now and whenever a screen is turned.
 
-        The initial camera may reach a browser after this one, and a user can return to it.
+        The initial camera may reach a browser after this one, and a user can return to it. A camera that a user has
+        pointed elsewhere stays.
         """
         camera = client.camera
-        if camera.image_width < camera.image_height:
-            self.frame(camera, camera.image_width, camera.image_height)
+        framed, aims = (WIDE, 1.0), deque([self.centre], AIMS)
 
-            @camera.on_update
-            def _(_: viser.CameraHandle) -> None:
-                if np.abs(camera.look_at - self._centre).max() < 1e-3 * self._size:
-                    self.frame(camera, camera.image_width, camera.image_height)
+        def fit() -> None:
+            nonlocal framed
+            shape, looked_at = (float(camera.image_width), float(camera.image_height)), camera.look_at
+            # An update may be older than the framing before it, so the places before count too.
+            untouched = min(np.abs(looked_at - aim).max() for aim in (self.centre, *aims)) < 1e-3 * self._size
+            initial = np.abs(looked_at - self.centre).max() < 1e-3 * self._size
+            upright, was_upright = shape[0] < shape[1], framed[0] < framed[1]
+            if untouched and ((upright and initial) or (shape != framed and (upright or was_upright))):
+                framed = shape
+                self.frame(camera, *shape)
+                aims.append(np.array(camera.look_at))
+
+        fit()
+        camera.on_update(lambda _: fit())
 
     def _draw_surroundings(self, subject: Subject) -> None:
         scene, cell = self._scene, self.cell
@@ -177,7 +199,7 @@ class Stage:
         scene.configure_default_lights(cast_shadow=False)
         width = 2 * cell * np.ceil(self._size / cell)
         # A little below, where no platform lies in it.
-        floor = np.array([*(np.round(self._centre[:2] / cell) * cell), self._extent.low[2] - 0.03 * self._size])
+        floor = np.array([*(np.round(self.centre[:2] / cell) * cell), self._extent.low[2] - 0.03 * self._size])
         scene.add_grid(
             "/grid",
             width=width,
@@ -232,10 +254,13 @@ class Stage:
             )
             for index in range(robot.m)
         ]
-        ends = np.zeros((2 * robot.m, 3), np.float32)
-        self._ends = scene.add_point_cloud(
-            "/ends", ends, BLACK, point_size=0.008 * size, point_shape="circle", precision="float32"
-        )
+        ends = np.zeros((robot.m, 3), np.float32)
+        # Dots on a platform much smaller than the robot would hide it.
+        small = min(DOT * size, 0.25 * float(np.ptp(robot.attachments, axis=0).max()) or DOT * size)
+        self._ends = [
+            scene.add_point_cloud(name, ends, BLACK, point_size=dot, point_shape="circle", precision="float32")
+            for name, dot in (("/ends/anchors", DOT * size), ("/ends/attachments", small))
+        ]
         self._sheaves = None
         if robot.pulley_radii.any():
             self._sheaves = scene.add_line_segments(
@@ -244,7 +269,7 @@ class Stage:
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
         com = np.array([robot.platform.com], np.float32)
-        scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=0.012 * size, point_shape="circle")
+        scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=1.5 * small, point_shape="circle")
         self._carriers: list[viser.FrameHandle | None] = []
         for index, carrier in enumerate(robot.carriers):
             if not carrier.drawing.body:
@@ -274,7 +299,7 @@ class Stage:
             visible=False,
         )
         self._short = scene.add_label("/shortfall", "", anchor="bottom-center", visible=False)
-        above = np.array([*self._centre[:2], self._extent.high[2] + 0.12 * size])
+        above = np.array([*self.centre[:2], self._extent.high[2] + 0.12 * size])
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
     def _make_shadow(self, path: np.ndarray) -> None:

@@ -10,16 +10,17 @@ from html import escape
 import numpy as np
 
 from ..figures import style
+from ..figures.tension_colours import NO_TENSION, place, shades
 from ..models import Robot
 from ..models.part import COORDINATES
 from ..text import quantity, quantity_range
-from .colours import NO_TENSION, place, shades
 from .instant import Instant, arrow
 from .subject import Subject
 
 MUTED = "#595959"
 GHOST = style.colour(2)  # of the reference of a flight
 OTHER = "#444444"  # of the plan or flight that is compared
+PART, BLACK = "#969696", "#000000"  # of posts; of pulleys and rotors
 STOPS = 9  # of the legend's gradient
 COLUMNS = (("cable", "left", 0), ("tension", "right", 10), ("", "left", 0), ("limits [N]", "left", 10))
 # On screens below 36 em, viser's panel is a sheet of 20 em that covers 60 % of the height.
@@ -126,6 +127,9 @@ def legend(subject: Subject, cell: float) -> str:
         f"<span>{_limit('t_max', robot.t_max)}</span></div>"
     )
     marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
+    marks += [("post below an anchor", PART)] if not all(carrier.moves for carrier in robot.carriers) else []
+    marks += [("pulley (its sheave)", BLACK)] if robot.pulley_radii.any() else []
+    marks += [("quadrotor (arms and rotors)", BLACK)] if any(c.drawing.arm for c in robot.carriers) else []
     marks += [("path of the platform", style.colour(0))] if subject.replay else []
     marks += [("reference of the platform", GHOST)] if subject.kind == "flight" else []
     marks += [("platform, cables and path of the other", OTHER)] if subject.other else []

@@ -144,6 +144,8 @@ def _structure() -> Drawing:
         [carrier.name for carrier in robot.carriers],
         [],
         tensions,
+        robot.t_min,
+        robot.t_max,
         np.empty((0, 3)),
         np.empty(0, dtype=bool),
     )

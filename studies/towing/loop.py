@@ -283,6 +283,8 @@ def _figure(found: Equilibrium) -> Drawing:
         [carrier.name for carrier in mover.carriers],
         list(zip(low, high, strict=True)),
         found.tensions,
+        mover.t_min,
+        mover.t_max,
         np.empty((0, 3)),
         np.empty(0, dtype=bool),
     )

@@ -1,4 +1,4 @@
-"""Choose the colour of a tension between its limits.
+"""Choose the colour of a tension between its limits: one scale for figures, films and viewer.
 
 A cable fails at both of its limits, and t_max is often a hundred times t_min: a linear scale would show one colour for
 all tensions near t_min. The scale is therefore logarithmic, with a hundredth of t_max added so that t_min = 0 has a
@@ -9,11 +9,20 @@ place too:
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+from ..text import quantity
+
+if TYPE_CHECKING:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
 
 FINEST = 0.01  # of t_max
 PALEST = 0.12  # of the colour map: paler lines cannot be seen on white
 NO_TENSION = "#999999"
+APART = 0.11  # of the scale: labels that are closer overlap
 
 
 def place(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
@@ -34,6 +43,31 @@ def shades(places: np.ndarray) -> np.ndarray:
     rgba = np.asarray(colormaps["viridis_r"](PALEST + (1 - PALEST) * known))
     rgba = np.where(np.isnan(places)[..., None], to_rgba(NO_TENSION), rgba)
     return np.round(255 * rgba[..., :3]).astype(np.uint8)
+
+
+def scale() -> ScalarMappable:
+    """Return the colours of places from 0 to 1, for a colour bar."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    return ScalarMappable(Normalize(0.0, 1.0), ListedColormap(shades(np.linspace(0.0, 1.0, 256)) / 255.0))
+
+
+def mark(bar: Colorbar, t_min: np.ndarray, t_max: np.ndarray, size: float) -> None:
+    """Label a colour bar of `scale` with the limits (m,) [N], and tensions between them if all cables have the same.
+
+    `size` is that of the letters [points].
+    """
+    places = {0.0: "t_min", 1.0: "t_max"}
+    if np.ptp(t_min) == 0 and np.ptp(t_max) == 0:
+        places = {0.0: quantity(float(t_min[0]), digits=3), 1.0: quantity(float(t_max[0]), digits=3)}
+        exponents = range(int(np.floor(np.log10(FINEST * t_max[0]))), int(np.ceil(np.log10(t_max[0]))) + 1)
+        for tension in (step * 10.0**exponent for exponent in exponents for step in (1, 2, 5)):
+            at = float(place(np.array([tension]), t_min[:1], t_max[:1])[0])
+            if t_min[0] < tension < t_max[0] and min(abs(at - other) for other in places) > APART:
+                places[at] = quantity(tension, digits=3)
+    bar.set_ticks(list(places), labels=list(places.values()))
+    bar.ax.tick_params(labelsize=size)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
