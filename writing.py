@@ -14,7 +14,7 @@ from pathlib import Path
 from .errors import InputError
 from .inputs import printable
 
-_unfinished: set[Path] = set()
+_unfinished: dict[Path, list[Path]] = {}  # with the folders made for them, the deepest first
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -59,29 +59,34 @@ def whole_folder(path: Path) -> Iterator[Path]:
 @contextmanager
 def _beside(path: Path, target: Path, make: Callable[[], str], mode: int) -> Iterator[Path]:
     """Yield what `make` makes; it becomes `target` when the block ends, with the permissions of what it replaces."""
+    new = [folder for folder in target.parents if not folder.exists()]
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(make())
     except (OSError, ValueError) as error:
+        _remove_empty(new)
         raise _refusal(path, error) from None
-    _unfinished.add(temporary)
+    _unfinished[temporary] = new
     try:
         yield temporary
         temporary.chmod(_mode(target, mode))
         temporary.replace(target)
     except BaseException as error:
         _remove(temporary)
+        _remove_empty(new)
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             raise _refusal(path, error) from None
         raise
     finally:
-        _unfinished.discard(temporary)
+        _unfinished.pop(temporary, None)
 
 
 def remove_unfinished() -> None:
     """Remove unfinished files, for a process that ends without unwinding its blocks."""
-    for temporary in tuple(_unfinished):
+    for temporary, new in tuple(_unfinished.items()):
         with suppress(OSError):
             _remove(temporary)
+        _remove_empty(new)
 
 
 def _remove(temporary: Path) -> None:
@@ -91,13 +96,20 @@ def _remove(temporary: Path) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def _remove_empty(folders: list[Path]) -> None:
+    """Remove folders that are still empty, the deepest first."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
+
+
 def check_writable(path: Path) -> Path:
-    """Return the file behind `path` and create its folder; call this before computing its contents.
+    """Return the file behind `path`; call this before computing its contents, and before writing anything.
 
     Raises
     ------
     InputError
-        If it is a folder, a device or a pipe, or its folder cannot be written.
+        If it is a folder, a device or a pipe, or its folder cannot be written or created.
     """
     where = printable(str(path))
     try:
@@ -106,9 +118,12 @@ def check_writable(path: Path) -> Path:
             raise InputError(f"{where} must be the path of a file, got a folder")
         if target.exists() and not stat.S_ISREG(target.stat().st_mode):
             raise InputError(f"{where} must be the path of a file, got a device or a pipe")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if not os.access(target.parent, os.W_OK):
-            raise PermissionError(13, "Permission denied")
+        # A command that is refused later must leave no empty folder behind: none is created here.
+        nearest = next(folder for folder in target.parents if folder.exists())
+        if not nearest.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not os.access(nearest, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except InputError:
         raise
     except (OSError, ValueError, RuntimeError) as error:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from towline.errors import InputError
-from towline.writing import check_writable, whole_file, whole_folder
+from towline.writing import check_writable, remove_unfinished, whole_file, whole_folder
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
@@ -41,6 +41,27 @@ def test_folders_devices_and_pipes_are_refused(tmp_path):
         with pytest.raises(InputError, match=kind), whole_file(path):
             pass
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+def test_a_check_creates_no_folder_and_a_failure_leaves_none(tmp_path):
+    file = tmp_path / "new" / "deep" / "robot.yaml"
+    assert check_writable(file) == file
+    assert not os.listdir(tmp_path)
+    with pytest.raises(ZeroDivisionError), whole_file(file) as temporary:
+        temporary.write_text(f"{1 / 0}")
+    assert not os.listdir(tmp_path)
+    with whole_file(file) as temporary:  # what a command does that ends without unwinding
+        remove_unfinished()
+        assert not os.listdir(tmp_path)
+        temporary.parent.mkdir(parents=True)
+        temporary.write_text("robot")
+    assert file.read_text() == "robot"
+
+
+def test_a_folder_below_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"file/new/robot\.yaml: cannot be written \(Not a directory\)"):
+        check_writable(tmp_path / "file" / "new" / "robot.yaml")
 
 
 def test_links_are_followed_and_permissions_kept(tmp_path):

@@ -59,3 +59,24 @@ def test_a_wrong_fault_is_named_as_the_option_with_its_text(folder, fault):
     done = CliRunner().invoke(app, ["simulate", "wang-flying", "rest.nc", "--fault", "cut 2 at 0.1", "--fault", fault])
     assert isinstance(done.exception, InputError)
     assert str(done.exception).startswith(f"--fault {fault!r} must ")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "calibrate wang-flying none.csv --figures new",
+        "calibrate wang-flying rest.yaml --figures new/deep --out other/robot.yaml",
+        "import caspr nothing --out new/robot.yaml",
+        "plan wang-flying rest.yaml --figures new --robust 2",
+        "plan wang-flying rest.yaml --vary margin=0:1:1 --keep new --workers 0",
+        "simulate wang-flying rest.yaml --figures new",
+        "workspace wang-flying --out new/x.nc --samples 0",
+        "bench tension --m 99 --out new",
+        "view nothing --html new/page.html",
+        "time wang-flying rest.yaml --out new/task.yaml",
+    ],
+)
+def test_a_refused_command_leaves_no_folder(folder, command):
+    done = CliRunner().invoke(app, command.split())
+    assert isinstance(done.exception, InputError)
+    assert [path.name for path in folder.iterdir()] == ["rest.yaml"]
