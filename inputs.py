@@ -27,7 +27,7 @@ __all__ = [
 Kind = TypeVar("Kind")
 
 _LONGEST = 60  # letters of a value in a message
-LONGEST_TEXT = 400  # letters of a path or of a part of a message
+LONGEST_TEXT = 240  # letters of a path or of a part of a message
 
 
 def shown(value: object) -> str:
@@ -35,10 +35,9 @@ def shown(value: object) -> str:
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of shape {value.shape}"
     try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # an int of more than 4300 digits
+        return printable(" ".join(repr(value).split()), _LONGEST)
+    except Exception:  # an int of more than 4300 digits, lists within lists without end, a class of the user's
         return f"{type(value).__name__} without a short form"
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def printable(text: str, longest: int = LONGEST_TEXT) -> str:
@@ -56,7 +55,7 @@ def required(name: str, value: object, kind: type[Kind]) -> Kind:
 
 def number(name: str, value: object, least: float, most: float, also: str = "") -> float:
     """Return a number from `least` to `most`, or raise InputError; `also` adds to the message what else is accepted."""
-    if isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool):
+    if isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool | np.timedelta64):
         # A whole number may have no float.
         as_float = np.inf if isinstance(value, int) and abs(value) > 10**300 else float(value)
         if least <= as_float <= most:
@@ -66,7 +65,7 @@ def number(name: str, value: object, least: float, most: float, also: str = "") 
 
 def whole_number(name: str, value: object, least: int, most: int) -> int:
     """Return a whole number from `least` to `most`, or raise InputError."""
-    if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:
+    if isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64) and least <= value <= most:
         return int(value)
     raise InputError(f"{name} must be a whole number from {least} to {most}, got {shown(value)}")
 
@@ -104,10 +103,12 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
     """Return `value` as an array of real numbers, without a copy where it is one, or raise InputError."""
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError, OverflowError):
+    except Exception:  # whatever the array interface of another library raises
         raise InputError(
             f"{name} must be an array of real numbers, got {shown(value)} (rows of unequal length?)"
         ) from None
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise InputError(f"{name} must be an array of real numbers without masked entries, got {shown(value)}")
     if array.dtype.kind not in "fiu":
         given = shown(value) if array.ndim == 0 else f"entries of type {array.dtype.name}"
         raise InputError(f"{name} must be an array of real numbers, got {given}")
@@ -116,8 +117,10 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
 
 def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return a float64 copy of `value` of this shape, or raise InputError unless all its numbers are finite."""
-    array = np.array(real_array(name, value), dtype=np.float64)
-    if array.shape != shape or not np.isfinite(array).all():
-        given = shown(array.tolist()) if array.shape == shape else f"an array of shape {array.shape}"
-        raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got {given}")
+    given = real_array(name, value)
+    if given.shape != shape:  # before the copy: a view of one number may have any shape
+        raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got one of shape {given.shape}")
+    array = np.array(given, dtype=np.float64)
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got {shown(array.tolist())}")
     return array

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import io
 import sys
+import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,13 +13,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .errors import InputError
-from .inputs import printable
+from .inputs import printable, shown
 from .writing import whole_file
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Contents", "Variable", "load_netcdf", "save_netcdf"]
+__all__ = ["Contents", "Variable", "check_units", "load_netcdf", "save_netcdf"]
+
+# Of motions and their tensions, of the platform and of carriers.
+UNITS = {"time": "s", "pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2", "tensions": "N"}
 
 
 class Variable(NamedTuple):
@@ -115,7 +119,9 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
     hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
     try:
         try:
-            return xr.load_dataset(path, engine="h5netcdf")
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of what is unusual in a file; whoever uses it checks what matters
+                return xr.load_dataset(path, engine="h5netcdf")
         except Exception as error:  # it may fail at any place of three libraries
             # HDF5 has its own message of several lines, where others have a few words.
             reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
@@ -123,3 +129,11 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
     finally:
         sys.unraisablehook = hook
     raise InputError(f"{refusal} ({reason})")
+
+
+def check_units(name: str, attributes: Mapping[Any, Any]) -> None:
+    """Raise InputError if a variable of a motion states other units than towline writes; it may state none."""
+    accepted = UNITS.get(name.removeprefix("carrier_").removeprefix("reference_"), "")
+    given = attributes.get("units", accepted)
+    if accepted and not (isinstance(given, str) and given == accepted):
+        raise InputError(f"{name} must have the units {accepted!r}, got {shown(given)}")

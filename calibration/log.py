@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..inputs import file_path, printable, shown
 from ..models.parsing import read_bytes
 from ..models.part import COORDINATES
+from ..netcdf import check_units
 from .measurements import Measurements, Sigma
 
 __all__ = ["read_measurements", "save_measurements"]
@@ -205,7 +206,7 @@ def _from_netcdf(content: bytes) -> dict[str, Any]:
             continue
         if "units" not in attributes:
             raise InputError(f"variable {name} must have the attribute units, got none")
-        columns[name] = _Column(values.astype(float) * _factor(name, str(attributes["units"])), f"variable {name}")
+        columns[name] = _Column(_floats(values) * _factor(name, str(attributes["units"])), f"variable {name}")
     sizes = {column.values.size for column in columns.values()}
     if len(sizes) > 1:
         raise InputError(f"variables must have one size, got {', '.join(str(size) for size in sorted(sizes))}")
@@ -223,6 +224,12 @@ def _attributes(of: Any) -> dict[str, Any]:
     return result
 
 
+def _floats(values: np.ndarray) -> np.ndarray:
+    """Return values as they can be computed with: a damaged file may hold nan that raise a signal."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(float) + 0.0
+
+
 def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], stated: dict[str, Any]) -> dict[str, Any]:
     """Return the arguments of `Measurements` from a file of it or of a flight, which has no standard deviations.
 
@@ -237,9 +244,11 @@ def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], sta
         unit = str(attributes.get("units", ""))
         if unit not in units:
             raise InputError(f"the units of {name} must be one of {', '.join(units)}, got {shown(unit)}")
-        result[argument] = values.astype(float) * units[unit]
+        result[argument] = _floats(values) * units[unit]
     if "pose" in arrays:
-        result["poses"] = arrays["pose"][0].astype(float)
+        values, attributes = arrays["pose"]
+        check_units("pose", attributes)
+        result["poses"] = _floats(values)
     return result
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..inputs import one_of
+from ..inputs import check_ending, one_of
 from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
 
 SIGMA_KEYS = "lengths, position, rotation"
@@ -81,6 +81,7 @@ def calibrate(
         check_writable(figures / f"residuals.{form}")
     if check_writable(target) == log.resolve():
         raise InputError(f"--out must be another file than the log, got {target}")
+    check_ending("--out", target, ".yaml", ".yml")
     measurements = read_measurements(log, stated)
     result = find(loaded, measurements, "auto" if groups == ["auto"] else groups, known, outliers)
     file = result.save(target)

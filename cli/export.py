@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json
 
 
@@ -54,8 +55,9 @@ def export(
         else:
             typer.echo(str(folder))
         return
-    path = out or Path(f"{loaded.name}{'.xml' if mjcf else '.c'}")
-    check_writable(path)
+    ending = ".xml" if mjcf else ".c"
+    path = out if out is not None else Path(f"{loaded.name}{ending}")
+    check_writable(check_ending("--out", path, ending))
     if mjcf:
         from ..models.mjcf import to_mjcf
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..inputs import check_ending
 from .options import PLAIN, Command, JsonOption, print_json
 
 app = typer.Typer(**PLAIN)
@@ -34,7 +35,7 @@ def caspr(
     from ..writing import check_writable, whole_file
 
     if out is not None:
-        check_writable(out)
+        check_writable(check_ending("--out", out, ".yaml", ".yml"))
     result = read_caspr(folder, cable_set)
     text = to_yaml(result.robot)
     if out is not None:

@@ -55,6 +55,18 @@ FormatOption = Annotated[
 ]
 
 
+SPEED, FPS = 1.0, 20.0
+SpeedOption = Annotated[float, typer.Option(help="With --animate: speed of the film; 1 is real time.")]
+FpsOption = Annotated[float, typer.Option(help="With --animate: frames per second of the film.")]
+
+
+def check_unused(speed: float, fps: float) -> None:
+    """Raise InputError if options of a film are given where none is written."""
+    for name, value, default in (("--speed", speed, SPEED), ("--fps", fps, FPS)):
+        if value != default:
+            raise InputError(f"{name} must be left out without --animate, got {value:g}")
+
+
 def print_json(value: dict[str, Any]) -> None:
     """Print as JSON; numbers that are not finite become null, since JSON has no name for them, and paths text."""
     import json

@@ -9,7 +9,18 @@ import typer
 
 from ..errors import InputError
 from ..inputs import check_ending, one_of, shown
-from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
+from .options import (
+    FPS,
+    SPEED,
+    FormatOption,
+    FpsOption,
+    JsonOption,
+    RobotArgument,
+    SpeedOption,
+    check_unused,
+    print_json,
+    print_written,
+)
 from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
 from .watching import watching
@@ -49,8 +60,8 @@ def plan(
     animate: Annotated[
         Path | None, typer.Option("--animate", help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="Speed of the film; 1 is real time.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Frames per second of the film.")] = 20.0,
+    speed: SpeedOption = SPEED,
+    fps: FpsOption = FPS,
     robust: Annotated[
         float | None,
         typer.Option(
@@ -93,6 +104,8 @@ def plan(
     from ..figures.style import FORMATS
 
     one_of("--format", form, FORMATS)
+    if animate is None:
+        check_unused(speed, fps)
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:

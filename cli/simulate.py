@@ -12,7 +12,19 @@ import typer
 from ..errors import InputError
 from ..inputs import check_ending, one_of, printable, shown
 from ..processors import one_thread_each
-from .options import FormatOption, JsonOption, RobotArgument, numbers, print_json, print_written
+from .options import (
+    FPS,
+    SPEED,
+    FormatOption,
+    FpsOption,
+    JsonOption,
+    RobotArgument,
+    SpeedOption,
+    check_unused,
+    numbers,
+    print_json,
+    print_written,
+)
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
 from .stopping import add_to_message
 from .watching import COMPILING, counting, watching
@@ -91,8 +103,8 @@ def simulate(
     animate: Annotated[
         Path | None, typer.Option("--animate", help="Film of the flight to write: .gif, or .mp4 with ffmpeg.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="Speed of the film; 1 is real time.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Frames per second of the film.")] = 20.0,
+    speed: SpeedOption = SPEED,
+    fps: FpsOption = FPS,
     as_json: JsonOption = False,
 ) -> None:
     """Fly a plan with a controller, in wind, with slack cables, sensors and faults.
@@ -104,6 +116,8 @@ def simulate(
 
     one_of("--controller", controller, CONTROLLERS)
     one_of("--format", form, FORMATS)
+    if animate is None:
+        check_unused(speed, fps)
     many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
     for name, given in many.items():
         if given and runs is None:

@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from ..inputs import check_ending
 from .options import JsonOption, print_json, robot_names
 from .stopping import unlisten
 
+HOST, PORT = "127.0.0.1", 8080
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -32,8 +34,8 @@ def view(
     robot: Annotated[
         str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")
     ] = None,
-    host: Annotated[str, typer.Option(help="Address to listen on; 127.0.0.1: this machine only.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen on; if it is in use, one of the next; 0: any.")] = 8080,
+    host: Annotated[str, typer.Option(help="Address to listen on; 127.0.0.1: this machine only.")] = HOST,
+    port: Annotated[int, typer.Option(help="Port to listen on; if it is in use, one of the next; 0: any.")] = PORT,
     as_json: JsonOption = False,
 ) -> None:
     """Show a robot to pose, plans or flights that play, or a workspace, in the browser (extra viewer)."""
@@ -43,6 +45,9 @@ def view(
     from ..writing import check_writable
 
     if html is not None:
+        for name, differs in (("--host", host != HOST), ("--port", port != PORT)):
+            if differs:
+                raise InputError(f"{name} must be left out with --html: a page needs no server")
         check_writable(check_ending("--html", html, ".html", ".htm"))
     subject = read(target, robot, other)
     summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})

@@ -36,7 +36,7 @@ def load(name: str | os.PathLike[str]) -> Robot:
     if close:
         hint = f"did you mean {close[0]!r}? `towline robots` lists all"
         raise InputError(f"no robot {shown(text)} in the library; {hint}")
-    raise InputError(f"no robot or file {shown(text)}; the library has {', '.join(available())}")
+    raise InputError(f"no robot or file {shown(text)}; `towline robots` lists the library")
 
 
 def as_robot(robot: object) -> Robot:

@@ -19,10 +19,11 @@ from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.scanner import Scanner, ScannerError
 
 from ..errors import InputError
-from ..inputs import LONGEST_TEXT, file_path, printable, shown
+from ..inputs import LONGEST_TEXT, check_ending, file_path, printable, shown
 from ..writing import whole_file
 from .schema import json_schema
 
+ENDINGS = (".yaml", ".yml")
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
 NAMES = 'must have only letters, digits, ".", "_" and "-", and begin with a letter or digit'  # `part.Name`
@@ -45,9 +46,9 @@ def save_yaml(model: BaseModel, file: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the file cannot be written, or its name does not end in .yaml or .yml.
     """
-    path = file_path("file", file)
+    path = check_ending("file", file_path("file", file), *ENDINGS)
     with whole_file(path) as temporary:
         temporary.write_text(to_yaml(model), encoding="utf-8")
     return path
@@ -183,11 +184,20 @@ def _misspelt_kind(detail: Any, model: type[BaseModel]) -> Any:
 def _plainly(message: str) -> str:
     """Return pydantic's message without its preamble, as "must be ..." where it has that form."""
     message = message.removeprefix("Value error, ")
-    message = re.sub(r"^Input should ", "must ", message).replace("a valid tuple", "a list")
+    message = (
+        re.sub(r"^Input should ", "must ", message)
+        .replace("a valid tuple", "a list")
+        .replace("a valid dictionary", "a mapping")
+    )
     return message[:1].lower() + message[1:]
 
 
 _TYPE = re.compile(r"(function-(after|before|plain|wrap)|literal|tuple|constrained-\w+)\[.*\]$")  # as pydantic names it
+
+
+def _type_in(place: tuple[Any, ...]) -> int | None:
+    """Return where pydantic's place of an error names a type first; None if nowhere."""
+    return next((i for i, key in enumerate(place) if _TYPE.match(str(key))), None)
 
 
 def _without_branches(details: list[Any]) -> list[Any]:
@@ -197,17 +207,17 @@ def _without_branches(details: list[Any]) -> list[Any]:
     all types report what they accept.
     """
     details = [detail | {"msg": _plainly(detail["msg"])} for detail in details]
+    places = {detail["loc"][:at] for detail in details if (at := _type_in(detail["loc"])) is not None}
+    groups: dict[Any, list[Any]] = {}  # by the place of the choice, or by number where there is none
+    for number, detail in enumerate(details):
+        starts = (detail["loc"][:i] for i in range(len(detail["loc"])))
+        groups.setdefault(next((start for start in starts if start in places), number), []).append(detail)
     result: list[Any] = []
-    while details:
-        first = details[0]
-        place = first["loc"]
-        at = next((i for i, key in enumerate(place) if _TYPE.match(str(key))), None)
-        if at is None:
-            result.append(first)
-            details = details[1:]
+    for place, branches in groups.items():
+        if isinstance(place, int):
+            result += branches
             continue
-        branches = [one for one in details if one["loc"][:at] == place[:at]]
-        details = [one for one in details if one["loc"][:at] != place[:at]]
+        first, at = branches[0], len(place)
         taking = [one for one in branches if one["type"] not in ("float_type", "literal_error", "tuple_type")]
         listed = [one for one in branches if str(one["loc"][at]).startswith("tuple[") and one["type"] != "tuple_type"]
         if isinstance(first["input"], dict) and taking:
@@ -218,7 +228,7 @@ def _without_branches(details: list[Any]) -> list[Any]:
             plain = [one["msg"] for one in branches if not one["type"].startswith("model")]
             first_one, *rest = dict.fromkeys(plain)
             rest = [text.removeprefix("must be ") for text in rest]
-            result.append(first | {"loc": place[:at], "msg": " or ".join([first_one, *rest])})
+            result.append(first | {"loc": place, "msg": " or ".join([first_one, *rest])})
     return result
 
 

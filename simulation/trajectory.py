@@ -7,13 +7,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..inputs import file_path, number, real_array, shown
 from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
-from ..netcdf import load_netcdf
+from ..netcdf import check_units, load_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["Trajectory", "read_trajectory"]
 
 ACCEPTED = "a plan, the NetCDF file of one, a timing, a path or a pose (6,)"
+SHORTEST = 1e-9  # between two samples [s]
+_PARTS = ("pose", "velocity", "acceleration")
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -127,22 +130,11 @@ def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
 
 def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes."""
-    missing = [
-        name
-        for name in (
-            "pose",
-            "velocity",
-            "acceleration",
-            "carrier_pose",
-            "carrier_velocity",
-            "carrier_acceleration",
-            "time",
-        )
-        if name not in dataset
-    ]
+    needed = (*_PARTS, *(f"carrier_{part}" for part in _PARTS), "time")
+    missing = [name for name in needed if name not in dataset]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
-    if "phase_load" in dataset and (loads := dataset["phase_load"].values).any():
+    if "phase_load" in dataset and (loads := _array(dataset, "phase_load")).any():
         raise InputError(
             f"reference must be a plan without loads, which flights do not carry, got one of {loads.max():g} kg"
         )
@@ -151,23 +143,21 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     count, m = len(robot.carriers), robot.m
     if (name and name != robot.name) or dataset["carrier_pose"].shape[1:] != (count, 6):
         raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
-    nodes = dataset["time"].values
-    platform = [np.array(dataset[part].values, dtype=float) for part in ("pose", "velocity", "acceleration")]
-    carriers = [
-        np.array(dataset[f"carrier_{part}"].values, dtype=float) for part in ("pose", "velocity", "acceleration")
-    ]
+    nodes = _array(dataset, "time", (-1,))
+    n = len(nodes)
+    platform = [_array(dataset, part, (n, 6)) for part in _PARTS]
+    carriers = [_array(dataset, f"carrier_{part}", (n, count, 6)) for part in _PARTS]
     for poses in (platform[0], carriers[0]):  # those of a flight are measured, and may jump by turns
         poses[..., 3:] = np.unwrap(poses[..., 3:], axis=0)
-    if len(nodes) < 2 or not all(np.isfinite(part).all() for part in (nodes, *platform, *carriers)):
-        raise InputError("reference must be a plan of finite poses at two times or more")
+    if n < 2 or nodes[0] < 0 or np.diff(nodes).min() < SHORTEST:
+        given = f"{n} of them from {nodes[0]:g} s to {nodes[-1]:g} s" if n else "none"
+        raise InputError(f"reference must be a plan of two times or more that increase from 0 s on, got {given}")
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
-    planned = dataset["tensions"].values if "tensions" in dataset else np.full((len(nodes), m), np.nan)
+    planned = _array(dataset, "tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
-    if planned.shape[1:] != (m,):
-        raise InputError(f"reference must be a plan of {m} cables, got one of {planned.shape[1]}")
     if not known.any():
         return Trajectory(float(nodes[-1]), at)
 
@@ -175,6 +165,29 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
     return Trajectory(float(nodes[-1]), at, tensions)
+
+
+def _array(
+    dataset: xr.Dataset, name: str, shape: tuple[int, ...] | None = None, gaps: bool = False
+) -> NDArray[np.float64]:
+    """Return a copy of a variable's numbers, of any shape or of this one; nan only with `gaps`, for what is not known.
+
+    Raises
+    ------
+    InputError
+        If they are anything else.
+    """
+    check_units(name, dataset[name].attrs)
+    values = dataset[name].values
+    accepted = f"numbers up to {LARGEST:g}" + ("" if shape is None else f" of shape {shape}".replace("-1", "n"))
+    fits = shape is None or (len(shape) == values.ndim and shape in (values.shape, (-1,)))
+    if values.dtype.kind not in "fiu" or not fits:
+        given = f"{values.dtype.name} of shape {values.shape}"
+        raise InputError(f"reference must be a plan whose {name} has {accepted}, got {given}")
+    wrong = values[~((np.abs(values) <= LARGEST) | (gaps & np.isnan(values)))]
+    if wrong.size:
+        raise InputError(f"reference must be a plan whose {name} has {accepted}, got {wrong[0]:g}")
+    return values.astype(np.float64)
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..inputs import shown
+from ..inputs import number, shown, whole_number
 from .stage_problem import Array, StageProblem
 from .stages import layout, machine
 from .stages.sizes import padded, places
@@ -127,10 +127,7 @@ def solve_horizon(
     """
     if not isinstance(problem, StageProblem):
         raise InputError(f"problem must be a StageProblem, got {type(problem).__name__}")
-    if not isinstance(iterations, int | np.integer) or isinstance(iterations, bool) or not 1 <= iterations <= 1000:
-        raise InputError(f"iterations must be a whole number from 1 to 1000, got {shown(iterations)}")
-    if not isinstance(tolerance, int | float) or isinstance(tolerance, bool) or not 1e-12 <= tolerance <= 1:
-        raise InputError(f"tolerance must be a number from 1e-12 to 1, got {shown(tolerance)}")
+    iterations, tolerance = whole_number("iterations", iterations, 1, 1000), number("tolerance", tolerance, 1e-12, 1.0)
     horizon = Horizon(problem.N, problem.n, problem.m, problem.p)
     horizon.iterations_max, horizon.tolerance = int(iterations), float(tolerance)
     for name in _FIELDS:
@@ -186,10 +183,9 @@ class Horizon:
     """
 
     def __init__(self, N: int, n: int, m: int, rows: int = 0):
-        for name, value, least in (("N", N, 1), ("n", n, 1), ("m", m, 1), ("rows", rows, 0)):
-            if not isinstance(value, int | np.integer) or isinstance(value, bool) or not least <= value <= 1000:
-                raise InputError(f"{name} must be a whole number from {least} to 1000, got {shown(value)}")
-        self._sizes = int(N), int(n), int(m), int(rows)
+        N, n, m = (whole_number(name, value, 1, 1000) for name, value in (("N", N), ("n", n), ("m", m)))
+        rows = whole_number("rows", rows, 0, 1000)
+        self._sizes = N, n, m, rows
         self._places, size = places(*self._sizes)
         self._work = np.zeros(size)
         w, wp, mp, pp = n + m, padded(n + m), padded(m), padded(rows)

@@ -6,6 +6,7 @@ of the wrong values in turn. A public function that is in neither table fails th
 
 from __future__ import annotations
 
+import functools
 import inspect
 import random
 import warnings
@@ -19,7 +20,7 @@ import numpy as np
 from pydantic import BaseModel
 
 import towline
-from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along
+from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along, viewer
 from towline.calibration import Calibration, Measurements, calibrate
 from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.inputs import printable
@@ -37,6 +38,7 @@ PACKAGES = (
     "towline.ocp",
     "towline.control",
     "towline.simulation",
+    "towline.viewer",
 )
 EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long
@@ -78,7 +80,19 @@ NOT_CALLED = {
     "Timing",
     "evaluate",  # of a condition: `holds` checks the arguments and calls it
     "load_kernels",  # compiles for half a minute
+    "serve",  # a context: the tests of the viewer enter it
 }
+
+
+class Hostile:
+    """Its text has escapes and line breaks, and it is an array only elsewhere, as those of a GPU."""
+
+    def __repr__(self) -> str:
+        return "a\n\x1b[31mb"
+
+    def __array__(self, *_: Any, **__: Any) -> np.ndarray:
+        raise TypeError("not an array")
+
 
 WRONG: dict[str, Any] = {
     "none": None,
@@ -113,6 +127,11 @@ WRONG: dict[str, Any] = {
     "text array": np.array(["1"] * 6),
     "dates": np.array(["2020-01-01"] * 6, dtype="datetime64[D]"),
     "huge array": np.full(6, 1e300),
+    "masked": np.ma.array(np.ones(6), mask=np.arange(6) == 2),
+    "seconds": np.timedelta64(3, "s"),
+    "hostile": Hostile(),
+    "no text": type("Silent", (), {"__repr__": lambda _: 1 / 0})(),
+    "nested": functools.reduce(lambda inner, _: [inner], range(3000), []),
 }
 
 # The first asks the network for a host of this name, the second raises what the caller's own function raises.
@@ -347,13 +366,21 @@ VALID: dict[str, Callable[[], Any]] = {
     "measured": lambda: True,
     "read_measurements.path": lambda: measurements().save("log.nc"),
     "Measurements.save.path": lambda: "other.nc",
+    "Robot.save.file": lambda: "file.yaml",
     "Calibration.save.path": lambda: "other.yaml",
+    "title": lambda: "title",
+    **{name: lambda: None for name in ("replay", "cloud", "other", "read.robot")},
+    "target": lambda: ROBOT,
+    "subject": lambda: viewer.read(ROBOT),
+    "save_page.file": lambda: "page.html",
     "result": lambda: sample(robot(), StaticEquilibrium(), samples=20),
 }
 
 # Other words by which a message may name a parameter: a file also by its path.
 ALSO = {
     "data": ("condition",),
+    "read.target": ("robot",),
+    "read.other": ("robot",),
     "load.name": ("robot",),
     "read_measurements.path": ("log",),
     "nonsense": ("options",),

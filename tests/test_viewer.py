@@ -261,6 +261,10 @@ def test_what_cannot_be_shown_is_one_line(folder):
         ("127.0.0.1", 70000, "--port"),
         ("192.0.2.1", 0, "--host"),
         ("no.such.host.", 0, "--host"),
+        (b"bytes\0", 0, "--host"),
+        (["127.0.0.1"], 0, "--host"),
+        ("127.0.0.1", "8080", "--port"),
+        ("127.0.0.1", True, "--port"),
     ):
         with pytest.raises(InputError, match=words), serve(read("planar-4"), host, port):
             pass

@@ -54,6 +54,8 @@ def cloud(dataset: xr.Dataset, where: str) -> Cloud:
     accepted = (
         dataset["accepted"].to_numpy().astype(bool) if "accepted" in dataset else np.ones(len(positions), dtype=bool)
     )
+    if accepted.shape != positions.shape[:1]:
+        raise InputError(f"{where}: accepted must be one flag for each position, got the shape {accepted.shape}")
     shown = slice(None, None, max(-(-len(positions) // MOST_POINTS), 1))
     positions, accepted = positions[shown], accepted[shown]
     colours = np.where(accepted[:, None], rgb(ACCEPTED), rgb(REFUSED)).astype(np.uint8)
@@ -78,7 +80,10 @@ def _check_places(positions: np.ndarray, where: str) -> None:
 def _cells(dataset: xr.Dataset, where: str) -> Cloud:
     if "reached" not in dataset or dataset["reached"].dims != ("x", "y", "z"):
         raise InputError(f"{where} must be a file written by `towline workspace`, got one without positions and cells")
-    cells = np.argwhere(dataset["reached"].to_numpy() > 0)
+    reached = dataset["reached"].to_numpy()
+    if reached.dtype.kind not in "fiu":
+        raise InputError(f"{where}: reached must be an array of numbers, got {reached.dtype}")
+    cells = np.argwhere(reached > 0)
     axes = [dataset[name].to_numpy() for name in ("x", "y", "z")]
     for axis in axes:
         if axis.dtype.kind != "f":

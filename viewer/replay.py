@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..inputs import printable
 from ..models import Robot
 from ..models.parsing import parse_yaml
+from ..netcdf import check_units
 from ..ocp import Task
 from ..ocp.audits.by_phase import certified
 from ..ocp.reports.scene import outline
@@ -188,10 +189,14 @@ def _array(
     largest: float = LARGEST,
 ) -> np.ndarray:
     """Return a variable as numbers of the expected shape, -1 for any length; `gaps` permits nan."""
+    if name not in dataset.variables or dataset[name].dtype.kind not in "fiu":
+        given = f"an array of {dataset[name].dtype}" if name in dataset.variables else "none"
+        raise InputError(f"{where}: {name} must be an array of numbers, got {given}")
     try:
-        values = dataset[name].to_numpy().astype(float)
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: {name} must be an array of numbers, got {dataset[name].dtype}") from None
+        check_units(name, dataset[name].attrs)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    values = dataset[name].to_numpy().astype(float)
     fits = len(values.shape) == len(shape) and all(
         want in (-1, have) for want, have in zip(shape, values.shape, strict=True)
     )

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..inputs import file_path, required, shown, whole_number
 from ..models import Dynamics
 from ..writing import whole_file
 from .access import guarded
@@ -22,11 +23,10 @@ from .page import aside, camera
 from .panel import Panel
 from .posing import home_at_rest
 from .stage import ALONG, Stage
+from .subject import Subject
 
 if TYPE_CHECKING:
     import viser
-
-    from .subject import Subject
 
 LOOPBACK = "127.0.0.1"
 PORT = 8080
@@ -50,8 +50,9 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     Raises
     ------
     InputError
-        If viser is not installed, or host or port are not possible.
+        If `subject` is none, viser is not installed, or host or port are not possible.
     """
+    required("subject", subject, Subject)
     _check_address(host, port)
     server = _start(host, port)
     try:
@@ -84,9 +85,10 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If viser is not installed, or the file cannot be written.
+        If `subject` is none, viser is not installed, or the file cannot be written.
     """
-    path = Path(file)
+    required("subject", subject, Subject)
+    path = file_path("file", file)
     with whole_file(path) as temporary:
         temporary.write_text(_page(subject), encoding="utf-8")
     return path
@@ -121,16 +123,15 @@ def _page(subject: Subject) -> str:
 
 def _check_address(host: str, port: int) -> None:
     """Raise InputError if no server can listen on the address, because viser would wait for ever."""
-    if not 0 <= port <= 65535:
-        raise InputError(f"--port must be a number from 0 to 65535, got {port}")
+    whole_number("--port", port, 0, 65535)
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind, protocol) as trial:
             trial.bind(address)
-    except (OSError, UnicodeError) as error:
+    except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"--host must be {LOOPBACK} or another address of this machine, got {host!r} ({reason})"
+            f"--host must be {LOOPBACK} or another address of this machine, got {shown(host)} ({reason})"
         ) from None
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..inputs import printable
+from ..inputs import file_path, printable, required, shown
 from ..models import Robot, available, load
 from ..netcdf import load_netcdf
 
@@ -46,6 +47,15 @@ class Subject:
     cloud: Cloud | None = None
     other: Replay | None = None
 
+    def __post_init__(self):
+        """Raise InputError for a subject that cannot be shown."""
+        required("title", self.title, str)
+        required("robot", self.robot, Robot)
+        for name, has in (("replay", "frames"), ("cloud", "positions"), ("other", "frames")):
+            part = getattr(self, name)  # their classes take a second to import
+            if part is not None and not hasattr(part, has):
+                raise InputError(f"{name} must be that of a subject from `read`, or None, got {shown(part)}")
+
     @property
     def kind(self) -> str:
         """Return "robot", "plan", "flight" or "workspace"."""
@@ -60,7 +70,11 @@ class Subject:
         return self.other.at(self.other.index_at(instant.time), prove=False)
 
 
-def read(target: str, robot: str | None = None, other: str | None = None) -> Subject:
+def read(
+    target: str | os.PathLike[str],
+    robot: str | os.PathLike[str] | None = None,
+    other: str | os.PathLike[str] | None = None,
+) -> Subject:
     """Read a robot, a plan, a flight or a workspace.
 
     Parameters
@@ -78,14 +92,16 @@ def read(target: str, robot: str | None = None, other: str | None = None) -> Sub
     InputError
         If it is none of these, or belongs to another robot.
     """
+    path = file_path("target", target, ACCEPTED)
     if other is not None:
-        first, second = read(target, robot), read(other)
-        return _compared(first, second, printable(other))
-    path = Path(target)
+        beside = file_path("other", other, "the file of a plan or a flight, or None")
+        return _compared(read(path, robot), read(beside), printable(str(beside)))
+    where = printable(str(path))
+    name = None if robot is None else os.fspath(file_path("--robot", robot, "the name or the file of a robot"))
     if path.suffix == ".zarr" or _is_netcdf(path):
-        return _of_dataset(_open(path), printable(target), robot)
-    if robot is not None:
-        raise InputError(f"--robot must be left out unless a workspace is shown, got {robot!r} with {target}")
+        return _of_dataset(_open(path), where, name)
+    if name is not None:
+        raise InputError(f"--robot must be left out unless a workspace is shown, got {shown(name)} with {where}")
     loaded = load(target)
     return Subject(loaded.name, loaded)
 
@@ -105,7 +121,9 @@ def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
         from .replay import Replay
 
         if robot is not None:
-            raise InputError(f"--robot must be left out for a plan, which has its robot, got {robot!r} for {where}")
+            raise InputError(
+                f"--robot must be left out for a plan, which has its robot, got {shown(robot)} for {where}"
+            )
         replay = Replay(dataset, where)
         return Subject(replay.title, replay.robot, replay=replay)
     if "reached" not in dataset and "position" not in dataset:
@@ -138,7 +156,7 @@ def _open(path: Path) -> xr.Dataset:
     if not path.exists():
         raise InputError(f"{printable(str(path))} does not exist; it must be {ACCEPTED}")
     if path.is_dir() and path.suffix != ".zarr":
-        raise InputError(f"{path} must be {ACCEPTED}, got a folder")
+        raise InputError(f"{printable(str(path))} must be {ACCEPTED}, got a folder")
     refusal = f"{printable(str(path))} must be {ACCEPTED}, got a file that cannot be read"
     if path.suffix != ".zarr":
         return load_netcdf(path, refusal)
