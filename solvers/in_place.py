@@ -1,5 +1,7 @@
 """Solve batches of one shape again and again, in arrays of its own and with tensions in every case: `InPlace`."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,11 +54,25 @@ class InPlace:
         self.direction, self._info = np.zeros((rows, n)), np.zeros((rows, 2))  # (rows, n), (rows, 2)
         self._residual, self._spare = np.zeros(rows), (np.zeros((rows, n)), np.zeros((rows, 2)))
         self._lengths = np.array([length])
+        self._has_core = n <= ROWS and m <= CABLES
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Set the arguments of the core, which are these arrays and parts of them."""
+        _, n, m = self.A.shape
         per = np.array([n * m, n, m, m, m, 0, 0], dtype=float)  # one length and equal weights for all rows
         given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), self._lengths, per)
         self._exact = (n, m, 0.0, *given, self.tensions, self.direction, self._info, self._residual, self.code)
         self._soft = (n, m, RHO, *given, self.tensions, *self._spare, self._residual, self.code)
-        self._has_core = n <= ROWS and m <= CABLES
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and pickles hold: without the arguments of the core, parts of arrays no longer."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_exact", "_soft")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the arrays, and the arguments of the core as parts of them."""
+        self.__dict__.update(state)
+        self._arrange()
 
     @property
     def shortfall(self) -> Array:

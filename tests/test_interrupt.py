@@ -153,6 +153,22 @@ def test_an_interrupt_that_a_library_swallows_ends_the_command_all_the_same(tmp_
     assert not os.listdir(tmp_path)
 
 
+def test_an_interrupt_before_anything_listens_is_one_line(tmp_path):
+    code = (
+        "import os, signal, sys\n"
+        "class Interrupts:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'towline.cli.stopping':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "from towline.cli.entry import main\n"
+        "sys.meta_path.insert(0, Interrupts())\n"
+        "main()\n"
+    )
+    process = start([sys.executable, "-c", code], tmp_path)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, "", "towline: stopped\n")
+
+
 def test_an_interrupt_after_the_end_of_a_command_is_ignored(tmp_path):
     """When all is written, neither Python's own end nor the thread that listens may be cut short by Ctrl-C."""
     code = (
