@@ -12,6 +12,7 @@ from scipy.sparse import lil_matrix
 from towline.calibration import Measurements, calibrate, next_poses
 from towline.calibration.clock import begin_with_clock
 from towline.calibration.model import Model, State
+from towline.calibration.normal_equations import metric
 from towline.calibration.parameters import OF_CABLE, Parameters
 from towline.calibration.pose_track import PoseTrack
 from towline.calibration.rotations import from_vectors
@@ -315,6 +316,16 @@ def test_a_clock_offset_is_found():
     late = calibrate(robot, log, outliers=False)
     assert late.residual_after > 5e-3  # without it no fit is good
     assert calibrate(robot, log, "auto").clock == pytest.approx(0.034, abs=1e-3)
+
+
+def test_a_scale_becomes_a_length_by_that_of_its_cable():
+    """And by a thousandth of the longest where readings are nearly 0 all along."""
+    robot, sizes = load("cogiro"), np.array([1e-6, 2, 3, 4, 5, 6, 7, 8])
+    readings = np.array([[0.8], [1.2]]) * sizes
+    model = Model(Parameters(robot, ("scales",)), Measurements(readings), {}, np.ones((robot.m, 2)))
+    of_scales = metric(model)[: OF_CABLE * robot.m].reshape(robot.m, OF_CABLE)[:, 7]
+    rms = np.sqrt((readings**2).mean(axis=0))
+    np.testing.assert_allclose(of_scales, [1e-3 * rms[-1], *rms[1:]])
 
 
 def test_a_track_covers_the_time_from_its_first_to_its_last_pose():
