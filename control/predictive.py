@@ -350,7 +350,7 @@ class Predictive(ComputedTorque):
         """Return states and controls about which the dynamics are linear: those of the last solution, or a decay."""
         late = (time - self._solved) / self._steps[0]
         count = len(self._steps)
-        if late <= count:
+        if time - self._solved <= self._times[-1]:  # as where a command is taken from it
             before, share = int(late), late - int(late)
             first, second = (np.minimum(np.arange(count + 1) + before + k, count) for k in (0, 1))
             states = (1 - share) * self._guess[0][first] + share * self._guess[0][second]

@@ -10,9 +10,13 @@ from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 
 from towline.calibration import Measurements, calibrate, next_poses
+from towline.calibration.clock import begin_with_clock
 from towline.calibration.model import Model, State
+from towline.calibration.normal_equations import metric
 from towline.calibration.parameters import OF_CABLE, Parameters
+from towline.calibration.pose_track import PoseTrack
 from towline.calibration.rotations import from_vectors
+from towline.calibration.run import length_of, model_of
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
@@ -312,6 +316,39 @@ def test_a_clock_offset_is_found():
     late = calibrate(robot, log, outliers=False)
     assert late.residual_after > 5e-3  # without it no fit is good
     assert calibrate(robot, log, "auto").clock == pytest.approx(0.034, abs=1e-3)
+
+
+def test_a_scale_becomes_a_length_by_that_of_its_cable():
+    """And by a thousandth of the longest where readings are nearly 0 all along."""
+    robot, sizes = load("cogiro"), np.array([1e-6, 2, 3, 4, 5, 6, 7, 8])
+    readings = np.array([[0.8], [1.2]]) * sizes
+    model = Model(Parameters(robot, ("scales",)), Measurements(readings), {}, np.ones((robot.m, 2)))
+    of_scales = metric(model)[: OF_CABLE * robot.m].reshape(robot.m, OF_CABLE)[:, 7]
+    rms = np.sqrt((readings**2).mean(axis=0))
+    np.testing.assert_allclose(of_scales, [1e-3 * rms[-1], *rms[1:]])
+
+
+def test_a_track_covers_the_time_from_its_first_to_its_last_pose():
+    times = np.arange(8) / 10
+    track = PoseTrack(times, np.zeros((8, 3)), np.tile(np.eye(3), (8, 1, 1)), np.ones(8, bool))
+    for clock, inside in ((0.0, range(8)), (0.05, range(7)), (-0.05, range(1, 8)), (0.31, range(4)), (-0.8, [])):
+        assert np.flatnonzero(track.inside(clock)).tolist() == list(inside)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_clock_offset_is_looked_for_where_residuals_are_small_on_average(seed):
+    """Slow and noisy: residuals hardly depend on it, but offsets at which few readings are left are no better."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(seed), 0.05 * np.arange(400)
+
+    def motion(t):
+        return robot.home + [1, 0.8, 0.3, 0.1, 0.1, 0.15] * np.sin(np.outer(t, [0.21, 0.17, 0.27, 0.19, 0.24, 0.13]))
+
+    built = as_built(400, seed, poses=motion(times + 0.034), noise=0.02)
+    seen = motion(times) + draw.normal(0, 5e-4, (400, 6))
+    log = Measurements(built.readings, seen, times=times, sigma={"lengths": 1e-3, "position": 5e-4, "rotation": 5e-4})
+    model = model_of(robot, log, ("anchors", "offsets", "clock"), {})
+    start = begin_with_clock(model, length_of(robot)).x[model.parameters.clock]
+    assert start == pytest.approx(0.034, abs=0.045)
 
 
 def test_neighbours_that_are_alike_make_parameters_less_certain():

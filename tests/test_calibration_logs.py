@@ -182,6 +182,7 @@ def test_a_cut_netcdf_file_is_refused(built, tmp_path):
         ({"lengths": [[1, 2], [3]]}, "lengths must be an array of real numbers"),
         ({"lengths": [1, 2]}, r"lengths must have the shape \(N, m\), got \(2,\)"),
         ({"lengths": [[1, np.nan]]}, "lengths must be finite numbers up to 1e.09, got nan at sample 0, column 1"),
+        ({"lengths": [[1, -2e9]]}, "lengths must be finite numbers up to 1e.09, got -2e.09 at sample 0, column 1"),
         ({"poses": np.zeros((2, 5))}, r"poses must have the shape \(1, 6\), or \(1, 3\) of positions, got \(2, 5\)"),
         ({"orientations": np.zeros((1, 3))}, "orientations must be None without poses"),
         ({"poses": np.zeros((1, 3)), "orientations": [[0, 0, 0, 2]]}, "orientations must be quaternions of length 1"),

@@ -303,6 +303,7 @@ def test_a_quadrotor_that_is_heavier_than_in_its_file_stays_at_its_place():
     [
         ({"bandwidth": -1}, "bandwidth"),
         ({"bandwidth": [1, 2]}, "bandwidth"),
+        ({"bandwidth": [2, 2, 2, 2, 2, -1]}, "bandwidth"),
         ({"damping": np.nan}, "damping"),
         ({"integral": "much"}, "integral"),
         ({"observer": np.inf}, "observer"),

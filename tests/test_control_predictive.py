@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_are
 
 from towline import plan
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
@@ -12,7 +13,7 @@ from towline.control.machine import carriers_of, directions, stages
 from towline.control.moved import Freed
 from towline.control.surroundings import Surroundings, _distance
 from towline.control.tethers import AXES, TETHER_COLUMNS
-from towline.control.weights import Weights, terminal
+from towline.control.weights import Weights, terminal, weights
 from towline.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.points import placed
@@ -272,6 +273,51 @@ def test_rows_are_left_out_where_their_limit_is_far_and_never_where_it_is_exceed
         states[:, 0] = off
         surroundings.write(horizon, states, np.zeros((2, 12)), 1.0)
         assert list(horizon.C[0].any(axis=1)) == [tube, ball]
+
+
+def test_the_last_solution_serves_as_long_as_it_reaches(monkeypatch):
+    robot = load("cogiro")
+    controller, (state, reference) = Predictive(robot, observer=0.0), rest(robot)
+    first = controller.step(0.0, state, reference)
+    assert ANSWERS[first.answered] == "as planned"
+    monkeypatch.setattr(Horizon, "solve", lambda horizon, warm: None)
+    monkeypatch.setattr(Horizon, "residuals", property(lambda horizon: Residuals(*[1.0] * len(Residuals._fields))))
+    answers, reaches = [], controller._times[-1]
+    for time in np.linspace(0.2, 1.4, 7) * reaches:
+        command = controller.step(time, state, reference)
+        answers.append(ANSWERS[command.answered])
+        np.testing.assert_allclose(command.tensions, first.tensions, rtol=5e-3)
+    assert answers == ["shifted plan"] * 5 + ["as planned"] * 2
+
+
+def test_each_body_and_the_tube_has_a_row_of_its_own():
+    robot, rng = load("cogiro"), np.random.default_rng(2)
+    bodies = [{"kind": "sphere", "centre": [x, 0.5, 1], "radius": 0.5} for x in (-1, 1)]
+    states, wanted = 0.3 * rng.normal(size=(2, 3, 12))
+
+    def rows(tube, keep_out):
+        surroundings = Surroundings(robot, tube, keep_out)
+        horizon = Horizon(2, 12, 8, surroundings.rows)
+        horizon.A[:] = np.eye(12)
+        surroundings.write(horizon, states, wanted, 1.0)
+        return np.concatenate([horizon.C, horizon.d[..., None]], axis=2)
+
+    alone = [rows(0.1, []), rows(None, bodies[:1]), rows(None, bodies[1:])]
+    np.testing.assert_array_equal(rows(0.1, bodies), np.concatenate(alone, axis=1))
+    assert np.concatenate(alone, axis=1).any(axis=2).all()
+
+
+def test_deviations_of_carriers_decay_with_their_bandwidth():
+    """The poles of a double integrator with the cost of a freed coordinate, by the Riccati equation of SciPy."""
+    robot, returning = load("wang-ctmrts"), 1.7
+    reach = np.array([0.5, 0.2])
+    by = weights(robot, np.full(6, 4.0), reach, returning, 0.02, np.zeros((6, 2)))
+    A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
+    for k in range(2):
+        cost = by.controls[[robot.m + k]]
+        P = solve_continuous_are(A, B, np.diag(by.states[[12 + k, 14 + k]]), cost[None])
+        np.testing.assert_allclose(np.linalg.eigvals(A - B @ B.T @ P / cost), -returning, rtol=1e-4)
+    assert by.states[13] / by.states[12] == pytest.approx((reach[0] / reach[1]) ** 2)
 
 
 def test_a_tube_is_kept_that_a_push_would_leave():

@@ -6,6 +6,7 @@ import pytest
 from towline import Dynamics, Robot, load, tensions
 from towline.calibration import next_poses
 from towline.calibration.run import length_of
+from towline.control import Predictive
 from towline.distribution import pose_problem
 from towline.models import points
 from towline.models.diagnosis import diagnose
@@ -65,3 +66,13 @@ def test_the_poses_to_measure_next_move_with_the_robot(name):
     np.testing.assert_allclose(next_poses(there, count=4) - poses, np.tile([*AWAY, 0, 0, 0], (4, 1)), atol=1e-9)
     assert np.ptp(poses[:, :3], axis=0).max() > 0.5 * length_of(here), "they are all over the robot's workspace"
     assert 0.2 < np.abs(poses[:, 3:]).max() <= 0.3
+
+
+def test_quadrotors_elsewhere_react_as_far():
+    here = load("multi-quadrotor-3")
+    data = here.model_dump(mode="json")
+    for part in (data["platform"], *data["carriers"]):
+        part["home"] = [*(np.array(part["home"][:3]) + AWAY), *part["home"][3:]]
+    one, other = (Predictive(robot)._weights for robot in (here, Robot.model_validate(data)))
+    np.testing.assert_allclose(other.states, one.states, rtol=1e-6)
+    np.testing.assert_allclose(other.controls, one.controls, rtol=1e-6)

@@ -10,7 +10,7 @@ from towline import Dynamics, Planner, Robot, load, plan, time_along
 from towline.errors import InputError
 from towline.models import Uncertainty
 from towline.models.sensitivity import derivatives, wrench_matrices
-from towline.robust import ellipsoid_factor, motion_factor, share_of_robots, spread
+from towline.robust import _inverse, ellipsoid_factor, motion_factor, share_of_robots, spread
 
 from .warm import towline
 
@@ -237,3 +237,15 @@ def test_what_robust_does_not_go_with():
         spread(load("cogiro"), np.zeros((1, 6)), np.ones((1, 8)))
     with pytest.raises(InputError, match=r"wrench must be an array of shape \(1, 6\) of finite numbers"):
         share_of_robots(robot, robot.home[None], np.zeros(6))
+
+
+def test_what_cables_do_not_span_takes_huge_tensions():
+    """Other robots need wrenches there: an inverse that leaves them out would call everything certain."""
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(2, 3, 5))
+    A[1, 2] = A[1, 0] + A[1, 1]
+    regular, singular = _inverse(A)
+    np.testing.assert_allclose(A[0] @ regular, np.eye(3), atol=1e-12)
+    assert np.isfinite(singular).all()
+    assert np.abs(singular @ [1, 1, -1]).max() > 1e8
+    np.testing.assert_allclose(A[1] @ singular @ A[1], A[1], atol=1e-5)

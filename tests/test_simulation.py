@@ -352,7 +352,7 @@ class Wrong(Controller):
         (tuple, "must return a Command"),
         ({"tensions": np.zeros(3)}, "tensions of shape"),
         ({"tensions": np.full(8, np.nan)}, "finite tensions"),
-        ({"answered": 9}, "answered from 0 to 3, got 9"),
+        ({"answered": 4}, "answered from 0 to 3, got 4"),
         ({"carrier_pose": np.zeros(6)}, "carrier_pose of shape"),
     ],
 )
@@ -442,6 +442,17 @@ def test_actuators_are_listed_where_only_some_carriers_have_any():
     assert actuation["actuator"].values.tolist() == ["thrust", "torque x", "torque y", "torque z"]
     weight = (robot.platform.mass + robot.carriers[0].mass) * 9.81
     assert actuation.sel(carrier="quad", actuator="thrust")[-1] == pytest.approx(weight, rel=1e-3)
+
+
+def test_a_flight_has_what_a_plan_has_and_reports_it(crane):
+    flight = simulate("ipanema-1", crane, duration=0.01)
+    assert set(crane.trajectory.variables) <= set(flight.trajectory.variables)
+    report = flight.report().splitlines()
+    assert report[0].startswith("ipanema-1, flight of 0.01 s: PASSED")
+    named = ["error of the position", "tensions", "slack", "steps answered", "controller"]
+    assert [line.strip()[: len(name)] for line, name in zip(report[1:], named, strict=True)] == named
+    tensions = flight.record.tensions
+    assert f"{tensions.min():.4g} N to {tensions.max():.4g} N" in report[2]
 
 
 def test_a_wind_too_fast_is_named():

@@ -12,7 +12,7 @@ from towline.viewer import read, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest
 from towline.viewer.sliders import whole_steps
-from towline.workspace import Places, StaticEquilibrium, sample, save
+from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
 from towline.workspace.nearest import nearest_feasible
 
 from .viewer_wire import CAMERA, Wire
@@ -114,6 +114,22 @@ def test_the_nearest_feasible_pose_is_on_the_edge_and_no_other_is_much_nearer():
     assert not StaticEquilibrium().evaluate(robot, Places.at_home(robot, others)).any()
     feasible_already = nearest_feasible(robot, StaticEquilibrium(), robot.home, robot.carrier_home, 20.0)
     np.testing.assert_array_equal(feasible_already, robot.home)
+
+
+@pytest.mark.parametrize(("turn", "nearest"), [(0.2, "turned"), (0.4, "moved")])
+def test_the_nearest_pose_counts_a_turn_by_the_length_of_the_robot(turn, nearest):
+    """Feasible are 0.3 m to the side, and a turn of which a length away from the axis moves by `turn` [m]."""
+    robot = load("cogiro")
+
+    class Either(Condition):
+        def evaluate(self, robot, places):
+            off = places.pose - robot.home
+            return (off[:, 0] >= 0.3) | (off[:, 5] * robot.length >= turn)
+
+    start = robot.home + np.array([0, 0, 0.5, 0, 0, 0])
+    off = nearest_feasible(robot, Either(), start, robot.carrier_home, 5.0) - start
+    assert (off[5] * robot.length >= turn) == (nearest == "turned")
+    assert np.linalg.norm([*off[:3], *off[3:] * robot.length]) < 1.1 * min(0.3, turn)
 
 
 @pytest.mark.parametrize("wire", ["planar-4"], indirect=True)

@@ -111,6 +111,15 @@ def test_curves_at_other_times_end_where_the_motion_ends():
     np.testing.assert_allclose(other.margins, [np.nan, 0.5, 1, np.nan])
 
 
+def test_paths_are_those_of_carriers_that_move(folder, tmp_path):
+    saved = xr.load_dataset(folder / "line.nc")
+    assert read(str(folder / "line.nc")).replay.carrier_paths == []
+    saved["carrier_pose"][:, 0, 1] += np.linspace(0, 0.3, saved.sizes["time"])
+    saved.to_netcdf(tmp_path / "moves.nc", engine="h5netcdf")
+    (path,) = read(str(tmp_path / "moves.nc")).replay.carrier_paths
+    np.testing.assert_allclose(path, saved["carrier_pose"][:, 0, :3])
+
+
 def test_the_cursor_of_curves_is_at_the_nearest_instant():
     times = np.array([0.0, 0.4, 1.0, 3.0])
     some = Curves(times, np.ones((4, 2)), np.ones(4))
