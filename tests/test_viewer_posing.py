@@ -1,17 +1,20 @@
 """Robots posed by hand: sliders and handles agree, cables keep their lengths, and the nearest feasible pose."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline.distribution import tensions
+from towline.distribution import pose_problem, tensions
 from towline.models import Dynamics, load
+from towline.solvers import capacity_margin
 from towline.viewer import read, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest
 from towline.viewer.sliders import whole_steps
+from towline.viewer.surface import surface
 from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
 from towline.workspace.nearest import nearest_feasible
 
@@ -195,6 +198,70 @@ def test_a_workspace_is_cut_along_each_axis(tmp_path):
         wire.set(False, label="points")
         settle(wire)
         assert wire.scene["/workspace"]["visible"] is False
+        wire.close()
+
+
+@pytest.fixture(scope="module")
+def space():
+    """The workspace of cogiro below 5.5 m, and the robot."""
+    robot = load("cogiro")
+    region = {"position": {"min": [-7, -5, 0.5], "max": [7, 5, 5.5]}}
+    return sample(robot, StaticEquilibrium(), region, samples=20_000, keep="all"), robot
+
+
+def test_the_surface_of_a_workspace_holds_its_volume_and_separates_its_samples(space):
+    dataset, robot = space
+    found = surface(dataset, robot)
+    assert found.mesh.volume == pytest.approx(float(dataset["volume"]), rel=0.03)
+    uncut = found.bands(np.full(3, 100.0))
+    triangles = np.concatenate([vertices[faces] for vertices, faces in uncut if len(faces)])
+    assert len(triangles) == len(found.mesh.faces)
+    # Above a level, the area of the plane that cuts it is the share of the accepted samples beside it.
+    level, thick = 2.0, 0.4
+    cut = found.bands(np.array([100.0, 100.0, level]))
+    triangles = np.concatenate([vertices[faces] for vertices, faces in cut if len(faces)])
+    assert triangles[..., 2].max() <= level + 1e-9
+    flat = triangles[np.abs(triangles[..., 2] - level).max(axis=1) < 1e-9]
+    area = np.linalg.norm(np.cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]), axis=1).sum() / 2
+    beside = np.abs(dataset["position"].to_numpy()[:, 2] - level) < thick / 2
+    assert area == pytest.approx(140 * dataset["accepted"].to_numpy()[beside].mean(), rel=0.1)
+
+
+def test_the_surface_is_coloured_by_the_margins_of_its_places(space):
+    """By margins that are computed anew, in places of the plane of a cut."""
+    dataset, robot = space
+    found = surface(dataset, robot)
+    cut = found.bands(np.array([100.0, 100.0, 2.0]))
+    checked = 0
+    for number, (vertices, _) in enumerate(cut):
+        inside = vertices[(np.abs(vertices[:, 2] - 2.0) < 1e-9) & (np.abs(vertices[:, :2]) < [4, 2]).all(axis=1)][::40]
+        for place in inside:
+            at = np.array([*place, *robot.home[3:]])
+            margin = capacity_margin(pose_problem(Dynamics(robot), at)).value
+            assert 8 * margin / found.largest == pytest.approx(number + 0.5, abs=1.0)
+            checked += 1
+    assert checked > 10
+
+
+@pytest.mark.parametrize("name", ["tried", "x"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, "many"])
+def test_counts_and_cells_of_a_file_that_are_no_numbers_are_no_surface(space, name, value):
+    dataset, robot = space
+    values = dataset[name].to_numpy().astype(object if isinstance(value, str) else float)
+    values[(1,) * values.ndim] = value
+    assert surface(dataset.assign({name: (dataset[name].dims, values)}), robot) is None
+    assert surface(dataset.drop_vars(name), robot) is None
+
+
+def test_without_scikit_image_the_points_stay_and_a_line_names_the_extra(space, monkeypatch, tmp_path):
+    save(space[0], tmp_path / "space.nc")
+    monkeypatch.setitem(sys.modules, "skimage.measure", None)
+    with serve(read(str(tmp_path / "space.nc")), port=0) as url:
+        wire = Wire(url)
+        settle(wire)
+        assert any("pip install" in str(found.get("content")) for found in wire.panel.values())
+        assert wire.element(label="surface")[1]["disabled"]
+        assert wire.scene["/workspace"]["visible"] is not False
         wire.close()
 
 

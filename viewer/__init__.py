@@ -4,7 +4,7 @@
     save_page(subject, "circle.html")
     with serve(subject) as url: ...
 
-The modules `instant`, `replay`, `curves`, `cloud`, `sliders` and `words` compute what is shown, without a
+The modules `instant`, `replay`, `curves`, `cloud`, `surface`, `sliders` and `words` compute what is shown, without a
 browser. Only `server` imports viser, which draws it (extra `viewer`).
 """
 

@@ -29,12 +29,15 @@ class Cloud:
         (name, colour) pairs.
     summary
         The number of points, as a sentence.
+    dataset
+        What they were taken from.
     """
 
     positions: np.ndarray
     colours: np.ndarray
     legend: list[tuple[str, str]]
     summary: str
+    dataset: xr.Dataset
 
 
 def cloud(dataset: xr.Dataset, where: str) -> Cloud:
@@ -61,7 +64,8 @@ def cloud(dataset: xr.Dataset, where: str) -> Cloud:
     colours = np.where(accepted[:, None], rgb(ACCEPTED), rgb(REFUSED)).astype(np.uint8)
     legend = [("accepted", ACCEPTED)] + ([] if accepted.all() else [("not accepted", REFUSED)])
     kept, tried = (_count(dataset, name) for name in ("accepted", "samples"))
-    return Cloud(positions, colours, legend, f"{kept} of {tried} samples accepted, {len(positions)} points shown")
+    summary = f"{kept} of {tried} samples accepted, {len(positions)} points shown"
+    return Cloud(positions, colours, legend, summary, dataset)
 
 
 def _count(dataset: xr.Dataset, name: str) -> str:
@@ -92,4 +96,4 @@ def _cells(dataset: xr.Dataset, where: str) -> Cloud:
     positions = np.stack([axis[column] for axis, column in zip(axes, cells.T, strict=True)], axis=1)
     colours = np.tile(np.array(rgb(ACCEPTED), np.uint8), (len(positions), 1))
     summary = f"{len(positions)} cells with accepted samples, shown by their centres"
-    return Cloud(positions, colours, [("accepted in this cell", ACCEPTED)], summary)
+    return Cloud(positions, colours, [("accepted in this cell", ACCEPTED)], summary, dataset)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..errors import InputError
 from . import words
 from .posing import Posing
 from .sliders import whole_steps
+from .surface import Surface
+from .surface import surface as surface_of
 from .timeline import TimeLine
 
 if TYPE_CHECKING:
@@ -51,17 +55,40 @@ class Panel:
     def _add_cuts(self, positions: np.ndarray) -> None:
         """Add a switch for the points (n, 3) of a workspace, and a slider for each axis that cuts away those beyond."""
         points = self._gui.add_checkbox("points", True)
-        cuts = []
+        surface = self._gui.add_checkbox("surface", False, disabled=True)
+        scale = self._gui.add_html("")
+        cuts: list[Any] = []
+        found: list[Surface] = []
         for name, column in zip("xyz", positions.T if len(positions) else np.zeros((3, 1)), strict=True):
             low, high, step = whole_steps(float(column.min()), float(column.max()))
             cuts.append(self._gui.add_slider(f"{name} up to [m]", low, high, step, high))
 
         def cut(_: Any) -> None:
             with self._server.atomic():
-                self._stage.show_cloud(points.value, np.array([it.value for it in cuts]))
+                most = np.array([it.value for it in cuts])
+                self._stage.show_cloud(points.value, most)
+                if found:
+                    self._stage.show_bands(found[0].bands(most) if surface.value else [])
 
-        for control in (points, *cuts):
+        def compute() -> None:
+            """Add the surface when it is there, because a compiler may need seconds for its margins."""
+            assert self._subject.cloud is not None
+            try:
+                there = surface_of(self._subject.cloud.dataset, self._subject.robot)
+            except InputError as error:
+                scale.content = words.note(str(error))
+                return
+            if there is None:
+                scale.content = words.note("The samples are too few, or too flat, for a surface.")
+                return
+            found.append(there)
+            scale.content = words.margin_scale(there.largest)
+            surface.disabled, surface.value, points.value = False, True, False
+            cut(None)
+
+        for control in (points, surface, *cuts):
             control.on_update(cut)
+        threading.Thread(target=compute, daemon=True).start()
 
     def close(self) -> None:
         """Stop playing."""

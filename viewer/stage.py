@@ -126,6 +126,27 @@ class Stage:
             self._cloud.points = self._points.positions[kept].astype(np.float32)
             self._cloud.colors = self._points.colours[kept]
 
+    def show_bands(self, bands: list[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Draw the surface of a workspace, vertices and faces of each band of margins from small to large; or none."""
+        for old in self._bands:
+            old.remove()
+        colours = shades(np.linspace(0.0, 1.0, max(len(bands), 1)))
+        self._bands = [
+            self._scene.add_mesh_simple(
+                f"/surface/{number}",
+                vertices.astype(np.float32),
+                faces.astype(np.uint32),
+                color=(int(colour[0]), int(colour[1]), int(colour[2])),
+                opacity=0.75,
+                material="toon3",
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for number, ((vertices, faces), colour) in enumerate(zip(bands, colours, strict=False), 1)
+            if len(faces)
+        ]
+
     def show_numbers(self, shown: bool) -> None:
         """Show or hide number and tension at the cables."""
         for label in self._numbers:
@@ -227,6 +248,7 @@ class Stage:
                 self._lines(f"/keep_out/{index + 1}/edges", lines, rgb(style.colour(5)))
                 self._body(f"/keep_out/{index + 1}/body", np.concatenate(lines), rgb(style.colour(5)), opacity=0.25)
         self._cloud, self._points = None, subject.cloud
+        self._bands: list[Any] = []
         if subject.cloud is not None and len(subject.cloud.positions):
             self._cloud = scene.add_point_cloud(
                 "/workspace",

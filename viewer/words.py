@@ -120,8 +120,7 @@ def shortfall(instant: Instant) -> str:
 def legend(subject: Subject, cell: float) -> str:
     """Return the meaning of colours and marks as HTML; `cell` is the edge of the grid's cells [m]."""
     robot = subject.robot
-    stops = ", ".join(f"rgb({r},{g},{b})" for r, g, b in shades(np.linspace(0.0, 1.0, STOPS)))
-    bar = f'<div style="height:10px;background:linear-gradient(to right, {stops})"></div>'
+    bar = _gradient()
     ends = (
         f'<div style="display:flex;justify-content:space-between"><span>{_limit("t_min", robot.t_min)}</span>'
         f"<span>{_limit('t_max', robot.t_max)}</span></div>"
@@ -150,6 +149,26 @@ def _limit(name: str, limits: np.ndarray) -> str:
     """Return a limit, or the range of the limits if those of the cables differ."""
     low, high = float(limits.min()), float(limits.max())
     return f"{name} = {quantity_range((low, high), 'N', 6)}"
+
+
+def note(message: str) -> str:
+    """Return a remark in the panel, as HTML."""
+    return f'<div style="{BODY};color:{MUTED}">{escape(message)}</div>'
+
+
+def margin_scale(largest: float) -> str:
+    """Return the colours of capacity margins from zero to the largest [N] of a workspace, as HTML."""
+    return (
+        f'<div style="{BODY}"><div>surface by capacity margin, attitude and carriers at home</div>{_gradient()}'
+        f'<div style="display:flex;justify-content:space-between"><span>0</span><span>{quantity(largest, "N", 3)}'
+        "</span></div></div>"
+    )
+
+
+def _gradient() -> str:
+    """Return a bar with the colours of all places."""
+    stops = ", ".join(f"rgb({r},{g},{b})" for r, g, b in shades(np.linspace(0.0, 1.0, STOPS)))
+    return f'<div style="height:10px;background:linear-gradient(to right, {stops})"></div>'
 
 
 def refusal(message: str) -> str:
