@@ -33,13 +33,14 @@ class Panel:
         self._subject, self._stage = subject, stage
         self._server, self._gui = server, cast("Any", server.gui)
         self._time_line: TimeLine | None = None
+        self._posing: Posing | None = None
         self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
         self._gui.add_html(words.NARROW)
         if subject.replay is None:
-            Posing(server, subject.robot, geometry, self._show, self._refuse)
+            self._posing = Posing(server, subject.robot, geometry, self._show, self._refuse)
         else:
             self._time_line = TimeLine(server, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
@@ -91,9 +92,11 @@ class Panel:
         threading.Thread(target=compute, daemon=True).start()
 
     def close(self) -> None:
-        """Stop playing."""
+        """Stop playing and shading."""
         if self._time_line is not None:
             self._time_line.close()
+        if self._posing is not None:
+            self._posing.close()
 
     def _refuse(self, reason: str) -> None:
         """Show why there is no instant to draw."""
