@@ -1,17 +1,22 @@
 """Time in the viewer: every update has one instant in scene, panel, charts and time line; steps, loop, curves."""
 
+import io
 import re
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
 
 from towline.errors import InputError
+from towline.figures.animation import timing
 from towline.models import load
 from towline.ocp import plan
 from towline.viewer import read, serve
 from towline.viewer.curves import Curves, curves
+from towline.viewer.film import scene
 
 from .viewer_wire import Wire
 
@@ -87,6 +92,30 @@ def test_steps_and_ends_and_playing_once_or_again_and_again(wire, folder):
         if wire.element(label="time [s]")[1]["value"] < 1.5:
             return
     pytest.fail("it does not begin again")
+
+
+@pytest.mark.parametrize("wire", ["line"], indirect=True)
+def test_a_film_of_the_saved_instants_is_sent_while_the_view_goes_on(wire, folder):
+    wire.set(True, label="Save film")
+    content, moved = b"", None
+    for _ in range(200):
+        wire.read(0.3)
+        if moved is None and any(found.get("label") == "Drawing a film ..." for found in wire.panel.values()):
+            wire.set("last", label="step")
+            moved = False
+        drawing = any(found.get("label") == "Drawing a film ..." for found in wire.panel.values())
+        moved = moved or (drawing and "t = 2.00 s" in wire.readout())
+        content += b"".join(part["content"] for part in wire.messages if part["type"] == "FileTransferPart")
+        if content and any(found.get("label") == "Save film" for found in wire.panel.values()):
+            break
+    assert moved
+    with Image.open(io.BytesIO(content)) as picture:
+        assert picture.n_frames == int(2 * 12.5) + 1
+        assert picture.info["duration"] == 80
+    replay = read(str(folder / "line.nc")).replay
+    drawn = scene(replay, timing(Path("x.gif"), 2.0, 1.0, 12.5))
+    saved = xr.load_dataset(folder / "line.nc").sel(time=drawn.path_times[0] + np.arange(26) * 0.08, method="nearest")
+    np.testing.assert_allclose(drawn.tensions, saved["tensions"])
 
 
 def test_curves_have_the_worst_of_every_part(folder):

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, TowlineError
 from . import words
+from .film import film
 from .posing import Posing
 from .sliders import whole_steps
 from .surface import Surface
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from .geometry import Geometry
     from .instant import Instant
+    from .replay import Replay
     from .stage import Stage
     from .subject import Subject
 
@@ -33,13 +35,14 @@ class Panel:
         self._subject, self._stage = subject, stage
         self._server, self._gui = server, cast("Any", server.gui)
         self._time_line: TimeLine | None = None
+        self._posing: Posing | None = None
         self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
         self._gui.add_html(words.NARROW)
         if subject.replay is None:
-            Posing(server, subject.robot, geometry, self._show, self._refuse)
+            self._posing = Posing(server, subject.robot, geometry, self._show, self._refuse)
         else:
             self._time_line = TimeLine(server, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
@@ -49,6 +52,8 @@ class Panel:
                 self._add_cuts(subject.cloud.positions)
             save = self._gui.add_button("Save picture")
             save.on_click(lambda event: _send_picture(event.client, f"{subject.robot.name}.png"))
+            if subject.replay is not None:
+                self._add_film(subject.replay)
         with self._gui.add_folder("Legend"):
             self._gui.add_html(words.legend(subject, stage.cell))
 
@@ -90,10 +95,30 @@ class Panel:
             control.on_update(cut)
         threading.Thread(target=compute, daemon=True).start()
 
+    def _add_film(self, replay: Replay) -> None:
+        """Add a button that draws a film in a thread of its own, while the view goes on."""
+        button = self._gui.add_button("Save film")
+
+        def save(client: viser.ClientHandle | None) -> None:
+            button.disabled, button.label = True, "Drawing a film ..."
+            try:
+                drawn = film(replay)
+                if client is not None:
+                    client.send_file_download(f"{replay.robot.name}.gif", drawn, save_immediately=True)
+            except TowlineError as error:
+                self._refuse(str(error))
+            finally:
+                button.disabled, button.label = False, "Save film"
+
+        # A daemon: at Ctrl-C nobody waits for it.
+        button.on_click(lambda event: threading.Thread(target=save, args=(event.client,), daemon=True).start())
+
     def close(self) -> None:
-        """Stop playing."""
+        """Stop playing and shading."""
         if self._time_line is not None:
             self._time_line.close()
+        if self._posing is not None:
+            self._posing.close()
 
     def _refuse(self, reason: str) -> None:
         """Show why there is no instant to draw."""

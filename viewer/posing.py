@@ -18,6 +18,7 @@ from ..workspace.nearest import nearest_feasible
 from .geometry import Geometry
 from .instant import Instant, at_rest
 from .sliders import Slider, sliders
+from .strips import Strips
 
 if TYPE_CHECKING:
     import viser
@@ -60,15 +61,16 @@ class Posing:
         owners = list(dict.fromkeys(setting.carrier for setting in self._settings))
         names = {owner: "platform" if owner is None else robot.carriers[owner].name for owner in owners}
         self._sliders: list[Any] = []
+        self._tracks: list[Any] = []
         for owner in owners:
             name = "Platform" if owner is None else f"Carrier {names[owner]}"
             # Teams of six would fill the screen.
             with gui.add_folder(name, expand_by_default=owner is None or len(owners) < 3):
-                self._sliders += [
-                    gui.add_slider(it.label, it.low, it.high, it.step, self._value(it))
-                    for it in self._settings
-                    if it.carrier == owner
-                ]
+                for it in self._settings:
+                    if it.carrier == owner:
+                        self._sliders.append(gui.add_slider(it.label, it.low, it.high, it.step, self._value(it)))
+                        self._tracks.append(gui.add_html(""))
+        self._strips = Strips(robot, self._settings, self._shade)
         self._hang = gui.add_checkbox(
             "let it hang",
             few_cables(robot),
@@ -176,6 +178,22 @@ class Posing:
                         handle.position = place[:3]
                         handle.wxyz = Rotation.from_euler("ZYX", place[:2:-1]).as_quat(scalar_first=True)
                 self._show(instant)
+            if self._hang.value:
+                self._shade([""] * len(self._tracks))
+            else:
+                self._strips.want(pose, carriers)
+
+    def close(self) -> None:
+        """Stop shading the sliders."""
+        self._strips.close()
+
+    def _shade(self, strips: list[str]) -> None:
+        """Show strips below the sliders; none where the platform hangs, as it then rests elsewhere."""
+        with self._server.atomic():
+            for track, content in zip(self._tracks, strips, strict=True):
+                shown = "" if self._hang.value else content
+                if track.content != shown:
+                    track.content = shown
 
     def _value(self, setting: Slider) -> float:
         """Return the value of a coordinate inside the range of its slider, with two digits more than its steps."""
