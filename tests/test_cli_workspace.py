@@ -135,7 +135,7 @@ def test_checkpoint_then_resume(folder):
             ("--mesh", "m.stl", "--attitude", "0 0 0; 0 0 1"),
             "--mesh must be of a region in which only positions vary",
         ),
-        (("--resume", "/proc/a"), "checkpoint must be a file that can be written, got /proc/a"),
+        (("--resume", "/proc/a"), "/proc/a: cannot be written (No such file or directory)"),
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(folder, arguments, message):
