@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +16,20 @@ from .warm import run, towline
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "adding-a-condition.md").read_text()
 HIGH = '{"kind": "above-ground", "height": 0.3}'
+COMMAND = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)[0]
 
 
 @pytest.fixture
 def folder(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert code.count("\n") <= 30
-    (tmp_path / "conditions_of_mine.py").write_text(code)
+    (tmp_path / "conditions.py").write_text(code)
     return tmp_path
 
 
 def test_the_example_runs_and_resumes(folder):
     """Compute in another way that every accepted place is at rest and above the ground."""
-    done = run(folder / "conditions_of_mine.py", cwd=folder)
+    done = run(folder / "conditions.py", cwd=folder)
     both, lowest, high = done.stdout.split()
     robot = load("cogiro")
     found = sample(robot, StaticEquilibrium(), samples=40_000, keep="all")
@@ -43,9 +45,9 @@ def test_the_example_runs_and_resumes(folder):
     checkpoint = folder / "run.checkpoint"
     whole = checkpoint.read_bytes()
     checkpoint.write_bytes(whole[: len(whole) // 2])
-    command = ["workspace", "cogiro", "--define", "conditions_of_mine.py", "--samples", "40000", "--json"]
-    command += ["--condition", "static-equilibrium", "--condition", HIGH]
-    done = towline(*command, "--resume", "run.checkpoint", "--workers", "2", cwd=folder)
+    program, *arguments = shlex.split(COMMAND.replace("\\\n", ""))
+    assert program == "towline"
+    done = towline(*arguments, "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["accepted"] == int(both)
     assert checkpoint.read_bytes() == whole
@@ -74,7 +76,7 @@ def test_every_condition_is_on_the_pages():
     """The registry is the list of the conditions; the pages are checked against it."""
     names = {kind: one for kind, one in Condition.kinds.items() if one.__module__.startswith("towline.")}
     table, reference = ((ROOT / "docs" / page).read_text() for page in ("workspace.md", "api/workspace.md"))
-    assert len(names) == 13
+    assert len(names) >= 13
     for kind, one in names.items():
         assert f"::: towline.workspace.{one.__name__}\n" in reference
         assert kind in ("all", "any") or f"`{one.__name__}" in table
