@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +20,22 @@ app = typer.Typer(**PLAIN)
 @app.callback()
 def _bench() -> None:
     """Measure towline against other solvers on this machine."""
+
+
+@contextmanager
+def results_alone() -> Iterator[None]:
+    """Send to standard error what libraries print while the block runs: HiGHS, from 1.16 on, prints its version.
+
+    C code prints this, not Python, so the file descriptor itself changes.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 @app.command("tension", cls=Command)
@@ -38,7 +58,7 @@ def tension(
         raise InputError(f"--m must be numbers of cables from 1 to 16, separated by commas, got {m!r}") from None
     if out is not None:
         check_writable(out / "tension.md")
-    with progress_bar("tension distribution", quiet=as_json) as progress:
+    with results_alone(), progress_bar("tension distribution", quiet=as_json) as progress:
         report = benchmark.run(count, repeats, cables, limit, progress)
     written = benchmark.write(report, out) if out is not None else []
     if as_json:
@@ -58,7 +78,7 @@ def control(
     """Measure control steps, and the programs of predictive control against other solvers."""
     from ..benchmarks import control as benchmark
 
-    with progress_bar("control", quiet=as_json) as progress:
+    with results_alone(), progress_bar("control", quiet=as_json) as progress:
         report = benchmark.run(steps, seeds, progress=progress)
     if as_json:
         print_json(report.to_dict())

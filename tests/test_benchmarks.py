@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from towline.benchmarks import planning, tension
 from towline.benchmarks.qp_solver import multipliers, register, solve_problem
 from towline.benchmarks.tension_contenders import REFERENCE, Contender, contenders
 from towline.benchmarks.tension_tasks import KINDS, make_task
+from towline.cli.bench import results_alone
 from towline.errors import InputError
 from towline.solvers import certify
 
@@ -144,6 +146,13 @@ def bench(tmp_path_factory):
     done = warm.towline("bench", "tension", *options)
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)
+
+
+def test_what_libraries_print_is_not_among_the_results(capfd):
+    with results_alone():
+        os.write(1, b"who I am\n")
+    print("{}", flush=True)
+    assert capfd.readouterr() == ("{}\n", "who I am\n")
 
 
 def test_bench_prints_what_the_design_says(bench):

@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import block_diag
 
 from towline.errors import InputError
 from towline.solvers import Horizon, HorizonSolution, StageProblem, solve_horizon
@@ -123,7 +124,7 @@ def by_clarabel(problem):
     for row in range(len(pick)):
         k, i = divmod(row, problem.m)
         pick[row, k * (problem.m + problem.n) + i] = 1.0
-    P = sp.block_diag([H, np.diag(problem.square.ravel())], format="csc")
+    P = sp.csc_matrix(block_diag(H, np.diag(problem.square.ravel())))
     low, high = np.isfinite(free[0]), np.isfinite(free[1])
     A = np.block(
         [

@@ -16,6 +16,7 @@ from ..accounts.claim import Claim, compared, stated
 from .instants import Instants, instants
 
 ROUNDING = 1e-12  # [m]
+RANK = 1e-9  # of the largest singular value: those below are rounding errors, the printed pairing has rank 3
 SMALL = 1e-4  # a small displacement [m] and rotation [rad]
 SHOWN = (np.array([0.5, 0.4, 1.4, 0.1, -0.15, 0.3]), np.array([0.15, -0.1, -1.0, 0.2, 0.1, -0.2]))
 """Poses of {A} in {G} and of {B} in {A} in figure 2."""
@@ -35,7 +36,7 @@ def _suspended() -> Claim:
     for name in ("wang-flying-printed", "wang-flying"):
         robot = load(name)
         A, w = Dynamics(robot).wrench_matrix(robot.home), np.array([0, 0, robot.weight, 0, 0, 0])
-        tensions = np.linalg.pinv(A) @ w
+        tensions = np.linalg.pinv(A, rcond=RANK) @ w
         pulls.append(tensions.min())
         left.append(np.abs(A @ tensions - w).max())
     return stated(
@@ -134,7 +135,7 @@ def _rotated(angles: np.ndarray) -> np.ndarray:
 
 def _structure() -> Drawing:
     robot = load("wang-flying-printed")
-    tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home))[:, 2] * robot.weight
+    tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
     sketch = RobotSketch(
         "the printed pairing at home",
         robot.anchors,
