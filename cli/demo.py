@@ -19,7 +19,7 @@ def demo(
 ) -> None:
     """Plan a circle of the flying cable robot and fly it in wind.
 
-    The circle is impossible while the quadrotor hovers, and feasible if it moves. The exit code is 0 if the plans show
+    The circle is infeasible while the quadrotor hovers, and feasible if it moves. The exit code is 0 if the plans show
     this and the flight passes.
     """
     from ..figures.style import FORMATS

@@ -32,7 +32,7 @@ def main() -> None:
 
 
 def _at_once(signum: int, frame: FrameType | None) -> NoReturn:
-    """End the process with the line and the exit code of an interrupt: nothing has begun yet."""
+    """End the process with the line and the exit code of an interrupt; nothing has begun that needs cleaning up."""
     os.write(2, b"towline: stopped\n")
     os._exit(128 + signum)
 

@@ -26,7 +26,7 @@ class Command(TyperCommand):
 
 
 def robot_names(incomplete: str) -> list[str]:
-    """Return the robots of the library that a shell can complete a name to; files it completes by itself."""
+    """Return the robots of the library whose names complete what is typed; the shell completes files itself."""
     from ..models.library import available
 
     return [name for name in available() if name.startswith(incomplete)]
@@ -61,7 +61,7 @@ FpsOption = Annotated[float, typer.Option(help="With --animate: frames per secon
 
 
 def check_unused(speed: float, fps: float) -> None:
-    """Raise InputError if options of a film are given where none is written."""
+    """Raise InputError if options of a film are given but no film is written."""
     for name, value, default in (("--speed", speed, SPEED), ("--fps", fps, FPS)):
         if value != default:
             raise InputError(f"{name} must be left out without --animate, got {value:g}")
@@ -91,7 +91,7 @@ def print_written(files: Iterable[object]) -> None:
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], align: str) -> None:
     """Print a table; `align` has one letter for each column, l for left and r for right.
 
-    A wide table is left to the terminal to wrap: a number that is cut would be another number.
+    The terminal wraps a wide table, because a number that is cut off would read as another number.
     """
     lines = [headings, *rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(headings))]

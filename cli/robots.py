@@ -29,7 +29,7 @@ def robots(
     """List the robots of the library, or diagnose one.
 
     The diagnosis has the rank of the wrench matrix and its reason, the tensions at rest at home or the proof that
-    there are none, and warnings of implausible numbers.
+    there are none, and warnings about implausible numbers.
     """
     if schema:
         from ..models import Robot

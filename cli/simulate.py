@@ -76,7 +76,7 @@ def simulate(
         typer.Option(help="Time of the flight [s]; default: that of the plan, at whose end the robot rests."),
     ] = None,
     tolerance: Annotated[float, typer.Option(help="Largest error of the position of a flight that passes [m].")] = 0.05,
-    seed: Annotated[int, typer.Option(help="Of gusts and noise; the same seed gives the same flight.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same flight.")] = 0,
     runs: Annotated[
         int | None,
         typer.Option(help="Number of flights, with the seeds from --seed on. Writes one table instead of one flight."),
@@ -172,7 +172,7 @@ def simulate(
 
 
 def _of_option(error: InputError, faults: list[str]) -> InputError:
-    """Return an error whose message names an option, where it named an item of the argument `faults`."""
+    """Return the error with the option --fault named in place of an item of the argument `faults`."""
     return InputError(re.sub(r"^faults\[(\d+)\]", lambda item: f"--fault {shown(faults[int(item[1])])}", str(error)))
 
 

@@ -45,7 +45,7 @@ def unlisten() -> None:
 
 
 def ignore() -> None:
-    """Ignore interrupts from here on: all is done and written, and Python's own end would be cut off without a word."""
+    """Ignore interrupts from here on: all is written, and an interrupt would only cut Python's shutdown short."""
     if signal.getsignal(signal.SIGINT) is _interrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # first, so that nothing can arrive between the two
         signal.set_wakeup_fd(-1)
@@ -78,14 +78,14 @@ def end() -> NoReturn:
 
 
 def _interrupt(signum: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt, once: another one would only disturb what cleans up."""
+    """Raise KeyboardInterrupt, once: another one would only disturb the clean-up."""
     if not _requested.is_set():
         _quiet()
         raise KeyboardInterrupt
 
 
 def _quiet() -> None:
-    """Remember the interrupt, and keep Python from printing where it was swallowed."""
+    """Remember the interrupt, and keep Python from printing that it was swallowed."""
     _requested.set()
     sys.unraisablehook = lambda unraisable: None
     threading.excepthook = lambda failure: None

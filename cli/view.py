@@ -35,10 +35,10 @@ def view(
         str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; 127.0.0.1: this machine only.")] = HOST,
-    port: Annotated[int, typer.Option(help="Port to listen on; if it is in use, one of the next; 0: any.")] = PORT,
+    port: Annotated[int, typer.Option(help="Port to listen on; if in use, one of the next; 0: any free one.")] = PORT,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a robot to pose, plans or flights that play, or a workspace, in the browser (extra viewer)."""
+    """Show a robot with sliders, one or two plans or flights, or a workspace, in the browser (extra viewer)."""
     import threading
 
     from ..viewer import read, save_page, serve

@@ -1,4 +1,4 @@
-"""Show progress live on standard error: a solver's iterations, or how much of many samples or plans is done."""
+"""Show progress live on standard error: a solver's iterations, or how many samples or plans are done."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Draw figures and films of datasets and plain arrays by Matplotlib; robots, tasks and plans are not known here."""
+"""Draw figures and films of datasets and plain arrays with Matplotlib, without use of robots, tasks or plans."""

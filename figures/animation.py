@@ -88,7 +88,7 @@ def check_film(path: Path, speed: float, fps: float) -> float:
     Raises
     ------
     InputError
-        If the suffix, the speed or the frame rate are not possible.
+        If the suffix, the speed or the frame rate is invalid.
     """
     number("speed", speed, SLOWEST, FASTEST)
     return film.frame_rate(path, fps)

@@ -17,7 +17,7 @@ MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files gr
 
 
 def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = None) -> Figure:
-    """Draw the residuals of each cable's length with the parameters of the file, and with those found.
+    """Draw the residuals of each cable's length with the parameters of the file, and with the calibrated ones.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
 
 
 def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: np.ndarray | None = None) -> Figure:
-    """Draw where each anchor was found relative to the file, with the ellipsoid that holds it with 95 %.
+    """Draw each calibrated anchor relative to the file, with the ellipsoid that contains it with 95 % probability.
 
     There is a panel for each cable, all at the same scale: y against x, and z against x.
 
@@ -62,7 +62,7 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
     covariances
         Of the calibrated ones, (m, 3, 3) [m^2].
     true
-        Where the anchors are, if that is known, as in a simulation, (m, 3) [m].
+        The true anchors, if they are known, as in a simulation, (m, 3) [m].
     """
     from matplotlib.patches import Ellipse
 

@@ -1,4 +1,4 @@
-"""Write films as GIF by Pillow or as MP4 by ffmpeg, by the suffix of the file."""
+"""Write films as GIF with Pillow or as MP4 with ffmpeg, as the suffix of the file states."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def frame_rate(path: Path, rate: float) -> float:
     Raises
     ------
     InputError
-        If the suffix is unknown, the rate is not possible, or ffmpeg is needed and missing.
+        If the suffix is unknown, the rate is invalid, or ffmpeg is needed and missing.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:

@@ -49,7 +49,7 @@ def outline(points: np.ndarray) -> np.ndarray:
 
 
 def extent(points: np.ndarray) -> tuple[int, np.ndarray]:
-    """Return in how many dimensions points (k, d) extend, and the axes (d, d) of their extent, the longest first."""
+    """Return in how many dimensions points (k, d) extend, and the axes (d, d) of their extent, longest first."""
     if not len(points):
         return 0, np.eye(points.shape[1])
     _, sizes, axes = np.linalg.svd(points - points.mean(axis=0))

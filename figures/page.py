@@ -112,7 +112,7 @@ def paragraph(text: str) -> str:
 
 
 def link(text: str, anchor: str) -> Link:
-    """Return a cell of a table, or an entry of the contents, that leads to an anchor of this page."""
+    """Return a link to an anchor of this page, for a cell of a table or an entry of the contents."""
     return Link(f'<a href="#{escape(anchor)}">{_safe(text)}</a>')
 
 
@@ -133,7 +133,7 @@ def folded(title: str, rows: Iterable[tuple[str, str]], anchor: str, more: str =
 
 
 def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str | Link]]) -> str:
-    """Return a table with a heading and column names; on a narrow screen each cell is a line behind its name."""
+    """Return a table with a heading and column names; on a narrow screen each cell is a line with its column's name."""
     first = "".join(f'<th scope="col">{_safe(head)}</th>' for head in heads)
     lines = ["<tr>" + "".join(map(_cell, heads, row)) + "</tr>" for row in rows]
     inner = "\n".join([f'<tr class="heads">{first}</tr>', *lines])
@@ -141,7 +141,7 @@ def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str | Link
 
 
 def side_by_side(pictures: Iterable[str]) -> str:
-    """Return figures beside each other where the screen is wide enough."""
+    """Return figures, side by side where the screen is wide enough."""
     return '<div class="side">\n' + "\n".join(pictures) + "\n</div>"
 
 
@@ -159,7 +159,7 @@ def file(title: str, text: str) -> str:
 
 
 def _safe(text: str) -> str:
-    """Return text in which no mark-up is left and powers of units are raised."""
+    """Return text with mark-up escaped and the powers of units raised."""
     return style.typeset(escape(text))
 
 

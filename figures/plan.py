@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FLAT = 0.3  # of the largest range of tensions: panels of smaller ones have scales of their own
+FLAT = 0.3  # of the largest range of tensions: panels with a smaller range have their own scale
 
 
 def path(trajectory: xr.Dataset) -> Figure:
@@ -88,7 +88,7 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
 
 
 def _same_scale(panels: list[Axes]) -> None:
-    """Give panels one vertical axis, unless the curves of one would look flat on it."""
+    """Give panels one vertical range, unless the curves of one panel would look flat in it."""
     ends = np.array([ax.get_ylim() for ax in panels])
     spans = np.ptp(ends, axis=1)
     if spans.min() < FLAT * spans.max():

@@ -37,9 +37,9 @@ SIDE = View("along x", 1, 2)
 
 
 def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a panel for each view, which hold `points` (n, 3) [m], at one scale.
+    """Return a figure with a panel for each view, large enough for `points` (n, 3) [m], all at one scale.
 
-    The view from above is over the view along y, and that along x beside it, so that what belongs together is in line.
+    The view from above is above the view along y, and the view along x is beside it, so that coordinates line up.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
 
 
 def _places(views: Sequence[View]) -> list[tuple[int, int]]:
-    """Return column and row of each view: views of one axis across are in one column, of one axis up in one row."""
+    """Return column and row of each view: views share a column if they share the axis across, a row if that up."""
     columns = list(dict.fromkeys(view.across for view in views))
     rows = list(dict.fromkeys(view.up for view in views))
     return [(columns.index(view.across), rows.index(view.up)) for view in views]

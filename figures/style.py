@@ -28,7 +28,7 @@ MARKERS = "os^vDP*X"
 LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 0.8}
 COLUMN = 88 / 25.4  # width of a journal's column [inches]
 TEXT, NOTE = 8.0, 7.0  # sizes of letters [points]: labels of axes; numbers, legends, titles and notes
-BESIDE, LETTER = 36.0, 3.8  # points: labels and numbers beside axes; a letter of a title on the average
+BESIDE, LETTER = 36.0, 3.8  # points: labels and numbers beside axes; a letter of a title on average
 FORMATS = ("png", "pdf", "svg")
 DPI = 300
 
@@ -78,13 +78,13 @@ def axes(
 ) -> Axes:
     """Return axes with labels, a light grid and no box, at `place` (rows, columns, index).
 
-    With `share` they have the limits of those axes, horizontally and vertically.
+    With `share` they have the ranges of those axes, horizontally and vertically.
     """
     return dressed(canvas.add_subplot(*place, sharex=share, sharey=share), xlabel, ylabel)
 
 
 def dressed(ax: Axes, xlabel: str, ylabel: str) -> Axes:
-    """Return axes after labels, a light grid and no box were set."""
+    """Set labels and a light grid, remove the box, and return the axes."""
     ax.set_xlabel(xlabel, fontsize=TEXT)
     ax.set_ylabel(ylabel, fontsize=TEXT)
     ax.tick_params(labelsize=NOTE)
@@ -96,7 +96,7 @@ def dressed(ax: Axes, xlabel: str, ylabel: str) -> Axes:
 
 
 def heading(ax: Axes, text: str, share: float = 1.0) -> None:
-    """Write a title above axes that have a `share` of a column's width, on the left, in lines that fit."""
+    """Write a title at the left above axes, wrapped to their `share` of a column's width."""
     from textwrap import fill
 
     letters = max(int((72.0 * COLUMN * share - BESIDE) / LETTER), 10)
@@ -171,7 +171,7 @@ def limit_line(ax: Axes, value: float, text: str, place: float = 1.0, above: boo
 
 
 def far_limit(ax: Axes, text: str) -> None:
-    """Name a limit in the legend that is too far from the curves to be drawn."""
+    """Name in the legend a limit that is too far from the curves to be drawn."""
     ax.plot([], [], **LIMIT, label=text)
 
 
@@ -209,7 +209,7 @@ def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> None:
 
 
 def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes], label: str, **place: Any) -> Colorbar:
-    """Return the scale of colours, drawn beside panels."""
+    """Draw a colour bar beside panels, and return it."""
     bar = canvas.colorbar(shades, ax=panels, **place)
     bar.set_label(label, fontsize=NOTE)
     bar.ax.tick_params(labelsize=NOTE)
@@ -222,7 +222,7 @@ def check_format(name: str) -> str:
     Raises
     ------
     InputError
-        If it is another.
+        If it is none of them.
     """
     return one_of("format", name, FORMATS)
 
@@ -233,7 +233,7 @@ def check_picture(path: Path) -> Path:
     Raises
     ------
     InputError
-        If the suffix is another.
+        If the suffix is none of them.
     """
     if path.suffix[1:].lower() not in FORMATS:
         accepted = ", ".join(f".{name}" for name in FORMATS)
@@ -250,7 +250,7 @@ def save(canvas: Figure, path: Path) -> Path:
     Raises
     ------
     InputError
-        If the suffix is another, or the file cannot be written.
+        If the suffix is none of them, or the file cannot be written.
     """
     from matplotlib import rc_context
 

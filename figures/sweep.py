@@ -1,4 +1,4 @@
-"""Draw what plans reach over the fields that were varied: curves over one, maps over two, maps side by side over three.
+"""Draw results of plans over the varied fields: curves over one, maps over two, maps side by side over three.
 
 Plans without a value are marked by their status.
 """
@@ -98,7 +98,7 @@ def _maps(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.
     rows = -(-len(third.values) // columns)  # for each quantity
     canvas = style.figure(height=0.8 + 1.45 * rows * len(quantities))
     canvas.suptitle(f"titles: {third.label}", fontsize=style.TEXT)
-    canvas.supylabel(axes[1].label, fontsize=style.TEXT)  # once: the maps are lower than it is long
+    canvas.supylabel(axes[1].label, fontsize=style.TEXT)  # once, since the label is longer than a map is high
     for number, (label, values) in enumerate(quantities.items()):
         drawn: dict[Axes, ScalarMappable] = {}
         for place, text in enumerate(third.texts):
@@ -138,7 +138,7 @@ def _map(
 
 
 def _mark(ax: Axes, x: np.ndarray, y: np.ndarray, word: str, mark: str, **options: Any) -> None:
-    """Mark plans of one status, the mark small enough for many of them."""
+    """Mark plans of one status, with marks small enough for many of them."""
     if not len(x):
         return
     size = float(np.clip(40 / np.sqrt(len(x)), 2.5, 6))

@@ -29,7 +29,7 @@ def views(scene: Scene) -> Figure:
             for part in (scene.anchors, scene.attachments, scene.path, scene.carriers, *scene.boxes)
         ]
     )
-    near = NEAR * np.ptp(robot, axis=0).max()  # of walls that are much larger than the robot the near part is drawn
+    near = NEAR * np.ptp(robot, axis=0).max()  # only this part of walls much larger than the robot is drawn
     lines = [line for outline_of in scene.obstacles for line in outline_of]
     outlines = [np.clip(line, robot.min(axis=0) - near, robot.max(axis=0) + near) for line in lines]
     canvas, panels = views_of(np.vstack([robot, *outlines]), (ABOVE, FRONT), below=0.7)

@@ -1,4 +1,4 @@
-"""Draw a film of a replay, as `towline plan --animate` does, apart from what a browser shows."""
+"""Draw a film of a replay, as `towline plan --animate` does, independently of any browser."""
 
 from __future__ import annotations
 

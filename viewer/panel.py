@@ -58,7 +58,7 @@ class Panel:
             self._gui.add_html(words.legend(subject, stage.cell))
 
     def _add_cuts(self, positions: np.ndarray) -> None:
-        """Add a switch for the points (n, 3) of a workspace, and a slider for each axis that cuts away those beyond."""
+        """Add a switch for the points (n, 3) of a workspace, and a slider for each axis to cut away those beyond it."""
         points = self._gui.add_checkbox("points", True)
         surface = self._gui.add_checkbox("surface", False, disabled=True)
         scale = self._gui.add_html("")
@@ -76,7 +76,7 @@ class Panel:
                     self._stage.show_bands(found[0].bands(most) if surface.value else [])
 
         def compute() -> None:
-            """Add the surface when it is there, because a compiler may need seconds for its margins."""
+            """Add the surface once it is computed; compiling the code for its margins may take seconds."""
             assert self._subject.cloud is not None
             try:
                 there = surface_of(self._subject.cloud.dataset, self._subject.robot)
@@ -110,7 +110,7 @@ class Panel:
             finally:
                 button.disabled, button.label = False, "Save film"
 
-        # A daemon: at Ctrl-C nobody waits for it.
+        # A daemon, so that the process ends at Ctrl-C without waiting for it.
         button.on_click(lambda event: threading.Thread(target=save, args=(event.client,), daemon=True).start())
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ class Panel:
 
 
 def _send_picture(client: viser.ClientHandle | None, name: str) -> None:
-    """Send a browser what it shows of the scene as a file to keep, on white."""
+    """Let a browser download its view of the scene, on white."""
     if client is None:
         return
     import io

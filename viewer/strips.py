@@ -15,7 +15,7 @@ from .sliders import Slider
 PLACES = 48  # of a strip, about one for every other pixel
 QUIET = 0.15  # [s] after the last change
 HOLDS, FAILS = style.colour(2), "#e8e8e8"
-# Below the track of a slider in a folder of viser's panel: beside its label, and its number.
+# Places a strip below the track of a slider in a folder of viser's panel, between its label and its number.
 STRIP = "height:4px;margin:-19px calc(0.625rem + 3.84rem) 15px calc(0.625rem + 6.87em);pointer-events:none"
 
 
@@ -50,14 +50,14 @@ def strip(holds: np.ndarray) -> str:
 
 
 class Strips:
-    """Strips that follow the pose a moment after its last change, until `close`.
+    """Strips that are updated a moment after the last change of the pose, until `close`.
 
     Parameters
     ----------
     robot, settings
         The robot and its sliders.
     write
-        Shows the strips, one for each slider.
+        Receives the HTML of the strips, one for each slider.
     """
 
     def __init__(self, robot: Robot, settings: list[Slider], write: Callable[[list[str]], None]):
@@ -72,7 +72,7 @@ class Strips:
             self._changed.notify()
 
     def close(self) -> None:
-        """Stop following."""
+        """Stop updating."""
         with self._changed:
             self._closed = True
             self._changed.notify()

@@ -16,7 +16,7 @@ from .geometry import FARTHEST
 if TYPE_CHECKING:
     import xarray as xr
 
-ENOUGH = 3  # samples of a block of cells, on the average
+ENOUGH = 3  # samples of a block of cells, on average
 MOST_BLOCKS = 24  # along an axis
 BANDS = 8  # of colour
 
@@ -28,13 +28,13 @@ class Surface:
     Attributes
     ----------
     mesh
-        Of the boundary.
+        The boundary.
     axes
-        Places of the grid's points along each axis of {G} [m].
+        Coordinates of the grid's points along each axis of {G} [m].
     shares
         The share of accepted samples at each point of the grid.
     margins
-        Capacity margin at rest at each point of the grid with attitude and carriers at home [N], none below 0.
+        Capacity margin at rest at each point of the grid with attitude and carriers at home [N], at least 0.
     """
 
     mesh: Mesh
@@ -79,10 +79,10 @@ class Surface:
 
 
 def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
-    """Return the surface of a dataset of `workspace.sample`; None if it is flat, or has no counts or places in them.
+    """Return the surface of a dataset of `workspace.sample`; None if it is flat, or has no usable counts or cells.
 
-    Cells are joined to blocks that have enough samples. In a block that is half inside, half of the samples are
-    accepted; of a workspace whose attitudes or carriers vary, any accepted sample counts.
+    Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of the
+    samples are accepted, or any sample if attitudes or carriers vary.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
 
 
 def _has_counts(dataset: xr.Dataset) -> bool:
-    """Return whether a file has finite counts in cells that are evenly spaced within reach of a picture."""
+    """Return whether a file has finite counts in evenly spaced cells that are near enough to be drawn."""
     if any(name not in dataset or dataset[name].dims != ("x", "y", "z") for name in ("tried", "reached")):
         return False
     values = [dataset[name].to_numpy() for name in ("tried", "reached", "x", "y", "z") if name in dataset.variables]
@@ -145,11 +145,11 @@ def _at(values: np.ndarray, axes: tuple[np.ndarray, ...], points: np.ndarray) ->
     """Return values of a grid at points (..., 3), linear between its points."""
     from scipy.interpolate import RegularGridInterpolator
 
-    outside: Any = None  # extrapolated: its stubs know numbers only
+    outside: Any = None  # extrapolate; the type stubs accept numbers only
     return RegularGridInterpolator(axes, values, bounds_error=False, fill_value=outside)(points)
 
 
 def _compact(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices that faces use, and the faces by their numbers."""
+    """Return the vertices that faces use, and the faces with these vertices renumbered."""
     used, numbers = np.unique(faces, return_inverse=True)
     return vertices[used], numbers.reshape(faces.shape)

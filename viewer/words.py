@@ -18,7 +18,7 @@ from .instant import Instant, arrow
 from .subject import Subject
 
 MUTED = "#595959"
-GHOST = style.colour(2)  # of the reference of a flight
+GHOST = style.colour(2)  # the reference of a flight
 OTHER = "#444444"  # of the plan or flight that is compared
 PART, BLACK = "#969696", "#000000"  # of posts; of pulleys and rotors
 STOPS = 9  # of the legend's gradient
@@ -134,7 +134,7 @@ def legend(subject: Subject, cell: float) -> str:
     marks += [("platform, cables and path of the other", OTHER)] if subject.other else []
     marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
     marks += [("reach of a carrier", style.colour(3))] if any(c.drawing.boxes for c in robot.carriers) else []
-    marks += [("direction of the wrench that is missing (its force)", style.colour(1))]
+    marks += [("missing wrench: the direction of its force", style.colour(1))]
     marks += subject.cloud.legend if subject.cloud else []
     rows = [f'<div><span style="color:{hue}">&#9632;</span> {escape(name)}</div>' for name, hue in marks]
     summary = f'<div style="color:{MUTED}">{escape(subject.cloud.summary)}</div>' if subject.cloud else ""

@@ -1,7 +1,7 @@
-"""Raise Ctrl-C again where it was swallowed: `heeding` around the work, `raise_if_swallowed` within it.
+"""Raise an interrupt (Ctrl-C) again that was swallowed: `heeding` around the work, `raise_if_swallowed` within it.
 
 CasADi calls Python while it converts the operands of an expression, and takes any exception there, an interrupt too, as
-"not of this type". To make a robot's expressions takes up to a second, and planning would go on as if nothing had
+"not of this type". Building a robot's expressions takes up to a second, and planning would go on as if nothing had
 happened.
 """
 
@@ -21,9 +21,9 @@ _arrived = threading.Event()
 
 @contextmanager
 def heeding() -> Iterator[None]:
-    """Remember an interrupt that arrives within, and raise it at the latest at the end.
+    """Remember an interrupt that arrives in the block, and raise it no later than at the end of the block.
 
-    Where the program has a handler of its own, or in another thread than the main one, nothing changes.
+    Nothing changes if the program has its own handler, or in threads other than the main one.
 
     Raises
     ------

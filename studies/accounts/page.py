@@ -39,7 +39,7 @@ def _counts(account: Account, chapters: list[tuple[str, str]]) -> str:
 
 
 def _errata(account: Account) -> list[str]:
-    """Return what was not reproduced: where, what the paper states, and why; each leads to its claim."""
+    """Return what was not reproduced: where, what the paper states, and why; each row links to its claim."""
     rows = [
         (html.link(claim.place, _anchor(claim)), claim.statement, claim.verdict.value, claim.why)
         for claim in account.errata

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
 FIGURES = "figures"  # the folder beside the report
 READ = (
-    "The paper was read as text recognised from its pages: a single wrong symbol may be an error of the recognition, "
-    "not of the authors."
+    "The paper was read as text recognised from its pages (OCR): a single wrong symbol may be an error of the "
+    "recognition, not of the authors."
 )
 
 

@@ -64,7 +64,7 @@ def _newton(dynamics: Dynamics, samples: Instants) -> Claim:
         within=ROUNDING,
         agrees="The equation is in balance.",
         differs="F_e, the force of the wind, is defined below the equation and used in Eq. 26, but is not in Eq. 24; "
-        f"with it the rest is {np.abs(left - wind).max():.0e} N.",
+        f"with it the remainder is {np.abs(left - wind).max():.0e} N.",
         unit="N",
     )
 

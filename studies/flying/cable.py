@@ -157,7 +157,7 @@ def _switch(robot: Robot) -> Claim:
         agrees="The force on the pulley is the tension of the stretched cable.",
         differs="Node 0 is fixed at the pulley, so by this rule element 1 never pulls and the force on the pulley is "
         "zero, "
-        "the printed value. An element pulls as long as it, with the tension that it had, is longer than at rest.",
+        "the printed value. An element pulls as long as it is longer than at rest, its earlier elongation included.",
         unit="N",
     )
 

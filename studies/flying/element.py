@@ -157,7 +157,7 @@ def _sizes() -> list[Claim]:
             "[k_5 k_6]^T, [dx u dx u]^T and [de u de u]^T, where u is a column, are 6 x 1",
             "6 x 1",
             bracket,
-            "The brackets must be the columns below each other.",
+            "The brackets must be the columns, one below the other.",
         ),
         (
             "eq-20-size",

@@ -164,7 +164,7 @@ def _pitching(part: Flown) -> Claim:
         0.0,
         float(part.gives.error.max()),
         missing=f"The flight and the pitch are not printed. With the assumed ones the distance is largest at "
-        f"{part.gives.times[worst]:.1f} s: the drag of the flight begins where a quadrotor that gives way is still on "
+        f"{part.gives.times[worst]:.1f} s: the drag sets in before a quadrotor that gives way has left "
         f"its plan, and tensions inside the limits are short by up to {short:.1f} N. Under one that stays on the plan "
         f"it is {100 * float(part.stays.error.max()):.0f} cm.",
         unit="m",
@@ -244,7 +244,7 @@ def _stability(stays: Flight, gives: Flight) -> Claim:
         holds=off[0] <= off[1],
         agrees="The error is smaller under a quadrotor that hovers.",
         differs=f"Under a quadrotor that hovers, no tensions in their range give the wrench in {unanswered:.0%} of the "
-        f"steps. One that moves with the wind by up to {100 * moved(gives):.0f} cm takes it off the cables, with "
+        f"steps. One that moves with the wind by up to {100 * moved(gives):.0f} cm relieves the cables, with "
         f"tensions in their range in {gives.answered['as planned'] / len(gives.references):.0%} of the steps.",
         figure="flown-hovering",
     )

@@ -124,8 +124,8 @@ def _sine_of_lengths(crossed: np.ndarray) -> Claim:
         "amplitude, printed pairing).",
         0.0,
         off,
-        missing="The squares of the lengths are sines, the lengths are not, but this distance may pass as one in a "
-        f"figure whose values are not printed. With crossed pairs it is {others:.1%}.",
+        missing="The squares of the lengths are sines, the lengths are not, but a figure without printed values may "
+        f"not show this distance. With crossed pairs it is {others:.1%}.",
         figure="helix-cables",
     )
 
@@ -187,8 +187,8 @@ def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndar
         holds=shortfall <= 0 and not excluded,
         otherwise=Verdict.IMPOSSIBLE if excluded else Verdict.NOT_DETERMINED,
         agrees="Tensions above zero exist, at the worst instant too.",
-        differs=f"With any pairing cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
-        f"{pull.needed:.2f} N is needed. With crossed pairs tensions are short by {shortfall:.2f} N at "
+        differs=f"With any pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
+        f"{pull.needed:.2f} N is needed. With crossed pairs, tensions are short by {shortfall:.2f} N at "
         f"{TIMES[row]:.1f} s, along a verified direction."
         if excluded
         else "With crossed pairs no tensions give the wrench, which excludes no other pairing.",

@@ -138,7 +138,7 @@ def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, uni
         None,
         float(np.abs(run).max()),
         missing="The paper prints no result of this step to compare. Two computations of this toolkit, step by step "
-        f"and in one pass, {agree}: they read the step in the same manner.",
+        f"and in one pass, {agree}: they interpret the step in the same way.",
         unit=unit,
         figure="procedure",
     )

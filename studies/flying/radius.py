@@ -80,7 +80,7 @@ def _largest(best: float, crossed: float, kept: str) -> Claim:
         otherwise=Verdict.IMPOSSIBLE,
         agrees="Some pairing holds the platform there.",
         differs=f"Of the {len(PAIRINGS)} pairings {taut} have rank 6 and hold the platform at the centre with every "
-        "cable taut. The best of all reaches the computed radius, and none holds at "
+        "cable taut. The best of all reaches the computed radius, and none holds the platform at "
         f"{', '.join(f'{radius:g}' for radius in beyond)} m. Crossed pairs reach {crossed:.4f} m, {kept}.",
         unit="m",
         figure="radius",
@@ -92,8 +92,8 @@ def _inward() -> Claim:
     return stated(
         "circle-any-pairing",
         "VI.A, VI.B",
-        f"With the pairing that the figures use, cables that carry the weight pull inward as a circle of {RADIUS:g} m "
-        "requires (that force; the least that any pairing gives).",
+        "With the pairing that the figures use, cables that carry the weight pull inward with the force that a "
+        f"circle of {RADIUS:g} m requires (that force; the least that any pairing gives).",
         pull.needed,
         pull.least,
         holds=pull.least <= pull.needed,

@@ -49,7 +49,7 @@ def _hovering(planned: Plan) -> Claim:
             f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind."
         )
     why += (
-        f" With any other pairing cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
+        f" With any other pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
         f"{pull.needed:.2f} N is needed."
         if excluded
         else " That excludes crossed pairs alone."

@@ -104,8 +104,8 @@ def _length(lengths: np.ndarray) -> Claim:
         "Over the turn cable 1 is short, long, short (length at the start, after half a turn and at the end).",
         "short, long, short",
         f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m",
-        missing="Where the turn starts is not printed. Assumed: where cable 1 is shortest. The middle is longer than "
-        f"start and end for {share:.0%} of the starts.",
+        missing="Where the turn starts is not printed. Assumed: where cable 1 is shortest. For "
+        f"{share:.0%} of all starts it is longer after half a turn.",
         figure="turn",
     )
 
@@ -136,7 +136,7 @@ def _tension() -> Claim:
         agrees="Length and tension rise together.",
         differs=f"The opposite holds with each of the {len(flying)} pairings whose cables all pull on that circle: a "
         "long cable is on the far side of the platform, and the near cables carry the load. On the printed circle "
-        "no pairing has pulling cables only.",
+        "there is no pairing whose cables all pull.",
         figure="turn",
     )
 
@@ -185,11 +185,12 @@ def _no_ratio(tensions: np.ndarray) -> Claim:
         "fig-11-circle",
         "VI.B, figure 11",
         f"On the circle of radius {RADIUS:g} m dT / T of cable 1 has a largest value (pairings of rank 6 whose steady "
-        "T of cable 1 does not pass zero).",
+        "T of cable 1 does not pass through zero).",
         "a largest value",
         f"{pulls.shape[1] - changing} of {pulls.shape[1]}",
-        missing="The printed pairing has no inverse, so its T is not determined. Where T passes zero, dT / T has no "
-        f"bound for any vibration: with crossed pairs at {', '.join(f'{time:.1f} s' for time in crossing)}. With "
+        missing="The printed pairing has no inverse, so its T is not determined. Where T passes through zero, dT / T "
+        "has no bound for any vibration: with crossed pairs "
+        f"at {', '.join(f'{time:.1f} s' for time in crossing)}. With "
         "every pairing some cable would have to push.",
     )
 

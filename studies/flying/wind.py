@@ -111,8 +111,8 @@ def _lift(dynamics: Dynamics) -> Claim:
         "F_ez = C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind, upwards.",
         printed,
         lift,
-        missing=f"The lift of this run is {used}. Why a wind across lifts the platform, and the wind along z, drawn in "
-        "figure 5, is part of no force, is not printed.",
+        missing=f"The lift of this run is {used}. The paper does not explain why a horizontal "
+        "wind lifts the platform, nor why the wind along z, drawn in figure 5, causes no force.",
         unit="N",
     )
 

@@ -137,7 +137,7 @@ def _gyroscopic() -> Claim:
     return compared(
         "eq-4-gyroscopic",
         "Eqs. 4, 9",
-        "The moments of the cables only have to give M ddX (moment that is left out).",
+        "The moments of the cables need to give no more than M ddX (moment that is left out).",
         0.0,
         float(np.linalg.norm(left_out)),
         within=1e-3,

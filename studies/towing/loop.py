@@ -202,13 +202,13 @@ def _drawn() -> Claim:
     return compared(
         "step-b",
         "step (b)",
-        "The robot-ends and the posture are drawn at random (coordinates of the load that then are still free, for W1, "
+        "The robot-ends and the posture are drawn at random (coordinates of the load that are then still free, for W1, "
         "W2, W3).",
         (0.0, 0.0, 0.0),
         missing,
         within=0.0,
         agrees="The lengths give the position.",
-        differs="Where the lengths are not given they give no position: it must be drawn too, and the lengths follow. "
+        differs="Where no lengths are given, no position follows: it must be drawn too, and gives the lengths. "
         "This run draws it uniformly in the box of Eq. 15, from the ground.",
     )
 

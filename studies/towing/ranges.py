@@ -277,7 +277,7 @@ def _repeated(samples: Mapping[str, Loops]) -> Claim:
         tuple(apart),
         holds=max(apart) <= DIGIT,
         agrees="They do.",
-        differs="The ends of the ranges are corners of the workspaces, which few loops come near; with more loops the "
-        "ranges still grow.",
+        differs="The ends of the ranges are corners of the workspaces, to which few loops come close; with more loops "
+        "the ranges still grow.",
         unit="m",
     )

@@ -176,10 +176,9 @@ def _rank_test() -> Claim:
         holds=passed > 0.0,
         otherwise=Verdict.IMPOSSIBLE,
         agrees="Some random postures have equal ranks.",
-        differs=f"None of {len(relative)} postures has equal ranks: three cables balance six rows on a set without "
-        "volume "
-        f"only. For 1 % of them the residual is at most {np.quantile(relative, 0.01):.2f} of the weight. The paper's "
-        "figures show the balance of forces alone.",
+        differs=f"None of {len(relative)} postures has equal ranks: three cables balance six rows only on a set "
+        f"without volume. For 1 % of them the residual is at most {np.quantile(relative, 0.01):.2f} of the weight. "
+        "The paper's figures show the balance of forces alone.",
     )
 
 
