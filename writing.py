@@ -104,7 +104,7 @@ def _remove_empty(folders: list[Path]) -> None:
 
 
 def check_writable(path: Path) -> Path:
-    """Return the file behind `path`; call this before computing its contents, and before writing anything.
+    """Return the file that `path` leads to; call this before computing its contents, and before writing anything.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def check_writable(path: Path) -> Path:
         nearest = next(folder for folder in target.parents if folder.exists())
         if not nearest.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-        with tempfile.TemporaryFile(dir=nearest):  # permissions alone do not state it: root has all, even in /proc
+        with tempfile.TemporaryFile(dir=nearest):  # permissions do not suffice: root has all, even in /proc
             pass
     except InputError:
         raise

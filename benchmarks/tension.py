@@ -200,7 +200,7 @@ class _Runner:
 def measure(
     task: Task, who: Sequence[Contender], repeats: int, limit: float, show: Callable[[int], None] = lambda turns: None
 ) -> list[Row]:
-    """Measure contenders at one task, in blocks that take turns; the reference is to be among them.
+    """Measure contenders at one task, in blocks that take turns; the reference must be among them.
 
     `show` is called after each turn with how many are done.
     """

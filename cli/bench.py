@@ -24,7 +24,7 @@ def _bench() -> None:
 
 @contextmanager
 def results_alone() -> Iterator[None]:
-    """Send to standard error what libraries print while the block runs: HiGHS, from 1.16 on, prints its version.
+    """Redirect what libraries print in the block to standard error: HiGHS, from 1.16 on, prints its version.
 
     C code prints this, not Python, so the file descriptor itself changes.
     """

@@ -50,7 +50,7 @@ FormatOption = Annotated[
     typer.Option(
         "--format",
         metavar="FORMAT",
-        help="Of figures, which are as wide as a journal's column (88 mm): png, pdf or svg.",
+        help="Format of figures, which are as wide as a journal's column (88 mm): png, pdf or svg.",
     ),
 ]
 
@@ -68,7 +68,7 @@ def check_unused(speed: float, fps: float) -> None:
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """Print as JSON; numbers that are not finite become null, since JSON has no name for them, and paths text."""
+    """Print as JSON; numbers that are not finite become null, since JSON cannot express them, and paths become text."""
     import json
     import math
     import os

@@ -96,7 +96,7 @@ def workspace(
         ),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option("--figure", help="Picture of the positions reached to write: .png, .pdf or .svg.")
+        Path | None, typer.Option("--figure", help="Picture of the reached positions to write: .png, .pdf or .svg.")
     ] = None,
     mesh: Annotated[
         Path | None,

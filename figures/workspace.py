@@ -64,7 +64,7 @@ def cross_sections(
         first = first or ax
         ax.tick_params(labelbottom=lowest, labelleft=leftmost)
         _panel(ax, {"": shown[place]}, None if marks is None else marks[:, :2])
-        ax.set_aspect("equal", adjustable="box")  # the limits are what is to be equal
+        ax.set_aspect("equal", adjustable="box")  # the limits must stay equal
         style.heading(ax, f"z = {height:g} m ± {500 * thickness:g} mm,\n{len(shown[place])} points", 1 / columns)
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)

@@ -1,4 +1,4 @@
-"""Pose a robot by hand: sliders and handles in the scene that agree, cables that keep their lengths, feasible poses."""
+"""Pose a robot by hand: with sliders, with handles in the scene, hanging on cables of fixed lengths, or feasibly."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Posing:
         return handle
 
     def _slid(self, event: Any, setting: Slider) -> None:
-        if event.client_id is None:  # otherwise `_go` set it
+        if event.client_id is None:  # otherwise `_go` has set it
             return
         pose, carriers = self._pose.copy(), self._carriers.copy()
         (pose if setting.carrier is None else carriers[setting.carrier])[setting.coordinate] = event.target.value
@@ -148,14 +148,14 @@ class Posing:
         pose, carriers
             (6,) and (c, 6).
         lengthen
-            Cables get the lengths of this pose; otherwise they keep theirs, if the platform hangs.
+            Cables take the lengths of this pose; otherwise they keep theirs while "let it hang" is on.
         held
-            The slider or handle that a user holds. It stays where it is, for its next event may be on its way, unless
+            The slider or handle that a user holds. It is not moved, because its next event may be on its way, unless
             it is a slider and the platform hangs elsewhere.
         """
         self._latest = number = self._latest + 1
         with self._busy:
-            if number != self._latest:  # while this one waited, a later one came
+            if number != self._latest:  # a later call came while this one waited
                 return
             try:
                 if lengthen or not self._hang.value:
@@ -188,7 +188,7 @@ class Posing:
         self._strips.close()
 
     def _shade(self, strips: list[str]) -> None:
-        """Show strips below the sliders; none where the platform hangs, as it then rests elsewhere."""
+        """Show strips below the sliders; none while the platform hangs, because it then rests elsewhere."""
         with self._server.atomic():
             for track, content in zip(self._tracks, strips, strict=True):
                 shown = "" if self._hang.value else content
@@ -203,7 +203,7 @@ class Posing:
 
 
 def few_cables(robot: Robot) -> bool:
-    """Return whether cables leave some motion of the platform free, so that it rests at few poses."""
+    """Return whether the cables leave some motion of the platform free, so that it can rest only at certain poses."""
     return robot.m < int(robot.dof_mask.sum()) and robot.weight > 0
 
 

@@ -50,7 +50,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     Raises
     ------
     InputError
-        If `subject` is none, viser is not installed, or host or port are not possible.
+        If `subject` is not a `Subject`, viser is not installed, or the host or port is invalid.
     """
     required("subject", subject, Subject)
     _check_address(host, port)
@@ -85,7 +85,7 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If `subject` is none, viser is not installed, or the file cannot be written.
+        If `subject` is not a `Subject`, viser is not installed, or the file cannot be written.
     """
     required("subject", subject, Subject)
     path = file_path("file", file)

@@ -1,4 +1,4 @@
-"""Compute the lines of what a robot is recognised by: rotors, sheaves of pulleys, posts."""
+"""Compute the lines of parts that make a robot recognisable: rotors, sheaves of pulleys, posts."""
 
 from __future__ import annotations
 

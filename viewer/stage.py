@@ -32,7 +32,7 @@ BLACK, GREY = (0, 0, 0), (150, 150, 150)
 DOT = 0.008  # of the robot's size: diameter of the ends of cables
 HEAD = 0.25  # of an arrow's length
 BARBS = 12
-AIMS = 50  # of a camera, that are remembered
+AIMS = 50  # of a camera that are remembered
 ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
 CELLS = 10  # of the grid along the robot's size, about
 
@@ -183,7 +183,7 @@ class Stage:
         away = self.nearest / min(width / height, free, 1.0)
         side = np.cross([0.0, 0.0, 1.0], ALONG)
         upwards = np.cross(ALONG, side / np.linalg.norm(side))
-        # The middle of what the panel leaves free, above the middle of the picture.
+        # The part that the panel leaves free has its centre above that of the picture.
         centre = self.centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
         camera.position = centre + away * ALONG
         camera.look_at = centre
@@ -277,7 +277,7 @@ class Stage:
             for index in range(robot.m)
         ]
         ends = np.zeros((robot.m, 3), np.float32)
-        # Dots on a platform much smaller than the robot would hide it.
+        # Dots would hide a platform that is much smaller than the robot.
         small = min(DOT * size, 0.25 * float(np.ptp(robot.attachments, axis=0).max()) or DOT * size)
         self._ends = [
             scene.add_point_cloud(name, ends, BLACK, point_size=dot, point_shape="circle", precision="float32")

@@ -30,11 +30,11 @@ class TimeLine:
     server
         Its panel gets the controls, its command palette the keys.
     replay
-        What plays.
+        The motion to play.
     show
         Draws an instant.
     other
-        Is charted beside it, if there is one.
+        Charted with it, if given.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class TimeLine:
     def _go(self, index: int, at: float | None = None) -> None:
         """Show an instant in scene, panel, charts and on the time line in one update.
 
-        `at` is where the time line is to be [s], between two instants; default: at the instant.
+        `at` is the position of the time line [s], between two instants; default: at the instant.
         """
         with self._busy:
             index = min(max(index, 0), len(self._replay.times) - 1)

@@ -8,16 +8,16 @@ from ..models import Robot
 from .condition import Condition
 from .places import Places
 
-SCATTERED = 4000  # poses of the first look, at distances of all magnitudes
-ROUNDS, AROUND, BETWEEN = 10, 400, 40  # then about the best one so far, and on the line to it
+SCATTERED = 4000  # poses of the first round, at distances of all magnitudes
+ROUNDS, AROUND, BETWEEN = 10, 400, 40  # then about the best pose so far, and on the line to it
 SHRINK = 0.6  # of the surroundings, each round
-NEAREST = 1e-4  # of the size, of the first look
+NEAREST = 1e-4  # of the size, in the first round
 
 
 def nearest_feasible(
     robot: Robot, condition: Condition, pose: np.ndarray, carriers: np.ndarray, size: float
 ) -> np.ndarray | None:
-    """Return the pose nearest to `pose` at which a condition holds, to some percent of the distance, or None.
+    """Return the pose nearest to `pose` at which a condition holds, to a few per cent of the distance, or None.
 
     The search samples poses; it may miss a feasible set that is thin or has several parts. Distances are metres, and
     radians times `Robot.length`.

@@ -1,4 +1,4 @@
-"""`PoseEstimate`: the pose that fits measured cable lengths best, and how far it is to be believed."""
+"""`PoseEstimate`: the pose that fits measured cable lengths best, and how far it can be trusted."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class PoseEstimate:
 
     @cached_property
     def conditioned(self) -> Any:
-        """Return whether the covariance is to be believed, (...): the lengths are nearly linear about the pose.
+        """Return whether the covariance can be trusted, (...): the lengths are nearly linear about the pose.
 
         It is False where the standard deviation of an angle exceeds 5 degrees, or where two standard deviations away,
         along any principal axis of the covariance, half of the change of the lengths is not linear.

@@ -202,7 +202,7 @@ def _measure_rows(work, at, k):
         work[values + i] = value
         excess = max(value, 0.0)
         rest = weight + square * excess - force
-        # Below 0 there is to be no force, at 0 any up to the weight, above it the slope of the penalty.
+        # Below 0 no force is allowed, at 0 any up to the weight, above it the slope of the penalty.
         off = force * (excess - value) if value < 0.0 else abs(rest) * excess
         off = max(off, scale * max(-rest if value <= 0.0 else 0.0, -force))
         work[at[WORST_ROW] + i] = max(off, work[at[WORST_ROW] + i])
