@@ -77,7 +77,7 @@ def as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
         if given.dtype.kind not in "fiubO":
             raise TypeError
         array = given.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # whatever the array interface of another library raises
         raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
         raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")

@@ -2,6 +2,7 @@
 
 import re
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from towline.viewer import read, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest
 from towline.viewer.sliders import sliders, whole_steps
+from towline.viewer.stage import Stage
 from towline.viewer.surface import surface
 from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
 from towline.workspace.nearest import nearest_feasible
@@ -136,6 +138,19 @@ def test_the_nearest_pose_counts_a_turn_by_the_length_of_the_robot(turn, nearest
     assert np.linalg.norm([*off[:3], *off[3:] * robot.length]) < 1.1 * min(0.3, turn)
 
 
+def test_a_feasible_set_of_one_pose_is_found_whatever_the_rounding():
+    robot = load("cogiro")
+
+    class Home(Condition):
+        def evaluate(self, robot, places):
+            return (places.pose == robot.home).all(axis=1)
+
+    start = np.array([0.1, -0.7, -3.9, 0.1, 0.2, 0.7])
+    assert (start + (robot.home - start) != robot.home).any()
+    found = nearest_feasible(robot, Home(), start, robot.carrier_home, 20.0)
+    np.testing.assert_array_equal(found, robot.home)
+
+
 @pytest.mark.parametrize("wire", ["planar-4"], indirect=True)
 def test_the_button_goes_to_the_nearest_feasible_pose(wire):
     settle(wire)
@@ -202,6 +217,33 @@ def test_a_workspace_is_cut_along_each_axis(tmp_path):
         wire.close()
 
 
+def test_cuts_are_drawn_one_after_the_other_and_the_last_one_stays(tmp_path, monkeypatch):
+    """A slider that is dragged calls from many threads at once."""
+    save(sample(load("planar-4"), StaticEquilibrium(), samples=2000), tmp_path / "space.nc")
+    drawn, inside, together = [], [], []
+
+    def show_cloud(self, shown, most):
+        inside.append(most)
+        time.sleep(0.05)
+        together.append(len(inside))
+        drawn.append(inside.pop()[0])
+
+    monkeypatch.setattr(Stage, "show_cloud", show_cloud)
+    with serve(read(str(tmp_path / "space.nc")), port=0) as url:
+        wire = Wire(url)
+        settle(wire)
+        drawn.clear()
+        together.clear()
+        ends = wire.element(label="x up to [m]")[1]
+        for share in np.linspace(0.1, 0.9, 9).tolist():
+            wire.set(ends["min"] + share * (ends["max"] - ends["min"]), label="x up to [m]")
+        settle(wire)
+        wire.close()
+    assert set(together) == {1}
+    assert len(drawn) < 9
+    assert drawn[-1] == pytest.approx(ends["min"] + 0.9 * (ends["max"] - ends["min"]))
+
+
 @pytest.fixture(scope="module")
 def space():
     """The workspace of cogiro below 5.5 m, and the robot."""
@@ -252,6 +294,42 @@ def test_counts_and_cells_of_a_file_that_are_no_numbers_are_no_surface(space, na
     values[(1,) * values.ndim] = value
     assert surface(dataset.assign({name: (dataset[name].dims, values)}), robot) is None
     assert surface(dataset.drop_vars(name), robot) is None
+
+
+def test_without_samples_in_a_file_its_region_states_that_attitudes_vary():
+    """Each sample of a cell has another attitude, so the share of them that is accepted is not that of the cell."""
+    robot = load("cogiro")
+    region = {
+        "position": {"min": [-7, -5, 0.5], "max": [7, 5, 5.5]},
+        "attitude": {"min": [-0.6, -0.6, -0.6], "max": [0.6, 0.6, 0.6]},
+    }
+    without, having = (sample(robot, StaticEquilibrium(), region, 10_000, keep=keep) for keep in ("none", "all"))
+    found = surface(without, robot)
+    np.testing.assert_array_equal(found.shares, surface(having, robot).shares)
+    assert set(np.unique(found.shares)) == {0.0, 1.0}
+    share = having["accepted"].to_numpy().mean()
+    assert found.mesh.volume > 1.1 * share * 14 * 10 * 5
+    for wrong in ("{", "[]", '{"attitude": 3}', 5):
+        assert surface(without.assign_attrs(region=wrong), robot) is not None
+
+
+def test_the_surface_ends_with_the_box_of_the_samples_whatever_the_number_of_cells():
+    """With few samples three cells are a block, and 32 are no whole blocks."""
+    robot = load("cogiro")
+    low, high = np.array([-3, -2, 1.0]), np.array([3, 2, 3.0])
+    region = {"position": {"min": low.tolist(), "max": high.tolist()}}
+    dataset = sample(robot, StaticEquilibrium(), region, samples=5000, keep="none")
+    found = surface(dataset, robot)
+    assert len(found.axes[0]) == 11
+    assert dataset.attrs["accepted"] == 5000
+    np.testing.assert_allclose(found.mesh.vertices.min(axis=0), low, atol=1e-9)
+    np.testing.assert_allclose(found.mesh.vertices.max(axis=0), high, atol=1e-9)
+    assert found.mesh.volume == pytest.approx(6 * 4 * 2, rel=0.02)
+
+
+def test_a_file_that_states_no_sample_was_tried_has_no_surface(space):
+    dataset, robot = space
+    assert surface(dataset.assign(tried=0 * dataset["tried"]), robot) is None
 
 
 def test_without_scikit_image_the_points_stay_and_a_line_names_the_extra(space, monkeypatch, tmp_path):

@@ -2,6 +2,7 @@
 
 import io
 import re
+import threading
 import time
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from towline.ocp import plan
 from towline.viewer import read, serve
 from towline.viewer.curves import Curves, curves
 from towline.viewer.film import scene
+from towline.viewer.replay import Replay
 
 from .viewer_wire import Wire
 
@@ -198,3 +200,46 @@ def test_only_motions_of_one_robot_are_compared(folder):
     saved.to_netcdf(folder / "another.nc", engine="h5netcdf")
     with pytest.raises(InputError, match=r"another.nc must be of wang-flying with 6 cables, got another"):
         read(str(folder / "line.nc"), other=str(folder / "another.nc"))
+
+
+@pytest.mark.parametrize("wire", ["line"], indirect=True)
+def test_playing_that_is_paused_while_it_waits_for_a_drag_moves_nothing(wire, monkeypatch):
+    at, go_on = Replay.at, threading.Event()
+
+    def slow(self, index, prove=True):
+        go_on.wait(5)
+        return at(self, index, prove)
+
+    monkeypatch.setattr(Replay, "at", slow)
+    wire.set(1.0, label="time [s]")  # its drawing takes a while
+    time.sleep(0.2)
+    play = wire.element(label="Play")[0]
+    for _ in range(2):
+        wire.send(type="GuiUpdateMessage", uuid=play, updates={"value": True})
+        time.sleep(0.2)
+    go_on.set()
+    while wire.read(0.4):
+        pass
+    assert wire.element(label="Play")[0] == play
+    assert "t = 1.00 s" in wire.readout()
+
+
+@pytest.mark.parametrize("wire", ["line"], indirect=True)
+def test_two_clicks_at_once_draw_one_film(wire, monkeypatch):
+    drawn = []
+
+    def film(replay):
+        drawn.append(replay)
+        time.sleep(0.3)
+        return b"GIF"
+
+    monkeypatch.setattr("towline.viewer.panel.film", film)
+    for _ in range(2):
+        wire.set(True, label="Save film")
+    while wire.read(0.6):
+        pass
+    assert len(drawn) == 1
+    wire.set(True, label="Save film")
+    while wire.read(0.6):
+        pass
+    assert len(drawn) == 2

@@ -64,12 +64,18 @@ class Panel:
         scale = self._gui.add_html("")
         cuts: list[Any] = []
         found: list[Surface] = []
+        drawing, latest = threading.Lock(), 0
         for name, column in zip("xyz", positions.T if len(positions) else np.zeros((3, 1)), strict=True):
             low, high, step = whole_steps(float(column.min()), float(column.max()))
             cuts.append(self._gui.add_slider(f"{name} up to [m]", low, high, step, high))
 
         def cut(_: Any) -> None:
-            with self._server.atomic():
+            nonlocal latest
+            latest = number = latest + 1
+            # viser calls this from many threads, and its updates are no locks: two would leave bands of both.
+            with drawing, self._server.atomic():
+                if number != latest:  # the later one reads the sliders too
+                    return
                 most = np.array([it.value for it in cuts])
                 self._stage.show_cloud(points.value, most)
                 if found:
@@ -97,9 +103,11 @@ class Panel:
 
     def _add_film(self, replay: Replay) -> None:
         """Add a button that draws a film in a thread of its own, while the view goes on."""
-        button = self._gui.add_button("Save film")
+        button, drawing = self._gui.add_button("Save film"), threading.Lock()
 
         def save(client: viser.ClientHandle | None) -> None:
+            if not drawing.acquire(blocking=False):  # clicked again before a browser had disabled the button
+                return
             button.disabled, button.label = True, "Drawing a film ..."
             try:
                 drawn = film(replay)
@@ -109,6 +117,7 @@ class Panel:
                 self._refuse(str(error))
             finally:
                 button.disabled, button.label = False, "Save film"
+                drawing.release()
 
         # A daemon, so that the process ends at Ctrl-C without waiting for it.
         button.on_click(lambda event: threading.Thread(target=save, args=(event.client,), daemon=True).start())

@@ -25,7 +25,7 @@ class Slider(NamedTuple):
         Index of its carrier, or None for the platform.
     coordinate
         Index in (x, y, z, roll, pitch, yaw).
-    low, high, home, step
+    low, high, step
         [m] or [rad].
     """
 
@@ -33,7 +33,6 @@ class Slider(NamedTuple):
     coordinate: int
     low: float
     high: float
-    home: float
     step: float
 
     @property
@@ -72,15 +71,6 @@ def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
     return [slider for slider in found if slider.high > slider.low]
 
 
-def poses(robot: Robot, settings: list[Slider], values: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the poses of platform (6,) and carriers (c, 6) in {G} for slider `values`, all else at home [m, rad]."""
-    pose, carriers = robot.home.copy(), robot.carrier_home.copy()
-    for slider, value in zip(settings, values, strict=True):
-        owner = pose if slider.carrier is None else carriers[slider.carrier]
-        owner[slider.coordinate] = value
-    return pose, carriers
-
-
 def whole_steps(low: float, high: float) -> tuple[float, float, float]:
     """Return ends of a slider that are whole steps around a range, and the step: a power of ten, a 200th or less."""
     span = max(high - low, SHORTEST)
@@ -94,9 +84,9 @@ def whole_steps(low: float, high: float) -> tuple[float, float, float]:
 def _slider(carrier: int | None, coordinate: int, low: float, high: float, home: float) -> Slider:
     """Return a slider whose ends are whole steps inside the range, so that they are round numbers."""
     if not high > low:
-        return Slider(carrier, coordinate, float(home), float(home), float(home), 1.0)
+        return Slider(carrier, coordinate, float(home), float(home), 1.0)
     digits = int(np.ceil(-np.log10((high - low) / 200)))
     step = 10.0**-digits
     inner_low = round(float(np.ceil(low / step - 1e-6)) * step, max(digits, 0))
     inner_high = round(float(np.floor(high / step + 1e-6)) * step, max(digits, 0))
-    return Slider(carrier, coordinate, min(inner_low, float(home)), max(inner_high, float(home)), float(home), step)
+    return Slider(carrier, coordinate, min(inner_low, float(home)), max(inner_high, float(home)), step)

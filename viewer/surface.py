@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..models import Robot
 from ..workspace.boundary_mesh import Mesh, boundary_of_values
 from ..workspace.conditions.margin import Margin
+from ..workspace.domain import Domain
 from ..workspace.places import Places
+from ..workspace.region import Region
 from .geometry import FARTHEST
 
 if TYPE_CHECKING:
@@ -97,17 +101,17 @@ def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
     joined = 1
     while -(-max(tried.shape) // joined) > MOST_BLOCKS or tried.sum() * joined**3 < ENOUGH * tried.size:
         joined += 1
-    if min(tried.shape) < 4 * joined:
-        return None
-    axes = []
+        if min(tried.shape) < 4 * joined:  # here, because a file may state that no sample was tried at all
+            return None
+    axes, ends = [], []
     for name in "xyz":
         places = dataset[name].to_numpy().astype(float)
         edge = places[1] - places[0]
         axes.append(places[0] + edge * (joined * np.arange(-(-len(places) // joined)) + (joined - 1) / 2))
+        ends.append((places[0] - edge / 2, places[-1] + edge / 2))  # the last block may be of fewer cells
     tried, reached = (_joined(counts, joined) for counts in (tried, reached))
-    varies = "attitude" in dataset or "carrier_position" in dataset
-    shares = (reached > 0).astype(float) if varies else reached / np.maximum(tried, 1.0)
-    mesh = _boundary(shares, axes)
+    shares = (reached > 0).astype(float) if _varies(dataset, robot) else reached / np.maximum(tried, 1.0)
+    mesh = _boundary(shares, axes, np.array(ends))
     poses = np.tile(robot.home, (shares.size, 1))
     poses[:, :3] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     margins = Margin().margins(robot, Places.at_home(robot, poses)).reshape(shares.shape)
@@ -126,12 +130,26 @@ def _has_counts(dataset: xr.Dataset) -> bool:
     return even and all(np.abs(axis).max(initial=0.0) <= FARTHEST for axis in values[2:])
 
 
-def _boundary(shares: np.ndarray, axes: list[np.ndarray]) -> Mesh:
-    """Return the surface where half of the samples are accepted, closed at the faces of the box of all samples."""
+def _varies(dataset: xr.Dataset, robot: Robot) -> bool:
+    """Return whether attitudes or carriers of the samples vary; the region of a file states it without samples."""
+    if "attitude" in dataset or "carrier_position" in dataset:
+        return True
+    try:
+        domain = Domain.of(robot, Region.model_validate(json.loads(dataset.attrs["region"])))
+    except (KeyError, TypeError, ValueError, RecursionError, InputError):  # the file of another program
+        return False
+    return domain.attitude_varies or domain.carriers_vary
+
+
+def _boundary(shares: np.ndarray, axes: list[np.ndarray], ends: np.ndarray) -> Mesh:
+    """Return the surface where half of the samples are accepted, closed at the faces of the box of all samples.
+
+    `ends` (3, 2) are those of the box [m].
+    """
     edges = np.array([axis[1] - axis[0] for axis in axes])
     low, high = (np.array([axis[end] for axis in axes]) for end in (0, -1))
     beyond = boundary_of_values(np.pad(shares - 0.5, 1, mode="edge"), low - edges, high + edges)
-    return Mesh(np.clip(beyond.vertices, low - edges / 2, high + edges / 2), beyond.faces)
+    return Mesh(np.clip(beyond.vertices, *ends.T), beyond.faces)
 
 
 def _joined(counts: np.ndarray, by: int) -> np.ndarray:

@@ -86,12 +86,19 @@ class TimeLine:
             self._turn(False)
             self._go(self._replay.index_at(float(self._now.value)), at=float(self._now.value))
 
-    def _go(self, index: int, at: float | None = None) -> None:
+    def _go(self, index: int, at: float | None = None, playing: bool = False) -> None:
         """Show an instant in scene, panel, charts and on the time line in one update.
 
-        `at` is the position of the time line [s], between two instants; default: at the instant.
+        Parameters
+        ----------
+        at
+            Position of the time line [s], between two instants; default: at the instant.
+        playing
+            Do nothing if it was paused meanwhile: while this waited, a user may have gone elsewhere.
         """
         with self._busy:
+            if playing and not self._playing.is_set():
+                return
             index = min(max(index, 0), len(self._replay.times) - 1)
             instant = self._replay.at(index)
             with self._server.atomic():
@@ -112,9 +119,9 @@ class TimeLine:
             onward = float(self._now.value) + passed * float(self._speed.value.rstrip("x"))
             if onward > last:
                 onward = first if self._loop.value else last
-                if not self._loop.value:
-                    self._turn(False)
-            self._go(self._replay.index_at(onward), at=onward)
+            self._go(self._replay.index_at(onward), at=onward, playing=True)
+            if onward == last and not self._loop.value:
+                self._turn(False)
 
 
 def _whole(length: float, step: float) -> float:

@@ -51,6 +51,7 @@ def nearest_feasible(
     for _ in range(ROUNDS):
         near = best + spread * rng.normal(size=(AROUND, 6)) / np.sqrt(free.sum()) * unit
         best = holding(np.vstack([best, near]))[:1]
-        best = holding(pose + np.linspace(0.0, 1.0, BETWEEN)[:, None] * (best - pose))[:1]
+        # The end of the line is `best` but for rounding, which may be too much for a thin feasible set.
+        best = holding(np.vstack([best, pose + np.linspace(0.0, 1.0, BETWEEN)[:, None] * (best - pose)]))[:1]
         spread *= SHRINK
     return best[0]
