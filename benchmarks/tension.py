@@ -34,6 +34,7 @@ Progress = Callable[[str, int, int], None]
 
 # Tensions, or their wrench, this far off are a failure, in units of the largest tension: 1000 times what was required.
 FAILED = 1e-6
+MOST = 100_000  # problems of a task, and runs of a solver
 SOLVERS = ("daqp", "osqp", "clarabel", "piqp", "proxsuite", "quadprog", "highspy", "scs", "moreau")
 
 
@@ -114,9 +115,9 @@ def run(
     InputError
         If a number is out of range.
     """
-    for name, value, least in (("count", count, 1), ("repeats", repeats, 1)):
-        if value < least:
-            raise InputError(f"{name} must be a whole number from {least}, got {value}")
+    for name, value in (("count", count), ("repeats", repeats)):
+        if not 1 <= value <= MOST:
+            raise InputError(f"{name} must be a whole number from 1 to {MOST}, got {value}")
     if not m or not all(1 <= cables <= 16 for cables in m):
         raise InputError(f"m must be numbers of cables from 1 to 16, got {list(m)}")
     if not limit > 0:

@@ -187,6 +187,9 @@ def _predict(
     from ..errors import InputError
     from .run import check_enough, length_of, model_of
 
+    if not (len(fitted) and len(left)):
+        return None
+
     def part(rows: np.ndarray, groups: tuple[str, ...], own: dict[str, float]) -> Model:
         start = None if whole.start is None else whole.start[rows]
         of = model_of(whole.robot, whole.measurements.only(rows), groups, own, start)

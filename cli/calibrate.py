@@ -84,12 +84,13 @@ def calibrate(
     check_ending("--out", target, ".yaml", ".yml")
     measurements = read_measurements(log, stated)
     result = find(loaded, measurements, "auto" if groups == ["auto"] else groups, known, outliers)
+    report = result.report()  # before anything is written
     file = result.save(target)
     pictures = [] if figures is None else result.plot(figures, form)
     if as_json:
         print_json({**result.to_dict(), "file": file, "figures": pictures})
     else:
-        typer.echo(result.report())
+        typer.echo(report)
         print_written([file, *pictures])
     if not result.converged:
         raise typer.Exit(1)

@@ -399,6 +399,12 @@ def test_halves_with_too_few_readings_predict_nothing():
     assert np.isfinite([left["offsets",], left[ANCHORS]]).all()
 
 
+def test_one_sample_leaves_nothing_to_confirm_the_result():
+    result = calibrate("cogiro", as_built(1, 7).measurements(), free=("offsets",))
+    assert result.held_out.after == np.inf
+    assert "too few samples" in result.report()
+
+
 def test_the_report_lists_the_largest_changes_of_lengths():
     """A scale that is off by 0.2 % makes more of a cable's length than anchors that moved by millimetres."""
     built = as_built(100, 0, anchors=2e-3, noise=1e-4, offsets=0.0)

@@ -176,6 +176,13 @@ def test_angles_of_the_kernel_are_those_of_numpy(turn, size):
     assert angle(y, x) == pytest.approx(np.arctan2(y, x), abs=1e-15)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_start_beyond_all_numbers_of_robots_is_refused(sign):
+    robot = load("cogiro")
+    with pytest.raises(InputError, match=r"^start must be numbers up to 1e\+09 \[m, rad\], got 1e\+300$"):
+        pose_from_lengths(robot, dynamics_of(robot).cable_lengths(robot.home), start=np.full(6, sign * 1e300))
+
+
 @settings(deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_a_pose_nearby_comes_back(shift):

@@ -64,6 +64,8 @@ def pose_from_lengths(
         shapes["carrier_pose"] = carriers.shape[:-2]
     if start is not None:
         start = as_array("start", start, (6,))
+        if np.abs(start).max(initial=0.0) > LARGEST:
+            raise InputError(f"start must be numbers up to {LARGEST:g} [m, rad], got {np.abs(start).max():g}")
         shapes["start"] = start.shape[:-1]
     first, *others = shapes.values()
     batch = first if all(other == first for other in others) else leading(shapes)
