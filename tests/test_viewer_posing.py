@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.distribution import pose_problem, tensions
+from towline.errors import InputError
 from towline.figures import style
 from towline.models import Dynamics, load
 from towline.solvers import capacity_margin
@@ -69,6 +70,19 @@ def test_a_handle_and_the_sliders_agree_and_change_the_tensions(wire):
     drag(wire, "/handles/platform", [1e9, 0, 0], Rotation.identity())
     settle(wire)
     assert pose(wire)[0] == pytest.approx(next(v["max"] for v in wire.panel.values() if v.get("label") == "x [m]"))
+
+
+@pytest.mark.parametrize("wire", ["cogiro"], indirect=True)
+def test_sliders_agree_with_a_handle_at_a_pose_that_cannot_be_shown(wire, monkeypatch):
+    def nowhere(*_):
+        raise InputError("no cable is tangent to its pulley there")
+
+    settle(wire)
+    monkeypatch.setattr("towline.viewer.posing.at_rest", nowhere)
+    drag(wire, "/handles/platform", [0.5, -0.3, 2.2], Rotation.identity())
+    settle(wire)
+    assert "no cable is tangent" in wire.readout()
+    assert [wire.element(label=f"{name} [m]")[1]["value"] for name in "xyz"] == pytest.approx([0.5, -0.3, 2.2])
 
 
 @pytest.mark.parametrize("wire", ["wang-ctmrts"], indirect=True)

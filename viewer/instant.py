@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..distribution import pose_problem
-from ..models import Dynamics, Robot
+from ..models import Dynamics
 from ..solvers import Certificate, capacity_margin, solve
 from .geometry import Geometry, Points
 
@@ -91,8 +91,8 @@ def arrow(instant: Instant, size: float, typical: float) -> np.ndarray | None:
     """Return the force part of the certificate's direction as an arrow from the CoM, start and tip (2, 3) in {G} [m].
 
     Its length grows with the shortfall, and stays below `ARROW` of `size` [m] times the share of force in the
-    direction, so that it stays in the picture. It is half of that where the shortfall is a `typical` force [N]. Return
-    None if there is no certificate, or almost no force in it.
+    direction, so that it stays in the picture: a quarter of that for a small shortfall, five eighths where it is a
+    `typical` force [N]. Return None if there is no certificate, or almost no force in it.
     """
     if instant.certificate is None:
         return None
@@ -101,8 +101,3 @@ def arrow(instant: Instant, size: float, typical: float) -> np.ndarray | None:
         return None
     grown = SHORTEST + (1 - SHORTEST) * instant.certificate.shortfall / (instant.certificate.shortfall + typical)
     return np.stack([instant.points.com, instant.points.com + ARROW * size * grown * force])
-
-
-def typical_force(robot: Robot) -> float:
-    """Return the weight of the platform [N], or without gravity the mean of the cables' largest tensions."""
-    return robot.weight if robot.weight > 0 else float(robot.t_max.mean())

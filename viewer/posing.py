@@ -152,11 +152,14 @@ class Posing:
         held
             The slider or handle that a user holds. It is not moved, because its next event may be on its way, unless
             it is a slider and the platform hangs elsewhere.
+
+        Sliders and handles agree about a pose that cannot be shown too: the next event begins there.
         """
         self._latest = number = self._latest + 1
         with self._busy:
             if number != self._latest:  # a later call came while this one waited
                 return
+            refused, instant = "", None
             try:
                 if lengthen or not self._hang.value:
                     self._lengths = self._dynamics.cable_lengths(pose, carriers)
@@ -164,9 +167,7 @@ class Posing:
                     pose = at_rest_with(self._robot, self._lengths, pose, carriers)
                 instant = at_rest(self._dynamics, self._geometry, pose, carriers)
             except TowlineError as error:
-                self._pose, self._carriers = pose.copy(), carriers.copy()
-                self._refuse(str(error))
-                return
+                refused = str(error)
             self._pose, self._carriers = pose.copy(), carriers.copy()
             with self._server.atomic():
                 for slider, setting in zip(self._sliders, self._settings, strict=True):
@@ -177,7 +178,10 @@ class Posing:
                         place = pose if owner is None else carriers[owner]
                         handle.position = place[:3]
                         handle.wxyz = Rotation.from_euler("ZYX", place[:2:-1]).as_quat(scalar_first=True)
-                self._show(instant)
+                if instant is None:
+                    self._refuse(refused)
+                else:
+                    self._show(instant)
             if self._hang.value:
                 self._shade([""] * len(self._tracks))
             else:

@@ -16,7 +16,7 @@ from ..figures.tension_colours import place, rgb, shades
 from ..text import quantity
 from . import words
 from .geometry import Extent, Geometry
-from .instant import Instant, arrow, typical_force
+from .instant import Instant, arrow
 from .shapes import posts, rotors, sheaves
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class Stage:
 
     def _point(self, instant: Instant) -> None:
         """Draw the arrow of the certificate."""
-        ends = arrow(instant, self._size, typical_force(self._robot))
+        ends = arrow(instant, self._size, self._robot.force_scale)
         self._arrow.visible = self._short.visible = ends is not None
         if ends is not None:
             self._arrow.points = _strokes(*ends).astype(np.float32)
