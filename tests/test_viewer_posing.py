@@ -341,9 +341,14 @@ def test_the_surface_ends_with_the_box_of_the_samples_whatever_the_number_of_cel
     assert found.mesh.volume == pytest.approx(6 * 4 * 2, rel=0.02)
 
 
-def test_a_file_that_states_no_sample_was_tried_has_no_surface(space):
+def test_without_samples_or_blocks_that_are_half_inside_there_is_no_surface(space):
+    """It would hide the points, and show nothing."""
     dataset, robot = space
     assert surface(dataset.assign(tried=0 * dataset["tried"]), robot) is None
+    one = np.zeros_like(dataset["reached"].to_numpy())
+    one[16, 16, 16] = 1
+    tried = dataset["tried"] + 3
+    assert surface(dataset.assign(reached=(tried.dims, one), tried=tried), robot) is None
 
 
 def test_without_scikit_image_the_points_stay_and_a_line_names_the_extra(space, monkeypatch, tmp_path):

@@ -83,7 +83,9 @@ class Surface:
 
 
 def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
-    """Return the surface of a dataset of `workspace.sample`; None if it is flat, or has no usable counts or cells.
+    """Return the surface of a dataset of `workspace.sample`; None if it has none.
+
+    It has none if it is flat, if it has no usable counts or cells, and if nowhere half of the samples are accepted.
 
     Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of the
     samples are accepted, or any sample if attitudes or carriers vary.
@@ -112,6 +114,8 @@ def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
     tried, reached = (_joined(counts, joined) for counts in (tried, reached))
     shares = (reached > 0).astype(float) if _varies(dataset, robot) else reached / np.maximum(tried, 1.0)
     mesh = _boundary(shares, axes, np.array(ends))
+    if not len(mesh.faces):  # nowhere are half of the samples accepted
+        return None
     poses = np.tile(robot.home, (shares.size, 1))
     poses[:, :3] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     margins = Margin().margins(robot, Places.at_home(robot, poses)).reshape(shares.shape)
