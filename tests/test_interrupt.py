@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -98,6 +99,8 @@ def interrupted(then):
             wait_for(lambda: pytest.fail("it went on"))
         if then == "another error":
             raise ImportError("initialization failed")
+        if then == "an exit":
+            raise SystemExit
 
 
 @pytest.mark.parametrize("then", ["the end", "a wait", "another error"])
@@ -110,6 +113,30 @@ def test_an_interrupt_that_casadi_swallows_is_raised_again(then, request):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     with heeding():
         wait_for(lambda: None)  # the interrupt is over
+
+
+def test_a_swallowed_interrupt_is_raised_in_the_main_thread_only_and_never_after_its_end(request):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    waited = []
+
+    def beside():
+        """Plan in another thread: its waits are no business of Ctrl-C."""
+        wait_for(lambda: waited.append(True))
+
+    def swallowed_beside():
+        with heeding():
+            multiplied()
+            thread = threading.Thread(target=beside)
+            thread.start()
+            thread.join()
+
+    with pytest.raises(KeyboardInterrupt):
+        swallowed_beside()
+    assert waited
+    with pytest.raises(SystemExit):
+        interrupted("an exit")
+    wait_for(lambda: None)  # the interrupt is over
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5, 4.0, 7.0])

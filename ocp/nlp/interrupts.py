@@ -38,11 +38,11 @@ def heeding() -> Iterator[None]:
     signal.signal(signal.SIGINT, _remember)
     try:
         yield
-    except KeyboardInterrupt:
-        _arrived.clear()
-        raise
     except Exception:  # what an interrupt became, such as the failed import of a compiled module
         raise_if_swallowed()
+        raise
+    except BaseException:  # the interrupt itself, or what ends the program anyway
+        _arrived.clear()
         raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -50,14 +50,14 @@ def heeding() -> Iterator[None]:
 
 
 def raise_if_swallowed() -> None:
-    """Raise the interrupt that arrived, if any.
+    """Raise the interrupt that arrived, if any; in the main thread, as Python does.
 
     Raises
     ------
     KeyboardInterrupt
         If one arrived that nobody raised since.
     """
-    if _arrived.is_set():
+    if _arrived.is_set() and threading.current_thread() is threading.main_thread():
         _arrived.clear()
         raise KeyboardInterrupt
 
