@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import io
 import sys
+import threading
 import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Contents", "Variable", "check_units", "load_netcdf", "save_netcdf"]
 
+_alone = threading.Lock()
 # Of motions and their tensions, of the platform and of carriers.
 UNITS = {"time": "s", "pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2", "tensions": "N"}
 
@@ -115,19 +117,20 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
     """
     import xarray as xr
 
-    # A damaged file leaves a half-opened one behind, whose closing prints a traceback as soon as it is collected.
-    hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
-    try:
+    with _alone:  # the hook and the warnings are those of the whole process
+        # A damaged file leaves a half-opened one behind, whose closing prints a traceback as soon as it is collected.
+        hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of what is unusual in a file; whoever uses it checks what matters
-                return xr.load_dataset(path, engine="h5netcdf")
-        except Exception as error:  # it may fail at any place of three libraries
-            # HDF5 has its own message of several lines, where others have a few words.
-            reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
-        gc.collect()
-    finally:
-        sys.unraisablehook = hook
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # of what is unusual in a file; whoever uses it checks what matters
+                    return xr.load_dataset(path, engine="h5netcdf")
+            except Exception as error:  # it may fail at any place of three libraries
+                # HDF5 has its own message of several lines, where others have a few words.
+                reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
+            gc.collect()
+        finally:
+            sys.unraisablehook = hook
     raise InputError(f"{refusal} ({reason})")
 
 
