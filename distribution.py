@@ -95,7 +95,7 @@ def pose_problem(
     for name, value in {**motion._asdict(), "wind": wind}.items():
         if value is None:
             continue
-        array = real_array(name, value)
+        array = real_array(name, value).astype(float, copy=False)
         if array.ndim > (2 if name.startswith("carrier") else 1):
             raise InputError(f"{name} must be that of one instant, got an array of shape {array.shape}")
         if np.isfinite(array).all() and np.abs(array).max(initial=0.0) > LARGEST:

@@ -293,10 +293,10 @@ def markdown(report: Report) -> str:
         for row in sorted(rows, key=lambda row: (np.isnan(row.ratio), row.ratio)):
             error = "-" if row.max_error is None else f"{row.max_error:.0e}"
             name = f"{row.contender} ({row.detail})" if row.detail else row.contender
-            lines.append(
-                f"| {name} | {row.tolerance} | {row.median_us:.1f} | {row.p99_us:.1f} | {row.ratio:.2f} | {error} | "
-                f"{row.failures} of {row.problems} |"
+            times = (
+                f"{row.median_us:.1f} | {row.p99_us:.1f} | {row.ratio:.2f}" if np.isfinite(row.ratio) else "- | - | -"
             )
+            lines.append(f"| {name} | {row.tolerance} | {times} | {error} | {row.failures} of {row.problems} |")
     return "\n".join(lines) + "\n"
 
 

@@ -184,14 +184,17 @@ def _import(file: Path) -> None:
     import sys
     from importlib import import_module
 
+    from ..inputs import check_ending, printable
+
+    check_ending("--define", file, ".py")
     try:
         sys.path.insert(0, str(file.resolve().parent))
         if Path(import_module(file.stem).__file__ or "").resolve() == file.resolve():
             return
         reason = "there is another module of that name"
     except Exception as error:  # anything that a file of the user's may raise
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-    raise InputError(f"--define must be a Python file that can be imported, got {file} ({reason})")
+        reason = printable(f"{type(error).__name__}: {error}".splitlines()[0])
+    raise InputError(f"--define must be a Python file that can be imported, got {printable(str(file))} ({reason})")
 
 
 def _condition(texts: list[str] | None) -> Condition:

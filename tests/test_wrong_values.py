@@ -1,10 +1,12 @@
 """Wrong values that once passed in silence: endings of files, numbers as text, poses that are none, options by name."""
 
+import warnings
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from towline import InputError, plan, read_task
+from towline import InputError, plan, read_task, tensions
 from towline.cli.main import app
 
 REST = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.3}
@@ -51,6 +53,29 @@ def test_steps_are_a_whole_number_and_no_text(steps):
     with pytest.raises(InputError, match="steps") as error:
         read_task(REST | {"steps": steps})
     assert str(error.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("checkpoint.ckpt", "--define must end in .py, got 'checkpoint.ckpt'"),
+        ("x" * 5000 + ".py", "--define must be a Py"),
+    ],
+)
+def test_a_file_of_definitions_is_a_python_file(file, message):
+    """A module named `checkpoint` would be imported in its place."""
+    done = CliRunner().invoke(app, ["workspace", "wang-flying", "--define", file])
+    assert isinstance(done.exception, InputError)
+    assert str(done.exception).startswith(message)
+    assert len(str(done.exception)) < 600
+
+
+def test_half_floats_are_numbers_as_others_are():
+    pose = np.array([0, 0, -1, 0, 0, 0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = tensions("wang-flying", pose, acceleration=np.full(6, 0.5, dtype=np.float16)).tensions
+    np.testing.assert_array_equal(found, tensions("wang-flying", pose, acceleration=np.full(6, 0.5)).tensions)
 
 
 @pytest.mark.parametrize("fault", ["cut 9 at 0.1", "cut 1", "cut 1 at 7"])
