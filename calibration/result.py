@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..inputs import file_path, real_array
+from ..inputs import real_array
 from ..models import points
 from ..models.robot import Robot
 from .outliers import Outlier, Slip
@@ -284,10 +284,9 @@ class Calibration:
         InputError
             If the format is another, or a file cannot be written.
         """
-        from ..figures import style
+        from ..figures.style import save_all
 
-        into, suffix = file_path("folder", folder), style.check_format(format)
-        return [style.save(drawn, into / f"{name}.{suffix}") for name, drawn in self.figures().items()]
+        return save_all(self.figures, folder, format)
 
     def report(self) -> str:
         """Return the result as text, for people."""

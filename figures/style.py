@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..inputs import one_of, printable
+from ..inputs import file_path, one_of, printable
 from ..writing import whole_file
 
 if TYPE_CHECKING:
@@ -263,6 +264,20 @@ def save(canvas: Figure, path: Path) -> Path:
             with rc_context({"pdf.fonttype": 42}):
                 canvas.savefig(temporary, dpi=DPI, format=form, metadata=metadata)
     return path
+
+
+def save_all(
+    draw: Callable[[], Mapping[str, Figure]], folder: str | os.PathLike[str], format: str = "png"
+) -> list[Path]:
+    """Save the figures that `draw` returns by the names of their files, and return their paths.
+
+    Raises
+    ------
+    InputError
+        If the format is none of `FORMATS`, before anything is drawn, or a file cannot be written.
+    """
+    into, suffix = file_path("folder", folder), check_format(format)
+    return [save(drawn, into / f"{name}.{suffix}") for name, drawn in draw().items()]
 
 
 def svg(canvas: Figure) -> str:

@@ -235,10 +235,9 @@ class Plan:
         InputError
             If the format is another, or a file cannot be written.
         """
-        from ..figures import style
+        from ..figures.style import save_all
 
-        into, suffix = file_path("folder", folder), style.check_format(format)
-        return [style.save(drawn, into / f"{name}.{suffix}") for name, drawn in self.figures().items()]
+        return save_all(self.figures, folder, format)
 
     def figures(self) -> dict[str, Figure]:
         """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.

@@ -262,10 +262,9 @@ class Flight:
         InputError
             If the format is another, or a file cannot be written.
         """
-        from ..figures import style
+        from ..figures.style import save_all
 
-        into, suffix = file_path("folder", folder), style.check_format(format)
-        return [style.save(drawn, into / f"{name}.{suffix}") for name, drawn in self.figures().items()]
+        return save_all(self.figures, folder, format)
 
     def figures(self) -> dict[str, Figure]:
         """Draw the flight, by the names of files: "flight", error, answers, wind and carriers over time; "tensions"."""
