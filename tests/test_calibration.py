@@ -454,7 +454,7 @@ def test_wrong_readings_and_slips_are_found(known):
 
 @pytest.mark.parametrize("seed", [5, 6, 9])
 def test_more_noise_than_stated_is_no_slip(seed):
-    """Where poses are unknown they absorb most of the noise, and residuals are small beside it."""
+    """Compare residuals with noise of which unknown poses absorb most: they are small beside it."""
     result = calibrate("cogiro", as_built(200, seed, noise=3 * NOISE, offsets=0.0).measurements(known=False), ANCHORS)
     assert result.noise == pytest.approx(3 * NOISE, rel=0.1)
     assert not result.slips

@@ -19,7 +19,7 @@ CAMERA = {
 
 
 class Wire:
-    """What a page knows: properties of panel elements by their label or kind, and of things in the scene by name."""
+    """Hold what a page knows: properties of panel elements by label or kind, and of things in the scene by name."""
 
     def __init__(self, url, width=1600, height=1000):
         self.socket = connect(url.replace("http", "ws"), origin=url, subprotocols=[f"viser-v{viser.__version__}"])

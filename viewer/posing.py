@@ -1,4 +1,4 @@
-"""Pose a robot by hand: with sliders, with handles in the scene, hanging on cables of fixed lengths, or feasibly."""
+"""Pose a robot by hand: with sliders or handles, hanging on cables of fixed lengths, or at a feasible pose nearby."""
 
 from __future__ import annotations
 
