@@ -18,9 +18,9 @@ from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest
 from towline.viewer.sliders import sliders, whole_steps
 from towline.viewer.stage import Stage
-from towline.viewer.surface import surface
 from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
 from towline.workspace.nearest import nearest_feasible
+from towline.workspace.surface import surface
 
 from .viewer_wire import CAMERA, Wire
 
@@ -308,6 +308,13 @@ def test_counts_and_cells_of_a_file_that_are_no_numbers_are_no_surface(space, na
     values[(1,) * values.ndim] = value
     assert surface(dataset.assign({name: (dataset[name].dims, values)}), robot) is None
     assert surface(dataset.drop_vars(name), robot) is None
+
+
+def test_a_workspace_that_no_picture_can_show_is_no_surface(space):
+    dataset, robot = space
+    farthest = max(float(np.abs(dataset[name]).max()) for name in "xyz")
+    assert surface(dataset, robot, within=farthest) is not None
+    assert surface(dataset, robot, within=0.999 * farthest) is None
 
 
 def test_without_samples_in_a_file_its_region_states_that_attitudes_vary():

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..errors import InputError, TowlineError
+from ..workspace.surface import Surface
+from ..workspace.surface import surface as surface_of
 from . import words
 from .film import film
+from .geometry import FARTHEST
 from .posing import Posing
 from .sliders import whole_steps
-from .surface import Surface
-from .surface import surface as surface_of
 from .timeline import TimeLine
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class Panel:
             """Add the surface once it is computed; compiling the code for its margins may take seconds."""
             assert self._subject.cloud is not None
             try:
-                there = surface_of(self._subject.cloud.dataset, self._subject.robot)
+                there = surface_of(self._subject.cloud.dataset, self._subject.robot, FARTHEST)
             except InputError as error:
                 scale.content = words.note(str(error))
                 return

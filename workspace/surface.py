@@ -10,12 +10,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..models import Robot
-from ..workspace.boundary_mesh import Mesh, boundary_of_values
-from ..workspace.conditions.margin import Margin
-from ..workspace.domain import Domain
-from ..workspace.places import Places
-from ..workspace.region import Region
-from .geometry import FARTHEST
+from .boundary_mesh import Mesh, boundary_of_values
+from .conditions.margin import Margin
+from .domain import Domain
+from .places import Places
+from .region import Region
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,10 +81,11 @@ class Surface:
         return points.reshape(-1, 3), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
+def surface(dataset: xr.Dataset, robot: Robot, within: float = np.inf) -> Surface | None:
     """Return the surface of a dataset of `workspace.sample`; None if it has none.
 
-    It has none if it is flat, if it has no usable counts or cells, and if nowhere half of the samples are accepted.
+    It has none if it is flat, if it has no usable counts or cells, if a coordinate of a cell is above `within` [m], and
+    if nowhere half of the samples are accepted.
 
     Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of the
     samples are accepted, or any sample if attitudes or carriers vary.
@@ -95,7 +95,7 @@ def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
     InputError
         If scikit-image is not installed.
     """
-    if not _has_counts(dataset):
+    if not _has_counts(dataset, within):
         return None
     tried, reached = (dataset[name].to_numpy().astype(float) for name in ("tried", "reached"))
     if min(tried.shape) < 4 or not reached.any():
@@ -122,8 +122,8 @@ def surface(dataset: xr.Dataset, robot: Robot) -> Surface | None:
     return Surface(mesh, tuple(axes), shares, np.maximum(np.nan_to_num(margins, nan=0.0, posinf=0.0), 0.0))
 
 
-def _has_counts(dataset: xr.Dataset) -> bool:
-    """Return whether a file has finite counts in evenly spaced cells that are near enough to be drawn."""
+def _has_counts(dataset: xr.Dataset, within: float) -> bool:
+    """Return whether a file has finite counts in evenly spaced cells, with no coordinate above `within` [m]."""
     if any(name not in dataset or dataset[name].dims != ("x", "y", "z") for name in ("tried", "reached")):
         return False
     values = [dataset[name].to_numpy() for name in ("tried", "reached", "x", "y", "z") if name in dataset.variables]
@@ -131,7 +131,7 @@ def _has_counts(dataset: xr.Dataset) -> bool:
         return False
     steps = [np.diff(axis) for axis in values[2:]]
     even = all(len(step) == 0 or ((step > 0.99 * step[0]).all() and (step < 1.01 * step[0]).all()) for step in steps)
-    return even and all(np.abs(axis).max(initial=0.0) <= FARTHEST for axis in values[2:])
+    return even and all(np.abs(axis).max(initial=0.0) <= within for axis in values[2:])
 
 
 def _varies(dataset: xr.Dataset, robot: Robot) -> bool:
