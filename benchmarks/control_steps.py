@@ -115,7 +115,7 @@ class Crowd:
         given = (command.tensions, command.actuation, command.carrier_pose, command.carrier_velocity)
         rows = self._plant.command(*given, command.carrier_acceleration)
         history, self._tensions = np.zeros((self._rows, 2, self._plant.size)), command.tensions
-        self._periods.run(self._states, rows, history, np.zeros((self._rows, 2, self._robot.m)))
+        self._periods.run(self._states, rows[:, None], history, np.zeros((self._rows, 2, self._robot.m)))
         self._states = history[:, 1].copy()
         gone = ~(np.abs(self._states).max(axis=1) < 1e3 * self._size) | (self._rng.random(self._rows) < 1e-3)
         if gone.any():

@@ -1,24 +1,50 @@
-"""Check that random problems of every awkward kind get the right status and the optimal tensions.
+"""Check that random problems of every awkward kind get the right status, optimal tensions and true certificates.
 
-    python -m towline.benchmarks.exactness [--count 1000000] [--start 0]
+    python -m towline.benchmarks.exactness [--count 1000000] [--start 0] [--family exact|random] [--float]
 
-Each problem is named by its seed. `solve_batch` answers, by its lanes and by the C core: each problem counts twice
-where towline was installed with that. The references are a linear program (HiGHS) for the status and the optimality
-conditions for the tensions. Where both sides differ, both are shown, and the exit code is 1.
+Each problem is named by its seed. `solve`, `solve_batch` by its lanes and by the C core, and the distribution of an
+exported control step, which is compiled here, solve it. `exact_judge` judges their answers in integers. Wrong is
+
+- a status that differs from that of `solve`, but for an exported step that is unsure;
+- "optimal" with a tension beyond a limit, a wrench error above the tolerance, or a cost above the least;
+- "infeasible" or "singular" if the limits permit w, or with a direction that does not, exactly, prove otherwise;
+- "infeasible" instead of "singular", or the other way round;
+- any other status.
+
+There are exceptions, and all are counted. A problem is `rough` if its scales differ by more than 2^8 or its cables are
+parallel to five digits. Only of such a problem "inaccurate" and "failed" are not wrong, and "singular" is right, too,
+if no cable pulls along the direction by more than 1e-11 of its column, as documented: it is listed as "singular to
+eleven digits". "infeasible" will do for a w off the range if it is off by less than 1000 tolerances, if the problem is
+rough, or if the condition of the matrix is above 1e5. The exported step has rounded numbers only. It may be
+unsure of a rough problem, if the condition is above 100, on the boundary of what the cables can give, and within 1000
+tolerances or 1e-6 of the largest wrench of a cable of it.
+
+The family "exact" is made of integers and powers of two, and the truth is known. The family "random" has random digits
+instead; there each answer has to prove itself. With --float the float form of the step solves problems of 24 bits, and
+is judged by its own tolerances: it may always be unsure, but it must not call optimal what is out of reach by any
+amount. Each wrong answer is shown, and the exit code is 1.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import BatchSolution, Status, TensionProblem, certify, compiled, solve_batch
+from ..errors import InputError, SolverError
+from ..solvers import TensionProblem, compiled, solve, solve_batch
 from ..solvers.core import CABLES
+from ..solvers.status import STATUSES
+from .exact_judge import DOUBLE, FLOAT, Judge
+from .exact_problems import ExactProblem, exact_problem
+from .step_distribution import StepDistribution
 
 Array = NDArray[np.float64]
 
@@ -38,6 +64,10 @@ KINDS = (
 OPTIMAL = 1e-7  # error of the optimality conditions, relative to the gradient
 PROVING = 1e10  # larger multipliers prove nothing: w moved by rounding changes the cost by a part in a million
 BLOCK = 2000
+NEAR = 1000.0  # tolerances
+FAR = 1e-6  # of the largest wrench of a cable at a limit or at its t_ref
+CONDITION, WORST = 1e2, 1e5
+NEARLY = "singular to eleven digits"
 
 
 def main() -> None:
@@ -45,88 +75,192 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=1_000_000)
     parser.add_argument("--start", type=int, default=0, help="the first seed")
+    parser.add_argument("--family", choices=list(FAMILIES), default="exact")
+    parser.add_argument("--float", action="store_true", help="judge the float form of the exported step alone")
     options = parser.parse_args()
     if options.count < 1 or options.start < 0:
         parser.error(f"--count must be at least 1 and --start at least 0, got {options.count} and {options.start}")
+    if options.float and options.family != "exact":
+        parser.error("--float takes the family exact")
     compiled.load()
     report = Report(Counter(), [], 0.0)
-    for first in range(options.start, options.start + options.count, BLOCK):
-        report = report.plus(check(range(first, min(first + BLOCK, options.start + options.count))))
-        print(report.line(), end="\r", file=sys.stderr)
+    with tempfile.TemporaryDirectory() as folder:
+        step = _step("float" if options.float else "double", Path(folder))
+        for first in range(options.start, options.start + options.count, BLOCK):
+            seeds = range(first, min(first + BLOCK, options.start + options.count))
+            block = check_float(seeds, step) if options.float else check(seeds, options.family, step)
+            for wrong in block.wrong:
+                print(wrong, flush=True)
+            report = report.plus(block)
+            print(report.line(), end="\r", file=sys.stderr, flush=True)
     print(report.line())
-    for disagreement in report.disagreements:
-        print(disagreement)
-    sys.exit(bool(report.disagreements))
+    for answer, count in sorted(report.answers.items()):
+        print(f"{answer}: {count}")
+    sys.exit(bool(report.wrong))
 
 
-class Disagreement(NamedTuple):
-    """Two answers to the problem of one seed."""
+def _step(precision: str, folder: Path) -> StepDistribution | None:
+    try:
+        return StepDistribution(precision, folder)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return None
+
+
+class Wrong(NamedTuple):
+    """A wrong answer to the problem of a seed."""
 
     seed: int
-    ours: str
-    reference: str
+    solver: str
+    reason: str
+
+
+class Answer(NamedTuple):
+    """The status of a solver, with tensions where it is optimal and a direction where it is a proof."""
+
+    status: str
+    tensions: Array  # (m,)
+    direction: Array  # (n,)
 
 
 class Report(NamedTuple):
-    """Counts of each status, the disagreements, and the largest violation of optimality."""
+    """Counts of each solver's statuses, the wrong answers, and the largest gap of a cost to the least one."""
 
-    statuses: Counter[str]
-    disagreements: list[Disagreement]
-    worst: float
+    answers: Counter[tuple[str, str]]
+    wrong: list[Wrong]
+    gap: float
 
     def plus(self, other: Report) -> Report:
         """Return both together."""
-        return Report(
-            self.statuses + other.statuses, self.disagreements + other.disagreements, max(self.worst, other.worst)
-        )
+        return Report(self.answers + other.answers, self.wrong + other.wrong, max(self.gap, other.gap))
+
+    @property
+    def statuses(self) -> set[str]:
+        """Return the statuses that occurred."""
+        return {status for _, status in self.answers}
 
     def line(self) -> str:
         """Return the figures in one line."""
-        counts = ", ".join(f"{count} {status}" for status, count in sorted(self.statuses.items()))
-        return f"{counts}; {len(self.disagreements)} disagreements, largest error of optimality {self.worst:.1e}"
+        problems = max(Counter(solver for solver, _ in self.answers.elements()).values(), default=0)
+        return f"{problems} problems, {len(self.wrong)} wrong answers, largest gap of an optimal cost {self.gap:.1e}"
 
 
-def check(seeds: range) -> Report:
-    """Solve the problems of these seeds, in batches of one shape, and compare."""
-    shapes: dict[tuple[int, ...], list[int]] = {}
-    problems = {seed: awkward_problem(seed) for seed in seeds}
-    for seed, (A, *_) in problems.items():
-        shapes.setdefault(A.shape, []).append(seed)
+def check(seeds: range, family: str = "exact", step: StepDistribution | None = None) -> Report:
+    """Solve the problems of these seeds by all solvers, in batches of one shape, and judge."""
     report = Report(Counter(), [], 0.0)
-    for members in shapes.values():
-        arrays = [np.array(column) for column in zip(*(problems[seed] for seed in members), strict=True)]
-        for backend in ("lanes", "c") if CABLES else ("lanes",):
-            answer = solve_batch(*arrays, threads=1, backend=backend)
-            report.statuses.update(answer.status.tolist())
-            for row, seed in enumerate(members):
-                report = report.plus(_compare(seed, problems[seed], answer, row))
+    for members, problems, arrays in _shapes(seeds, FAMILIES[family]):
+        batches = {
+            name: solve_batch(*arrays, threads=1, backend=name) for name in ("lanes", *(("c",) if CABLES else ()))
+        }
+        stepped = step.solve(*arrays) if step else None
+        for row, (seed, problem) in enumerate(zip(members, problems, strict=True)):
+            given = {"solve": _alone(problem)}
+            for name, batch in batches.items():
+                given[name] = Answer(str(batch.status[row]), batch.tensions[row], batch.direction[row])
+            if stepped:
+                status = STATUSES[stepped.status[row]].value
+                given["step"] = Answer(status, stepped.tensions[row], stepped.direction[row])
+            report = report.plus(_judged(seed, problem, given))
     return report
 
 
-def _compare(seed: int, data: tuple[Array, ...], answer: BatchSolution, row: int) -> Report:
-    """Compare one row with the references."""
-    A, w, low, high, wish, weights = data
-    problem = TensionProblem(A, w, low, high, wish, weights)
-    status = str(answer.status[row])
-    if answer.feasible[row]:
-        error = optimality_error(problem, answer.tensions[row])
-        if error < OPTIMAL:
-            return Report(Counter(), [], error)
-        return Report(Counter(), [Disagreement(seed, status, f"optimality missed by {error:.1e}")], error)
-    certificate = certify(problem)
-    if certificate is not None and certificate.verify(problem) and _excludes(answer.direction[row], problem):
-        proven = Status.SINGULAR if certificate.singular else Status.INFEASIBLE
-        if status == proven:
-            return Report(Counter(), [], 0.0)
-    return Report(Counter(), [Disagreement(seed, status, linear_program_status(problem))], 0.0)
+def check_float(seeds: range, step: StepDistribution | None) -> Report:
+    """Solve the problems of these seeds by the step in float, and judge by its tolerances."""
+    if step is None:
+        raise InputError("the float form of the step needs a C compiler, command cc")
+    report = Report(Counter(), [], 0.0)
+    for members, problems, arrays in _shapes(seeds, lambda seed: exact_problem(seed, "float")):
+        stepped = step.solve(*arrays)
+        for row, (seed, problem) in enumerate(zip(members, problems, strict=True)):
+            status = STATUSES[stepped.status[row]].value
+            answer = Answer(status, stepped.tensions[row], stepped.direction[row])
+            judge = Judge(problem, FLOAT)
+            reason, gap = _reason(judge, "float", answer)
+            if status == "optimal" and not reason:
+                # In float "optimal" is a promise that exact tensions are near.
+                reason = "w is out of reach" if problem.outside else judge.distance_to_optimum(answer.tensions)
+            wrong = [Wrong(seed, "float", f"{status}: {reason}")] if reason else []
+            report = report.plus(Report(Counter({("float", status): 1}), wrong, gap))
+    return report
 
 
-def _excludes(d: Array, problem: TensionProblem) -> bool:
-    """Return whether d . w is more than tensions inside the limits can give along d, from the data alone."""
-    pulls = d @ problem.A
-    counts = np.abs(pulls) > 1e-11 * np.linalg.norm(d) * np.linalg.norm(problem.A, axis=0).max()
-    limits = np.where(pulls > 0.0, problem.t_max, problem.t_min)
-    return bool(d @ problem.w > (pulls[counts] * limits[counts]).sum())
+def _shapes(
+    seeds: range, problem_of: Callable[[int], ExactProblem]
+) -> Iterator[tuple[list[int], list[ExactProblem], list[Array]]]:
+    """Yield the seeds and problems of each shape, and the problems as arrays with the rows in front."""
+    shapes: dict[tuple[int, ...], list[int]] = {}
+    problems = {seed: problem_of(seed) for seed in seeds}
+    for seed, problem in problems.items():
+        shapes.setdefault(problem.A.shape, []).append(seed)
+    for members in shapes.values():
+        own = [problems[seed] for seed in members]
+        yield members, own, [np.array(column) for column in zip(*(problem[:7] for problem in own), strict=True)]
+
+
+def _alone(p: ExactProblem) -> Answer:
+    """Return the answer of `solve`, whose certificate has to verify and to agree with the status."""
+    problem = TensionProblem(*p[:6], length=p.length)
+    none = np.full(problem.m, np.nan), np.full(problem.n, np.nan)
+    try:
+        solution = solve(problem)
+        certificate = solution.certificate
+    except SolverError as error:
+        return Answer(str(error), *none)
+    status = solution.status.value
+    if certificate is not None and not certificate.verify(problem):
+        status = f"{status}, whose certificate does not verify"
+    elif certificate is not None and certificate.singular is not (status == "singular"):
+        status = f"{status}, whose certificate contradicts it"
+    tensions = none[0] if solution.tensions is None else solution.tensions
+    return Answer(status, tensions, none[1] if certificate is None else certificate.direction)
+
+
+def _judged(seed: int, problem: ExactProblem, given: dict[str, Answer]) -> Report:
+    """Judge the answers to one problem; those that are the same to the last bit are judged once."""
+    judge, wrong, largest = Judge(problem, DOUBLE), list[Wrong](), 0.0
+    counts: Counter[tuple[str, str]] = Counter()
+    known: dict[tuple[str, bytes, bytes], tuple[str, float]] = {}
+    for solver, answer in given.items():
+        unsure = answer.status == "inaccurate" and solver == "step"
+        key = (answer.status, answer.tensions.tobytes(), answer.direction.tobytes())
+        if unsure or key not in known:
+            known[key] = _reason(judge, solver, answer)
+        reason, gap = known[key]
+        if not reason and not unsure and answer.status != given["solve"].status:
+            reason = f"the status of solve is {given['solve'].status}"
+        counts[solver, NEARLY if reason == NEARLY else answer.status] += 1
+        if reason not in ("", NEARLY):
+            wrong.append(Wrong(seed, solver, f"{answer.status}: {reason}"))
+        largest = max(largest, gap)
+    return Report(counts, wrong, largest)
+
+
+def _reason(judge: Judge, solver: str, answer: Answer) -> tuple[str, float]:
+    """Return why an answer is wrong, or nothing, and the gap of its cost if it is optimal."""
+    problem, tolerance = judge.problem, judge.tolerance(np.zeros(len(judge.columns)))
+    if answer.status == "optimal":
+        error, gap = judge.error(answer.tensions), judge.smallest_gap(answer.tensions)
+        if not error <= judge.tolerance(answer.tensions):
+            return f"the wrench error is {error:g} N", gap
+        return ("" if gap <= judge.tolerances.gap else f"the cost is {gap:.1e} too high"), gap
+    if answer.status in ("infeasible", "singular"):
+        off, loose = judge.off_range(), problem.rough or solver == "float"
+        nearly = loose and answer.status == "singular" and judge.is_nearly_orthogonal(answer.direction)
+        if problem.outside == 0.0 or not judge.excludes(answer.direction):
+            permits = "the limits permit w" if problem.outside == 0.0 else "the direction does not exclude w"
+            return (NEARLY if nearly and solver != "float" else permits), 0.0
+        if answer.status == "singular":
+            return ("" if off > 0.0 or nearly else "w is in the range"), 0.0
+        either = loose or off <= NEAR * tolerance or judge.condition() > WORST
+        return ("" if either else "w is off the range"), 0.0
+    if answer.status in ("inaccurate", "failed") and (problem.rough or solver == "float"):
+        return "", 0.0
+    if answer.status == "inaccurate" and solver == "step":
+        near = 0.0 < problem.outside <= max(NEAR * tolerance, FAR * judge.largest()) or tolerance == 0.0
+        near = near or 0.0 < judge.off_range() <= NEAR * tolerance or judge.condition() > CONDITION
+        near = near or problem.place in ("face", "corner")
+        return ("" if near else "nothing is near that rounding could decide"), 0.0
+    return "no status of such a problem", 0.0
 
 
 def optimality_error(problem: TensionProblem, t: Array) -> float:
@@ -158,24 +292,6 @@ def optimality_error(problem: TensionProblem, t: Array) -> float:
         multipliers[counts] += np.linalg.lstsq(columns[:, counts], rest.astype(np.float64), rcond=None)[0]
         rest = gradient / largest - columns @ np.maximum(multipliers, 0.0)
     return float(np.linalg.norm(rest.astype(np.float64)))
-
-
-def linear_program_status(problem: TensionProblem) -> str:
-    """Return the answer of HiGHS: "optimal", else "infeasible", or "singular" if no limits make it so."""
-    from scipy.optimize import linprog
-
-    size = max(float(np.linalg.norm(problem.scaled_w)), 1e-300)
-    unit = max(float(np.abs(problem.scaled_A).max()), 1e-300)
-
-    def available(bounds: list[tuple[float, float]] | tuple[None, None]) -> bool:
-        equations = {"A_eq": problem.scaled_A / unit, "b_eq": problem.scaled_w / size}
-        return linprog(np.zeros(problem.m), **equations, bounds=bounds, method="highs").status == 0
-
-    if available(
-        [(low * unit / size, high * unit / size) for low, high in zip(problem.t_min, problem.t_max, strict=True)]
-    ):
-        return "optimal"
-    return "infeasible" if available((None, None)) else "singular"
 
 
 def awkward_problem(seed: int, m: int | None = None, n: int | None = None) -> tuple[Array, ...]:
@@ -226,6 +342,15 @@ def awkward_problem(seed: int, m: int | None = None, n: int | None = None) -> tu
     wish = load * rng.normal(size=m) * 3.0 if "wished" in kinds else np.zeros(m)
     weights = 10.0 ** rng.uniform(-4, 4, m) if "weighted" in kinds else np.ones(m)
     return A * unit, w * unit * load, low * load, high * load, wish, weights
+
+
+def _random_problem(seed: int) -> ExactProblem:
+    """Return an awkward problem of which nothing is known."""
+    A, w, low, high, wish, weights = awkward_problem(seed)
+    return ExactProblem(A, w, low, high, wish, weights, 1.0, None, np.nan, "somewhere", True)
+
+
+FAMILIES: dict[str, Callable[[int], ExactProblem]] = {"exact": exact_problem, "random": _random_problem}
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@
     window     the way leads through a hole in a wall
     team       three or four quadrotors carry a load two metres, past a ball every other time
     moving     the motion begins while platform and carriers move
+    fast       as fast as the cables permit, up to 10 m/s, past places of all shapes, from or to a limit exactly
     phases     a load is picked up, lifted, carried, lowered and put down; a fifth is four times the platform's weight
 
 Where a family needs places at which the platform can rest, they are chosen so that tensions exist there with the
@@ -23,11 +24,13 @@ from ..distribution import wrench_problem
 from ..models import Dynamics, Robot, load
 from ..ocp import Task
 from ..solvers import solve
+from .recheck import cable_distance, point_distance, rotation
 
 __all__ = ["FAMILIES", "ROBOTS", "random_task"]
 
 ROBOTS = ("wang-flying", "wang-ctmrts-6", "ipanema-1", "cogiro", "planar-4", "wang-flying-quadrotor")
 OF_SPACE = ("ipanema-1", "cogiro", "wang-flying", "caroca", "ipanema-2", "the-cable-robot-simulator")
+FAST = (*OF_SPACE, "point-mass-3", "multi-quadrotor-3")
 TEAMS = ("multi-quadrotor-3", "multi-quadrotor-4")
 TEAM_STEPS = 50
 
@@ -258,6 +261,91 @@ def _team(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     return name, task
 
 
+def _fast(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a task of least time past some places, which starts or ends exactly on a limit."""
+    name = FAST[seed % len(FAST)]
+    robot = load(name)
+    team = any(carrier.efforts for carrier in robot.carriers)
+    extent = 4.0 if team else float(np.ptp(robot.home_anchors, axis=0)[:2].max())
+    reach = 0.3 * extent
+    start = robot.home.copy() if team else _place(rng, robot, reach)
+    ends = [_place(rng, robot, reach) for _ in range(10)]
+    end = max(ends, key=lambda pose: float(np.linalg.norm((pose - start)[:3])))
+    if team:
+        end = start + np.r_[2.0, rng.uniform(-1, 1), rng.uniform(0, 0.5), 0, 0, 0]
+    way = end[:3] - start[:3]
+    keep_out = []
+    for number in range(1 if team else int(rng.integers(1, 4))):
+        half = rng.uniform(0.02, 0.06) * np.linalg.norm(way)
+        centre = start[:3] + rng.uniform(0.3, 0.7) * way + rng.uniform(-0.15, 0.15, 3) * np.linalg.norm(way)
+        tip = rng.normal(size=3)
+        tip *= 3 * half / np.linalg.norm(tip)
+        shapes: dict[str, dict[str, Any]] = {
+            "sphere": {"centre": centre.tolist(), "radius": half},
+            "capsule": {"start": (centre - tip).tolist(), "end": (centre + tip).tolist(), "radius": half / 2},
+            "box": {
+                "min": (centre - half * np.array([0.3, 3, 1])).tolist(),
+                "max": (centre + half * np.array([0.3, 3, 1])).tolist(),
+                "attitude": [0.0, 0.0, float(rng.uniform(-1, 1))],
+            },
+        }
+        kind = str(rng.choice(list(shapes)))
+        cables = None if rng.random() < 0.6 else float(rng.choice([0.0, 0.01]))
+        apart = {"platform": float(rng.choice([0.0, 0.03])), "cables": cables, "carriers": 0.2 if team else None}
+        keep_out.append({"kind": kind, "name": f"{kind} {number}", **shapes[kind], **apart})
+    limits: dict[str, Any] = {"keep_out": keep_out}
+    if rng.random() < 0.5:
+        limits["platform_speed"] = 10.0
+    task: dict[str, Any] = {
+        "path": {"kind": "line", "start": start.tolist(), "end": end.tolist()},
+        "duration": {"min": 0.2, "max": 20.0},
+        "objective": {"time": 0.2, "jerk": 1e3},
+        "tube": {"position": "free", "attitude": float(rng.choice([0.0, 0.2]))},
+        "base": _base(rng, robot),
+        "limits": limits,
+        "scheme": str(rng.choice(["linear", "linear", "hermite", "gauss", "constant"])),
+        "steps": 40,
+    }
+    task |= _from_a_limit(rng, robot, start, end, limits)
+    return name, task
+
+
+def _from_a_limit(
+    rng: np.random.Generator, robot: Robot, start: np.ndarray, end: np.ndarray, limits: dict[str, Any]
+) -> dict[str, Any]:
+    """Add a limit that is met exactly at one end to `limits`, and return what the task needs beside that."""
+    pose, anchors = start if rng.random() < 0.5 else end, robot.home_anchors
+    turned = rotation(pose[3:])
+    ends = pose[:3] + robot.attachments @ turned.T
+    points = np.vstack([ends, pose[:3] + turned @ np.array(robot.platform.com)])
+    which = str(rng.choice(["floor", "place", "cable", "length", "speed"]))
+    if which == "floor":
+        limits["platform_box"] = {"min": [-100.0, -100.0, float(min(start[2], end[2]))], "max": [100.0] * 3}
+    elif which == "length" and robot.fixed_lengths is None:
+        others = [at[:3] + robot.attachments @ rotation(at[3:]).T for at in (start, end)]
+        longest = np.linalg.norm(np.array(others) - anchors, axis=-1).max()
+        limits["cable_length"] = {"min": 0.01, "max": float(longest)}
+    elif which == "speed":
+        limits["platform_speed"] = 0.3
+        return {"initial": {"pose": start.tolist(), "velocity": [0.0, 0.0, 0.3, 0.0, 0.0, 0.0]}}
+    else:
+        below = points[points[:, 2].argmin()] - [0.0, 0.0, 0.4]
+        beside = 0.5 * (ends[0] + anchors[0]) + 0.3 * _unit(np.cross(anchors[0] - ends[0], [0.1, 0.2, 1.0]))
+        ball = {"kind": "sphere", "name": "at an end", "radius": 0.1, "carriers": None}
+        if which == "place":
+            ball |= {"centre": below.tolist(), "cables": None}
+            ball["platform"] = float(point_distance(ball, points).min())
+        else:
+            ball |= {"centre": beside.tolist(), "platform": None}
+            ball["cables"] = float(cable_distance(ball, ends, anchors).min())
+        limits["keep_out"].append(ball)
+    return {}
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
 def _moving(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     """Return a task that begins while the platform moves."""
     name = OF_SPACE[seed % len(OF_SPACE)]
@@ -285,8 +373,12 @@ def _phases(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     start[3:] = end[3:] = robot.home[3:]
     end[2], up = start[2], np.array([0, 0, rng.uniform(0.05, 0.2) * size, 0, 0, 0])
     body = {"mass": robot.platform.mass, "com": [0.0, 0.0, -float(rng.uniform(0.0, 0.2)) * size]}
-    heavy = seed % 5 == 0
-    while not heavy and not all(_can_rest(Dynamics(robot), at, np.zeros(6), body) for at in (start, end, end + up)):
+    heavy, dynamics = seed % 5 == 0, Dynamics(robot)
+
+    def can_rest(load: dict[str, Any] | None) -> bool:
+        return all(_can_rest(dynamics, at, np.zeros(6), load) for at in (start, end, end + up))
+
+    while not heavy and not can_rest(body) and can_rest(None):
         body["mass"] *= 0.7
     body["mass"] *= 4.0 if heavy else float(rng.uniform(0.2, 0.8))
 
@@ -316,6 +408,7 @@ FAMILIES: dict[str, Family] = {
     "rack": _rack,
     "window": _window,
     "team": _team,
+    "fast": _fast,
     "moving": _moving,
     "phases": _phases,
 }

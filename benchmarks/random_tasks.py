@@ -26,9 +26,10 @@ from ..models import load
 from ..ocp import MotionStatus, Plan, plan
 from .machine import machine
 from .random_families import FAMILIES, random_task
+from .recheck import rechecked
 
 MOST_NOT_FOUND = 0.02
-TOUCHING = 1e-6  # [m]
+AUDIT_RATE = 1000.0  # [1/s], of the saved motion
 DIFFERENCES = 5e-5  # of the weight: what second differences over a millisecond miss where the jerk jumps
 
 
@@ -93,7 +94,7 @@ def attempt(family: str, seed: int) -> Outcome:
     name, task = random_task(family, seed)
     start, reason = time.process_time(), ""
     try:
-        planned = plan(load(name), task)
+        planned = plan(load(name), task.model_copy(update={"output_rate": AUDIT_RATE}))
         seconds = time.process_time() - start
         result, reason = wrong(planned) or planned.status.value, planned.reason
     except TowlineError as error:
@@ -117,9 +118,10 @@ def wrong(planned: Plan) -> str:
         tolerance = DIFFERENCES * robot.force_scale if load.any() else 1e-6
         if np.linalg.norm(short, axis=1).max() > max(audit.tolerance, tolerance):
             return "wrong: feasible, but the tensions do not give the force"
-        if _touches(planned):
-            return "wrong: feasible, but the platform is inside an obstacle"
-        return "" if not audit.excess else "wrong: feasible, but a limit is exceeded"
+        if audit.excess:
+            return "wrong: feasible, but a limit is exceeded"
+        found = rechecked(planned.trajectory, audit.tolerance)
+        return f"wrong: feasible, but {'; '.join(found)}" if found else ""
     if planned.status is MotionStatus.INFEASIBLE and not audit.excess:
         certificate = planned.certificate
         if certificate is None or certificate.time is None:
@@ -167,26 +169,6 @@ def _carried(planned: Plan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arm = turned[inside] @ (np.array(phase.load.com) - np.array(robot.platform.com))
         wrench[inside] = np.hstack([force, np.cross(arm, force)])
     return wrench, known, ground
-
-
-def _touches(planned: Plan) -> bool:
-    """Return whether an attachment or the CoM of the platform is nearer to a ball or a box than it may be."""
-    pose, body = planned.audit.motion.pose, planned.scenario.robot
-    points = np.vstack([body.attachments, body.platform.com])
-    at = pose[:, None, :3] + np.einsum("nij,kj->nki", Rotation.from_euler("ZYX", pose[:, 5:2:-1]).as_matrix(), points)
-    for place in planned.scenario.task.limits.keep_out:
-        if place.platform is None:
-            continue
-        if place.kind == "sphere":
-            outside = np.linalg.norm(at - place.centre, axis=-1) - place.radius
-        elif place.kind == "box":
-            beyond = np.maximum(np.array(place.min) - at, at - np.array(place.max))
-            outside = np.where((beyond <= 0).all(axis=-1), beyond.max(axis=-1), np.linalg.norm(beyond.clip(0), axis=-1))
-        else:
-            continue
-        if outside.min() < place.platform - TOUCHING:
-            return True
-    return False
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ PARTS = ("accuracy", "time", "size")
 BLOCK = 20_000  # more than the C core solves itself in `solve_batch`: another form of the method answers
 CODES = {status: code for code, status in enumerate(STATUSES)}
 OPTIMAL, INFEASIBLE, SINGULAR = (CODES[status] for status in (Status.OPTIMAL, Status.INFEASIBLE, Status.SINGULAR))
-NEGLIGIBLE = 1e-11  # a cable pulls along d only beyond this part of the largest column norm, as in all of towline
+ROUNDED = 1e-12  # a cable without a limit may pull along a direction by this part of its column norm
 UNSURE = CODES[Status.INACCURATE]
 
 
@@ -97,14 +97,14 @@ def compare(robot: Robot, A: Array, w: Array, steps: Steps, single: bool = False
     off = [(0.0, 0.0)]
     for row in [] if single else above:
         problem = TensionProblem(A[row], w[row], robot.t_min, robot.t_max, length=robot.length)
-        exact = exact_optimum(problem, project(problem).closest)
+        exact = exact_optimum(problem, project(problem).closest).tensions
         off.append((float(np.abs(steps.tensions[row] - exact).max()), float(np.abs(batch.tensions[row] - exact).max())))
     step_off, python_off = np.max(off, axis=0) / robot.t_max.max()
     proven = np.isin(steps.status, (INFEASIBLE, SINGULAR))
     pull = np.einsum("ni,nij->nj", steps.direction[proven], A[proven])
-    columns = np.linalg.norm(A[proven] * robot.wrench_scale[:, None], axis=1).max(axis=1, initial=0.0)
-    pull = np.where(np.abs(pull) > NEGLIGIBLE * columns[:, None], pull, 0.0)
-    reach = np.maximum(pull * robot.t_min, pull * robot.t_max).sum(axis=1)
+    columns = np.linalg.norm(A[proven] * robot.wrench_scale[:, None], axis=1)
+    limit = np.where(pull > 0.0, robot.t_max, robot.t_min)
+    reach = np.where(np.isfinite(limit) | (np.abs(pull) > ROUNDED * columns), pull * limit, 0.0).sum(axis=1)
     demand = np.einsum("ni,ni->n", steps.direction[proven], w[proven])
     inside = ((steps.tensions >= robot.t_min) & (steps.tensions <= robot.t_max)).all(axis=1)
     return Accuracy(
