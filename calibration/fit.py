@@ -11,18 +11,22 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import Model, State
-from .normal_equations import NormalEquations, metric
+from .normal_equations import Diagonals, NormalEquations, metric
+from .settling import settled
 
 __all__ = ["Fit", "fit", "held", "unobservable_below"]
 
 MOST_STEPS = 150
 NEGLIGIBLE = 1e-8  # decrease of the sum of squares relative to 1 + the sum: parameters move by 1e-4 of their sigmas
 STILL = 1e-6  # [m] of a step, where it makes no difference to the sum of squares
-MOST_IDLE = 4  # steps that make none
+MOST_IDLE = 8  # steps that make none
+LEAST_BACK = 0.01  # share of the way back to the file along open directions, in one step
 SMALL = 1e-3  # of 1 + the sum of squares
 WEAK = 1e-3  # [1/m^2] times the square of the cables' length: a prior of 30 of their lengths
 WEAKEST = 1e-12  # of the largest eigenvalue, so that rounding is smaller
-LEAST, LARGEST = 1e-6, 1e12  # of the damping, where it is not zero
+LEAST, LARGEST = 1e-9, 1e12  # of the damping's factor, where it is not zero
+GOOD = 0.75  # ratio of a step's decrease to the expected one
+FARTHEST = 0.5  # of the cables' length: beyond that derivatives mean nothing, unless nothing is to be gained
 RELATIVE = 1e-13  # of an eigenvalue to the largest, below which it is rounding
 
 
@@ -67,50 +71,113 @@ def held(S: np.ndarray, length: float) -> np.ndarray:
     return S + weak * np.eye(len(S))
 
 
-def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS) -> Fit:
-    """Minimise the sum of squares from `state` on; `length` is that of the cables [m]."""
+def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enough: float = 0.0) -> Fit:
+    """Minimise the sum of squares from `state` on; `length` is that of the cables [m].
+
+    It ends where the decrease to expect is below a share `enough` of the sum; 0: where no step helps.
+    """
     scale = metric(model)
     varies = model.parameters.varies
     first = model.parameters.first
-    cost, damping, done, idle = model.residuals(state).cost, 0.0, 0, 0
+    damping, back, at_best = _Damping(), 1.0, False
+    cost, done, idle = np.inf, 0, 0
     while done < steps:
         residuals, derivatives = model.linearised(state)
+        cost = residuals.cost
         while done < steps:
             done += 1
-            equations = NormalEquations.at(model, residuals, derivatives, scale, damping)
+            equations = NormalEquations.at(model, residuals, derivatives, scale, damping.added)
+            damping.see(equations.diagonals)
             away = (state.x - first)[varies] * scale[varies]
-            dp, expected = _step(equations, away, length, damping)
+            dp, expected = _step(equations, away * back, length, damping.factor > 0, at_best)
+            if expected < enough * cost:
+                return Fit(state, cost, True, done)
             size = float(np.abs(dp).max(initial=0.0))
             dx = np.zeros_like(state.x)
             dx[varies] = dp / scale[varies]
             tried = model.moved(state, dx, equations.poses_after(dp))
             new = model.residuals(tried).cost
-            if damping == 0 and expected <= NEGLIGIBLE * (1 + cost):
+            little = NEGLIGIBLE * (1 + cost)
+            negligible = expected <= little
+            settles = equations.inverse_root is not None and little - GOOD * expected < new - cost < np.inf
+            if settles:
+                # The parameters may be right, and some poses have farther to go than their derivatives show.
+                tried = settled(model, tried, little / len(state.shift))
+                new = model.residuals(tried).cost
+            if negligible and damping.factor == 0:
                 idle += 1
-                if size <= STILL or idle == MOST_IDLE:
+                costly = new - cost > SMALL * (1 + cost)
+                if size <= STILL or idle >= MOST_IDLE or (costly and back < LEAST_BACK):
                     # The last step costs nothing, and improves nearly quadratically.
                     return Fit(tried, new, True, done) if new <= cost else Fit(state, cost, True, done)
+                back = back / 4 if costly else min(2 * back, 1.0)
+                if costly:
+                    continue
             # A step along open directions may cost a little: they are straight lines only nearby.
-            if new <= cost or max(new - cost, expected) <= SMALL * (1 + cost):
-                state, cost = tried, new
-                damping = 0.0 if damping <= LEAST else damping / 30
+            if new - cost <= SMALL * (1 + cost) if negligible else new <= cost and size <= FARTHEST * length:
+                # Where nothing more is expected, a step without damping shows whether that is so.
+                damping.accept(0.0 if negligible else (cost - new) / expected)
+                damping.factor *= not negligible
+                state, cost, at_best = tried, new, settles
                 break
-            damping = max(LEAST, 10 * damping)
-            if damping > LARGEST:
-                # No step is short enough: the sum of squares is at its rounding.
-                return Fit(state, cost, expected <= SMALL * (1 + cost), done)
+            damping.reject()
+            if damping.factor > LARGEST:
+                # No step is short enough.
+                return Fit(state, cost, False, done)
     return Fit(state, cost, False, done)
 
 
-def _step(equations: NormalEquations, away: np.ndarray, length: float, damping: float) -> tuple[np.ndarray, float]:
-    """Return the step (p,) and the decrease of the sum of squares to expect."""
-    of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
+class _Damping:
+    """Levenberg and Marquardt's damping: a factor times the largest value so far of each diagonal element.
+
+    A share of the element itself would not damp where a derivative is nearly zero: steps there would all be rejected
+    (More, in MINPACK). The factor follows the ratio of the decrease to the expected one (Nielsen).
+    """
+
+    def __init__(self) -> None:
+        self.factor, self._growth = 0.0, 2.0
+        self._largest: Diagonals | None = None
+
+    @property
+    def added(self) -> Diagonals | None:
+        """Return what is added to the diagonals, or None for nothing."""
+        if self._largest is None or self.factor == 0:
+            return None
+        return Diagonals(*(self.factor * part for part in self._largest))
+
+    def see(self, diagonals: Diagonals) -> None:
+        """Take note of diagonals without damping."""
+        known = self._largest or diagonals
+        self._largest = Diagonals(*(np.maximum(*pair) for pair in zip(known, diagonals, strict=True)))
+
+    def accept(self, ratio: float) -> None:
+        """Change the factor after a step that was taken, by the ratio of its decrease to the expected one."""
+        self.factor *= 0.1 if ratio > GOOD else min(max(1 / 3, 1 - (2 * ratio - 1) ** 3), 2.0)
+        self.factor *= self.factor > LEAST
+        self._growth = 2.0
+
+    def reject(self) -> None:
+        """Enlarge the factor after a step that was not taken, ever faster."""
+        self.factor = max(LEAST, self._growth * self.factor)
+        self._growth *= 2
+
+
+def _step(
+    equations: NormalEquations, away: np.ndarray, length: float, damped: bool, at_best: bool
+) -> tuple[np.ndarray, float]:
+    """Return the step (p,) and the decrease of the sum of squares to expect.
+
+    Poses that are `at_best` for the parameters have nothing to gain, whatever their first derivatives promise.
+    """
+    of_poses = 0.0 if equations.y is None or at_best else float(np.vdot(equations.y, equations.y))
     if not equations.b.size:
         return np.zeros(0), of_poses
-    S = held(equations.S, length)
-    back = (S - equations.S) @ away if not damping else 0.0
-    if damping:
-        S = S + np.diag(damping * np.diag(S))
-    # The prior brings open directions back to the file, and they do not enter b.
-    both = np.linalg.solve(S, np.column_stack([equations.b, equations.b + back]))
-    return -both[:, 1], float(equations.b @ both[:, 0]) + of_poses
+    S, b = held(equations.S, length), equations.b
+    if damped:
+        dp = -np.linalg.solve(S, b)
+        return dp, float(-b @ dp) + of_poses
+    # The prior brings open directions back to the file; it does not enter b, and what they seem to gain does not count.
+    dp = -np.linalg.solve(S, b + (S - equations.S) @ away)
+    values, vectors = np.linalg.eigh(equations.S)
+    fixed = values > unobservable_below(values, length)
+    return dp, float(((vectors.T @ b)[fixed] ** 2 / values[fixed]).sum()) + of_poses

@@ -49,12 +49,13 @@ def runs(anchors: np.ndarray, axes: np.ndarray, radii: np.ndarray, attachments: 
     radii
         Of the pulleys [m], (m,); 0: a point anchor.
 
-    Lengths are nan where no cable is tangent to its sheave.
+    Lengths are nan where no cable is tangent to its sheave, as none is to a radius below 0.
     """
     offset = attachments - anchors[:, None]
     lengths = np.sqrt(np.einsum("mni,mni->mn", offset, offset))
+    lengths[radii < 0] = np.nan
     d_radius = np.zeros_like(lengths)
-    over = np.flatnonzero(radii)
+    over = np.flatnonzero(radii > 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         directions = offset / lengths[..., None]
         if over.size:

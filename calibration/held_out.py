@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..display import Displayed
 from ..models.robot import Robot
-from .clock import CLOCK_RANGE
-from .fit import fit
 from .measurements import Measurements
 from .model import Model, State
 from .parameters import Parameters
+from .starts import fit_from
 
 if TYPE_CHECKING:
     from .run import Solved
@@ -28,8 +28,8 @@ SHORTEST = 4  # samples of a block; of fewer, every other sample is left out
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
 CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
-LIKELY = 0.9 * CLOCK_RANGE  # a clock offset at the end of the range has no minimum inside
 NESTED: tuple[tuple[str, ...], ...] = (
+    (),
     ("offsets",),
     ("anchors",),
     ("anchors", "offsets"),
@@ -44,7 +44,8 @@ NESTED: tuple[tuple[str, ...], ...] = (
 class Compared(NamedTuple):
     """A set of parameters, and the root mean square of its residuals fitted and left out [m].
 
-    With poses that were not measured both are divided by the share of the lengths' errors that shows in residuals.
+    With poses that were not measured both are divided by the share of the lengths' errors that shows in residuals. Inf
+    if half of the samples do not determine the parameters, or a fit did not converge.
     """
 
     free: tuple[str, ...]
@@ -53,7 +54,7 @@ class Compared(NamedTuple):
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOut(Displayed):
     """The errors with which parameters predict measurements that were left out.
 
     Attributes
@@ -63,7 +64,7 @@ class HeldOut:
     after
         The same with the parameters found from the other half [m].
     sets
-        The smaller sets of parameters, and the set itself, last.
+        The smaller sets of parameters, none at first: the file. The set itself is the last.
     best
         The smallest set whose error left out is at most 2 % above the smallest error of all.
     """
@@ -102,34 +103,36 @@ def compare(
     Measurements are without slips, weights (m, N) are 0 for wrong readings, and a clock offset is near `clock` [s].
     """
     sets = [one for one in NESTED if set(one) < set(free) - {"clock"}]
-    sets = [(*one, "clock") if "clock" in free else one for one in sets]
+    sets = [(*one, "clock") if one and "clock" in free else one for one in sets]
+    if free == ("clock",):
+        sets = [()]
     return _compare(robot, measurements, weights, [*sets, free], prior, clock)
 
 
 def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
     """Return the smallest set of parameters that predicts measurements left out nearly as well as any set.
 
-    The sets are offsets alone, anchors, both, and these with attachments, scales and pulley radii; with a clock offset
-    where times and poses were measured. With `outliers`, slips and wrong readings are removed first.
+    The sets are none (the file), offsets alone, anchors, both, and these with attachments, scales and pulley radii;
+    with a clock offset where times and poses of a motion were measured. With `outliers`, slips and wrong readings are
+    removed first.
 
     Raises
     ------
     InputError
         If the measurements are too few even for the offsets.
     """
-    from .run import check_enough, cleaned, solve
+    from .run import check_enough, cleaned, is_enough, solve, usual
 
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
-    check_enough(robot, measurements, sets[0], {})
-    if measurements.times is not None and _enough(robot, measurements, ("offsets", "clock")):
-        sets = [(*one, "clock") for one in sets]
-    first = [one for one in sets if set(one) <= CLEANED and _enough(robot, measurements, one)][-1]
+    check_enough(robot, measurements, ("offsets",), {})
+    if "clock" in usual(robot, measurements):
+        sets = [(*one, "clock") if one else one for one in sets]
+    first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, one)][-1]
     solved = solve(robot, measurements, first, {}, outliers)
     clock = float(solved.fit.state.x[solved.model.parameters.clock])
-    sure = CERTAIN * _clock_sigma(solved) < abs(clock) < LIKELY if "clock" in first else False
-    if "clock" in first and not sure:
+    if "clock" in first and not CERTAIN * _clock_sigma(solved) < abs(clock):
         # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
-        sets, clock = [one[:-1] for one in sets], 0.0
+        sets, clock = [tuple(name for name in one if name != "clock") for one in sets], 0.0
     return _compare(robot, *cleaned(solved), sets, {}, clock).best
 
 
@@ -139,17 +142,6 @@ def _clock_sigma(solved: Solved) -> float:
 
     parameters = Calibration(solved, solved.model.parameters.groups, {}).parameters
     return next(one.sigma for one in parameters if one.name == "clock")
-
-
-def _enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:
-    from ..errors import InputError
-    from .run import check_enough
-
-    try:
-        check_enough(robot, measurements, groups, {})
-    except InputError:
-        return False
-    return True
 
 
 def _compare(
@@ -165,7 +157,11 @@ def _compare(
     whole = replace(model_of(robot, measurements, (), {}), weights=weights)
     parts = halves(measurements)
     compared = []
+    before = float(np.sqrt(_mean_square(*poses_fitted(whole, robot))))
     for free in sets:
+        if not free:
+            compared.append(Compared((), before, before))
+            continue
         own = {name: value for name, value in prior.items() if name in free}
         results = [_predict(whole, free, own, clock, parts[i], parts[1 - i]) for i in range(2)]
         known = [result for result in results if result is not None]
@@ -173,7 +169,6 @@ def _compare(
             np.sqrt(np.mean([result[i] for result in known])) if len(known) == 2 else np.inf for i in range(2)
         )
         compared.append(Compared(free, float(fitted), float(left_out)))
-    before = float(np.sqrt(_mean_square(*poses_fitted(whole, robot))))
     best = min(compared, key=lambda one: one.left_out)
     good = [one for one in compared if one.left_out <= WORSE * best.left_out]
     chosen = min(good, key=lambda one: Parameters(robot, one.free).varies.sum(), default=best)
@@ -183,7 +178,7 @@ def _compare(
 def _predict(
     whole: Model, free: tuple[str, ...], prior: dict[str, float], clock: float, fitted: np.ndarray, left: np.ndarray
 ) -> tuple[float, float] | None:
-    """Return the mean squares [m^2] fitted and left out; None if there are too few samples for these parameters."""
+    """Return the mean squares [m^2] fitted and left out; None with too few samples, or if no fit converged."""
     from ..errors import InputError
     from .run import check_enough, length_of, model_of
 
@@ -203,11 +198,13 @@ def _predict(
     length = length_of(whole.robot)
     begin = model.begin()
     begin.x[model.parameters.clock] = clock if "clock" in free else 0.0
-    found = fit(model, begin, length)
+    found = fit_from(model, begin, length)[0]
+    if not found.converged:
+        return None
     other = part(left, free, {})
     nothing = replace(other, parameters=replace(other.parameters, groups=()))
     state = nothing.begin()._replace(x=found.state.x)
-    state = fit(nothing, state, length).state
+    state = fit_from(nothing, state, length)[0].state
     return _mean_square(model, found.state), _mean_square(nothing, state)
 
 
@@ -226,4 +223,4 @@ def poses_fitted(model: Model, robot: Robot) -> tuple[Model, State]:
     from .run import length_of
 
     nothing = replace(model, parameters=Parameters(robot, ()), prior={})
-    return nothing, fit(nothing, nothing.begin(), length_of(robot)).state
+    return nothing, fit_from(nothing, nothing.begin(), length_of(robot))[0].state

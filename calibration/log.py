@@ -17,16 +17,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..declared import check_hdf5
 from ..errors import InputError
 from ..inputs import file_path, printable, shown
-from ..models.parsing import read_bytes
 from ..models.part import COORDINATES
 from ..netcdf import check_units
+from ..reading import read_bytes
 from .measurements import Measurements, Sigma
 
 __all__ = ["read_measurements", "save_measurements"]
 
 LARGEST_LOG = 1_000_000_000  # [bytes]
+ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "km": 1e3}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180, "°": np.pi / 180}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
@@ -41,6 +43,7 @@ UNITS = {
 }
 NUMBERED = re.compile(r"(l|tension)(0|[1-9]\d{0,2})")
 HEADING = re.compile(r"\s*([^\[\]]*?)\s*\[\s*([^\[\]]*?)\s*\]\s*")
+WRITTEN = ("cable_lengths", "pose", "tensions", "time")  # by towline
 ACCEPTED = "l0, l1, ..., x, y, z, roll, pitch, yaw, qx, qy, qz, qw, t, tension0, tension1, ..."
 MISSING = ("", "nan", "NaN", "NAN")
 
@@ -81,6 +84,8 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
         return Measurements(**arguments)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+    except csv.Error as error:  # a field of more than 131 072 characters
+        raise InputError(f"{where} must be CSV that can be read, got {error}") from None
 
 
 def _csv_columns(content: bytes) -> dict[str, _Column]:
@@ -156,8 +161,6 @@ def _from_columns(columns: Mapping[str, _Column]) -> dict[str, Any]:
     if groups[ANGLE_NAMES] and groups[QUATERNION]:
         raise InputError("must have an orientation as roll, pitch, yaw or as qx, qy, qz, qw, got both")
     orientation = groups[ANGLE_NAMES] or groups[QUATERNION]
-    if orientation and not groups[POSITION]:
-        raise InputError("must have the columns x, y, z beside an orientation, got none")
     if groups[POSITION]:
         result["poses"] = np.column_stack([columns[name].values for name in POSITION])
     if orientation:
@@ -188,12 +191,14 @@ def _from_netcdf(content: bytes) -> dict[str, Any]:
         # NetCDF 4 is HDF5. Of a damaged file, h5netcdf would complain once more on standard error when it is forgotten.
         with h5py.File(io.BytesIO(content), "r") as file:
             arrays = {
-                str(name): (np.asarray(variable[...]), _attributes(variable))
-                for name, variable in file.items()
-                if isinstance(variable, h5py.Dataset) and variable.dtype.kind in "fiu"
+                name: (np.asarray(variable[...]), _attributes(variable))
+                for name, variable in check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED).items()
+                if variable.dtype.kind in "fiu"
             }
             known = _attributes(file)
             stated = {name: known[f"sigma_{name}"] for name in Sigma._fields if f"sigma_{name}" in known}
+    except InputError:
+        raise
     except Exception as error:  # h5py raises of any kind for damaged files
         raise InputError(
             f"must be a NetCDF 4 file, got one that cannot be read ({printable(str(error), 80)})"
@@ -202,7 +207,7 @@ def _from_netcdf(content: bytes) -> dict[str, Any]:
         return _as_towline_writes(arrays, stated)
     columns = {}
     for name, (values, attributes) in arrays.items():
-        if values.ndim != 1 or not (NUMBERED.fullmatch(name) or name in UNITS):
+        if values.ndim != 1 or name in WRITTEN:
             continue
         if "units" not in attributes:
             raise InputError(f"variable {name} must have the attribute units, got none")
@@ -211,6 +216,10 @@ def _from_netcdf(content: bytes) -> dict[str, Any]:
     if len(sizes) > 1:
         raise InputError(f"variables must have one size, got {', '.join(str(size) for size in sorted(sizes))}")
     return _from_columns(columns)
+
+
+def _is_read(name: str) -> bool:
+    return bool(NUMBERED.fullmatch(name)) or name in UNITS or name in WRITTEN
 
 
 def _attributes(of: Any) -> dict[str, Any]:
@@ -227,7 +236,8 @@ def _attributes(of: Any) -> dict[str, Any]:
 def _floats(values: np.ndarray) -> np.ndarray:
     """Return values as they can be computed with: a damaged file may hold nan that raise a signal."""
     with np.errstate(invalid="ignore"):
-        return values.astype(float) + 0.0
+        numbers = values.astype(float, copy=False)
+        return np.add(numbers, 0.0, out=numbers)
 
 
 def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], stated: dict[str, Any]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import number, real_array, required, shown
 from ..models import points
@@ -44,7 +45,7 @@ class Sigma(NamedTuple):
     rotation: float = 0.0
 
 
-class Measurements:
+class Measurements(Displayed):
     """Hold N samples of a robot's cable lengths, with poses, tensions and times where they were measured.
 
     Parameters
@@ -55,8 +56,8 @@ class Measurements:
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (N, 6), or positions alone, (N, 3). Rows of
         nan were not measured. Default: no pose was measured.
     orientations
-        Of the platform where `poses` are positions: (roll, pitch, yaw) [rad], (N, 3), or quaternions in the order
-        (x, y, z, w), (N, 4). Rows of nan were not measured.
+        Of the platform where `poses` are positions, or None as beside an inertial sensor: (roll, pitch, yaw) [rad],
+        (N, 3), or quaternions in the order (x, y, z, w), (N, 4). Rows of nan were not measured.
     tensions
         Of the cables [N], (N, m): cables with a stiffness are longer under them than their readings. Default: not
         measured, no cable stretches.
@@ -96,9 +97,9 @@ class Measurements:
         count = len(self.lengths)
         if not 1 <= count <= MOST:
             raise InputError(f"lengths must have 1 to {MOST} rows, got {count}")
-        self.poses = None if poses is None else _poses(poses, orientations, count)  # (N, 6)
         if poses is None and orientations is not None:
-            raise InputError(f"orientations must be None without poses, got {shown(orientations)}")
+            poses = np.full((count, 3), np.nan)
+        self.poses = None if poses is None else _poses(poses, orientations, count)  # (N, 6)
         self.tensions = None if tensions is None else _table("tensions", tensions, self.lengths.shape)  # (N, m)
         self.times = None if times is None else _rising(times, count)  # (N,)
         self.sigma = _sigma(sigma)
@@ -126,6 +127,16 @@ class Measurements:
         except (IndexError, TypeError, ValueError):
             accepted = f"indices below {len(self)} that rise, flags ({len(self)},) or a slice"
             raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
+
+    def with_sigma(self, sigma: float | Mapping[str, float]) -> Measurements:
+        """Return the measurements with other standard deviations, as for the class.
+
+        Raises
+        ------
+        InputError
+            If they have a wrong value.
+        """
+        return Measurements(self.lengths, self.poses, None, self.tensions, self.times, sigma)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as NetCDF, whole or not at all, and return the path; `read_measurements` reads the file.

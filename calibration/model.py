@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..display import Displayed
 from ..models import points
 from ..models.robot import Robot
 from . import rotations
@@ -61,6 +62,12 @@ class Residuals(NamedTuple):
         total = sum(float(np.vdot(part, part)) for part in self)
         return total if np.isfinite(total) else np.inf
 
+    @property
+    def of_samples(self) -> np.ndarray:
+        """Return the sum of squares of each sample's readings and pose, (N,), inf where a cable has no length."""
+        total = (self.readings**2).sum(axis=0) + (self.poses**2).sum(axis=1)
+        return np.where(np.isfinite(total), total, np.inf)
+
 
 class Derivatives(NamedTuple):
     """Derivatives of the residuals of readings.
@@ -73,15 +80,19 @@ class Derivatives(NamedTuple):
         By clock offset and slips, (m, N, 1 + slips).
     poses
         By shift and turn of the own sample, (m, N, 6).
+    arms, lengths
+        R b of each cable (m, N, 3) [m], and its length (m, N) [m].
     """
 
     cables: np.ndarray
     others: np.ndarray
     poses: np.ndarray
+    arms: np.ndarray
+    lengths: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Displayed):
     """Measurements of a robot, and what varies to explain them.
 
     Attributes
@@ -92,6 +103,8 @@ class Model:
         Poses to begin with where none was measured, (N, 6) [m, rad]; default: home.
     track
         Of measured poses over time; default: the clock offset is 0.
+    upright
+        Standard deviation of orientations that were not measured about those to begin with [rad]; inf: anything.
     """
 
     parameters: Parameters
@@ -100,6 +113,7 @@ class Model:
     weights: np.ndarray
     start: np.ndarray | None = None
     track: PoseTrack | None = None
+    upright: float = np.inf
 
     @property
     def robot(self) -> Robot:
@@ -122,7 +136,8 @@ class Model:
         """
         sigma = self.measurements.sigma
         known = self._given[2] | (self.track is not None)
-        result = np.where(known, np.repeat([sigma.position, sigma.rotation], 3), np.inf)
+        unknown = np.repeat([np.inf, self.upright], 3)
+        result = np.where(known, np.repeat([sigma.position, sigma.rotation], 3), unknown)
         result[:, self.robot.dof_mask == 0] = 0.0
         return result
 
@@ -164,13 +179,18 @@ class Model:
     def _base(self, clock: float) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
         if self.track is not None:
             return self.track.at(clock)
+        return (*self._begun, None, None)
+
+    @cached_property
+    def _begun(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (N, 3) [m] and rotations (N, 3, 3) as measured, or to begin with where they were not."""
         position, rotation, known = self._given
         if self.start is not None and not known.all():
             place, turned = ~known[:, 0], ~known[:, 3]
             position, rotation = position.copy(), rotation.copy()
             position[place] = self.start[place, :3]
             rotation[turned] = points.rotations(self.start[turned, 3:])
-        return position, rotation, None, None
+        return position, rotation
 
     def residuals(self, state: State) -> Residuals:
         """Return the residuals of readings, poses and parameters."""
@@ -202,10 +222,10 @@ class Model:
         excess = self._stretch * run.lengths - table[:, 6:7] - slip  # scale times reading, without noise
         readings = weights * (ratio * excess - own * self.measurements.lengths.T)
         sigmas = self.pose_sigmas
-        moved = np.concatenate([state.shift, rotations.vectors_of(state.turn)], axis=1) if sigmas.any() else state.shift
         poses = np.zeros((len(position), 6))
         held = (sigmas > 0) & np.isfinite(sigmas)
         if held.any():
+            moved = np.concatenate([state.shift, rotations.vectors_of(state.turn)], axis=1)
             poses[held] = moved[held] / sigmas[held]
         residuals = Residuals(readings, poses, (state.x - parameters.first) / self.prior_sigmas)
         if not derive:
@@ -224,7 +244,7 @@ class Model:
             others[..., 0] = np.einsum("mni,ni->mn", by_pose, np.concatenate([velocity, rate], axis=1))
         for column, (cable, first) in enumerate(parameters.slips, start=1):
             others[cable, first:, column] = -gain[cable, first:]
-        return residuals, Derivatives(cables, others, by_pose)
+        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths)
 
     def _slips(self, x: np.ndarray) -> np.ndarray:
         """Return the sum of each cable's slips so far, (m, N) [m]; (m, 1) without slips."""
@@ -235,6 +255,12 @@ class Model:
         for (cable, first), size in zip(parameters.slips, x[parameters.clock + 1 :], strict=True):
             result[cable, first:] += size
         return result
+
+    def lengths(self, state: State) -> np.ndarray:
+        """Return the lengths of the cables that the readings mean, (N, m) [m]."""
+        table = self.parameters.table(state.x)
+        unstrained = table[:, 6:7] + self._slips(state.x) + table[:, 7:8] * self.measurements.lengths.T
+        return (unstrained / self._stretch).T
 
     def moved(self, state: State, dx: np.ndarray, dq: np.ndarray | None) -> State:
         """Return the state after changes of parameters (P,) and of poses (N, 6), or None if no pose varies."""

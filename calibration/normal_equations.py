@@ -7,22 +7,27 @@ With J and G the derivatives of all residuals by parameters and by the pose of e
     C_k dq_k = -(G_k'e + E_k dp)
 
 with prior standard deviations as residuals of their own. With L_k L_k' = C_k, the sum is one product Y'Y of the matrix
-Y of all L_k^-1 E_k on top of each other. Parameters are multiplied by `metric`, so that each is a length [m].
+Y of all L_k^-1 E_k on top of each other. Parameters are multiplied by `metric`, so that each is a length [m]. Damping
+adds to the diagonals of J'J and of C_k.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from ..display import Displayed
+from .curvature import curvature
 from .model import Derivatives, Model, Residuals, State
 from .parameters import OF_CABLE
 from .products import inner
 
-__all__ = ["NormalEquations", "metric"]
+__all__ = ["Diagonals", "NormalEquations", "metric", "pose_steps"]
 
 NEARLY_SINGULAR = 1e-10  # added to C_k, relative to its mean, where it has no inverse: the lengths leave the pose open
+FLATTEST = 0.1  # share of C_k that second derivatives leave
 SLOWEST = 1e-3  # [m/s]; a platform that moves less makes a clock offset no better known
 
 
@@ -41,8 +46,15 @@ def metric(model: Model) -> np.ndarray:
     return np.concatenate([table.ravel(), [speed], np.ones(len(parameters.slips))])
 
 
+class Diagonals(NamedTuple):
+    """Of J'J [1/m^2], (p,), and of each C_k [1/m^2, 1/rad^2], (N, 6)."""
+
+    parameters: np.ndarray
+    poses: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
-class NormalEquations:
+class NormalEquations(Displayed):
     """The equations at one state.
 
     Attributes
@@ -51,6 +63,8 @@ class NormalEquations:
         Of the parameters that vary, in metres, (p, p) and (p,).
     inverse_root
         L_k^-1, (N, 6, 6), and with it Y as (N, 6, p) and the right side; None if no pose varies.
+    diagonals
+        Without damping; of poses 0 if none varies.
     """
 
     S: np.ndarray
@@ -58,12 +72,18 @@ class NormalEquations:
     inverse_root: np.ndarray | None
     Y: np.ndarray | None
     y: np.ndarray | None
+    diagonals: Diagonals
 
     @classmethod
     def at(
-        cls, model: Model, residuals: Residuals, derivatives: Derivatives, scale: np.ndarray, damping: float = 0.0
+        cls,
+        model: Model,
+        residuals: Residuals,
+        derivatives: Derivatives,
+        scale: np.ndarray,
+        damping: Diagonals | None = None,
     ) -> NormalEquations:
-        """Return the equations; `scale` is `metric`, and `damping` adds that share of C_k's diagonal to it."""
+        """Return the equations; `scale` is `metric`, and `damping` is added to the diagonals of J'J and C_k."""
         varies = model.parameters.varies
         J, others, keep = _columns(model, derivatives, scale)
         m, count, width = J.shape
@@ -83,16 +103,20 @@ class NormalEquations:
         sigma = model.prior_sigmas[varies] * scale[varies]
         S[np.diag_indices(len(b))] += 1 / sigma**2
         b += residuals.parameters[varies] / sigma
+        own = np.diag(S).copy()
+        if damping is not None:
+            S[np.diag_indices(len(b))] += damping.parameters
         if not model.poses_vary.any():
-            return cls(S, b, None, None, None)
-        inverse_root, G, g = _poses(model, residuals, derivatives, damping)
+            return cls(S, b, None, None, None, Diagonals(own, np.zeros((count, 6))))
+        inverse_root, G, g, of_poses = _poses(model, residuals, derivatives, damping)
         E = np.empty((count, 6, size))
         E[..., : m * width] = (G[..., None] * np.swapaxes(J, 0, 1)[:, None]).reshape(count, 6, m * width)
         E[..., m * width :] = G @ np.swapaxes(others, 0, 1)
         Y = np.matmul(inverse_root, E if keep.all() else E[..., keep])
         y = np.matmul(inverse_root, g[..., None])[..., 0]
         stacked = Y.reshape(6 * count, -1)
-        return cls(S - inner(stacked, stacked), b - inner(stacked, y.reshape(-1, 1))[:, 0], inverse_root, Y, y)
+        S, b = S - inner(stacked, stacked), b - inner(stacked, y.reshape(-1, 1))[:, 0]
+        return cls(S, b, inverse_root, Y, y, Diagonals(own, of_poses))
 
     def poses_after(self, dp: np.ndarray) -> np.ndarray | None:
         """Return the changes of the poses (N, 6) that follow from those of the parameters (p,), None if none varies."""
@@ -113,9 +137,9 @@ def _columns(model: Model, derivatives: Derivatives, scale: np.ndarray) -> tuple
 
 
 def _poses(
-    model: Model, residuals: Residuals, derivatives: Derivatives, damping: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return L_k^-1 (N, 6, 6), G_k' (N, 6, m) and G_k'e (N, 6) of the coordinates that vary."""
+    model: Model, residuals: Residuals, derivatives: Derivatives, damping: Diagonals | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return L_k^-1 (N, 6, 6), G_k' (N, 6, m), G_k'e (N, 6) and C_k's diagonal (N, 6) of the coordinates that vary."""
     vary, sigmas = model.poses_vary, model.pose_sigmas
     G = np.ascontiguousarray(derivatives.poses.transpose(1, 2, 0)) * vary[..., None]
     C = G @ np.swapaxes(G, 1, 2)
@@ -125,13 +149,28 @@ def _poses(
     diagonal = np.arange(6)
     C[:, diagonal, diagonal] += inverse**2
     own = C[:, diagonal, diagonal]
-    C[:, diagonal, diagonal] = np.where(own > 0, own * (1 + damping), 1.0)
+    if damping is not None:
+        C[:, diagonal, diagonal] += damping.poses
+    C[:, diagonal, diagonal] += C[:, diagonal, diagonal] == 0
     try:
         root = np.linalg.cholesky(C)
     except np.linalg.LinAlgError:
         C[:, diagonal, diagonal] += NEARLY_SINGULAR * own.mean(axis=1, keepdims=True) + 1e-300
         root = np.linalg.cholesky(C)
-    return np.linalg.inv(root), G, g
+    return np.linalg.inv(root), G, g, own
+
+
+def pose_steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray]:
+    """Return Newton's steps of poses with parameters as they are, (N, 6), and the decrease to expect of each, (N,)."""
+    vary = model.poses_vary
+    inverse_root, _, g, _ = _poses(model, residuals, derivatives, None)
+    bent = curvature(residuals, derivatives) * (vary[:, :, None] & vary[:, None, :])
+    values, vectors = np.linalg.eigh(inverse_root @ bent @ np.swapaxes(inverse_root, 1, 2))
+    inverse_root = (
+        np.swapaxes(vectors / np.sqrt(np.maximum(np.abs(1 + values), FLATTEST))[:, None], 1, 2) @ inverse_root
+    )
+    y = np.matmul(inverse_root, g[..., None])
+    return -np.matmul(np.swapaxes(inverse_root, 1, 2), y)[..., 0], (y[..., 0] ** 2).sum(axis=1)
 
 
 def state_equations(model: Model, state: State, scale: np.ndarray) -> NormalEquations:

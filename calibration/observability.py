@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..display import Displayed
 from .fit import unobservable_below
 from .model import State
 from .parameters import OF_CABLE, WORDS, Parameters
@@ -29,7 +30,7 @@ AXES = "xyz"
 
 
 @dataclass(frozen=True, eq=False)
-class Observability:
+class Observability(Displayed):
     """The directions that measurements determine.
 
     Attributes

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import number, shown
 from ..models import points
@@ -37,7 +38,7 @@ SMALLEST_PRIOR = 1e-9
 
 
 @dataclass(frozen=True)
-class Parameters:
+class Parameters(Displayed):
     """The parameters of a robot's calibration: which there are, and which of them vary.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 from ..text import quantity
 
 if TYPE_CHECKING:
+    from ..display import Fact
     from .result import Calibration, Parameter
 
 __all__ = ["report"]
@@ -21,10 +22,10 @@ HELPS = 1.05  # by which errors left out must be larger before a smaller set is 
 
 def report(result: Calibration) -> str:
     """Return the result for people: how well lengths fit, the parameters, and what the measurements leave open."""
-    state = "" if result.converged else ", NOT CONVERGED"
     lines = [
-        f"{result.robot.name}: {', '.join(result.free)} from {len(result.residuals)} samples{state}",
+        headline(result),
         f"  residual of the lengths {_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)",
+        *([] if result.refused is None else [f"  DO NOT USE THIS RESULT: {result.refused}"]),
         *_of_held_out(result),
         *_of_noise(result),
         *_of_parameters(result),
@@ -34,22 +35,46 @@ def report(result: Calibration) -> str:
     return "\n".join(lines)
 
 
+def headline(result: Calibration) -> str:
+    """Return in one line what was calibrated, from how many samples, and whether the result can be used."""
+    free = ", ".join(result.free) or "the file as it is"
+    state = "" if result.converged else ", NOT CONVERGED"
+    return f"{result.file.name}: {free} from {len(result.residuals)} samples{state}"
+
+
+def facts(result: Calibration) -> list[Fact]:
+    """Return the facts that need no further calibration, with the parameters that changed most."""
+    residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
+    doubt = [] if result.doubt is None else [("DO NOT USE", result.doubt)]
+    by_size = sorted(result.parameters, key=lambda one: -abs(one.correction))
+    counts = (("wrong readings", result.outliers), ("slips", result.slips), ("unobservable", result.not_identifiable))
+    return [
+        *doubt,
+        ("residual of the lengths", residual),
+        *((name, quantity(len(of))) for name, of in counts if of),
+        ("parameters", quantity(len(by_size))),
+        *((one.name, " ".join(_one(one).split()[1:])) for one in by_size[:MOST_LISTED]),
+    ]
+
+
 def _mm(length: float) -> str:
     return quantity(1e3 * length, "mm", digits=3)
 
 
 def _of_held_out(result: Calibration) -> list[str]:
+    if result.doubt is not None:
+        return []
     held_out = result.held_out
     if not np.isfinite(held_out.after):
-        return ["  too few samples: half of them do not determine these parameters, so nothing confirms the result"]
+        return ["  too few samples, or no convergence: half of them do not determine these parameters to confirm them"]
     lines = [f"  on samples left out {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
     fitted = held_out.sets[-1].fitted
+    if not held_out.best:
+        return lines if held_out.after > held_out.before else [*lines, "  the file predicts samples left out as well"]
     if set(held_out.best) < set(result.free):
         lines.append(
             f"  {', '.join(held_out.best)} alone predict samples left out as well: the other parameters do not help"
         )
-    elif held_out.after > held_out.before:
-        lines.append("  samples left out fit worse than with the file's robot: do not use this result")
     elif held_out.after > 1.5 * fitted:
         lines.append(f"  fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
     return lines
@@ -75,12 +100,19 @@ def _of_parameters(result: Calibration) -> list[str]:
     from .run import length_of
 
     lines = ["  parameters, with standard deviations and their change from the file:"]
-    length = length_of(result.robot)  # on which a scale acts
+    length = length_of(result.file)  # on which a scale acts
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
     shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
     lines += [f"    {_one(one)}" for one in result.parameters if one.name in shown]
     if len(result.parameters) > len(shown):
         lines.append(f"    and {len(result.parameters) - len(shown)} with smaller changes")
+    if result.beyond_prior:
+        named = ", ".join(
+            f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior[:MOST_LISTED]
+        )
+        more = len(result.beyond_prior) - MOST_LISTED
+        others = f" and {more} more" if more > 0 else ""
+        lines.append(f"  beyond 5 sigmas of the prior: {named}{others}; check the log, the file and the prior")
     return lines
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..display import BLUE, GREY, Displayed, Fact, picture
 from ..errors import InputError
 from ..inputs import real_array
 from ..models import points
+from ..models.part import LARGEST
 from ..models.robot import Robot
+from ..text import quantity
 from .outliers import Outlier, Slip
 
 if TYPE_CHECKING:
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "Parameter"]
 
+EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
+FAR = 5.0  # standard deviations of the prior
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
 
 
@@ -44,7 +49,7 @@ class Parameter(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(Displayed):
     """The result of `calibrate`.
 
     Attributes
@@ -53,16 +58,64 @@ class Calibration:
         The groups of parameters that were found.
     prior
         Their standard deviations about the file's values, where given.
+    doubt
+        A slip that the log seems to have, such as cables in another order or degrees read as radians, or None.
     """
 
     _solved: Solved
     free: tuple[str, ...]
     prior: Mapping[str, float]
+    doubt: str | None = None
+
+    def _headline(self) -> str:
+        from .report import headline
+
+        return headline(self)
+
+    def _facts(self) -> Iterable[Fact]:
+        from .report import facts
+
+        return facts(self)
+
+    def _picture(self) -> str:
+        samples = np.arange(len(self.residuals))
+        curves = (
+            (samples, 1e3 * np.sqrt(np.mean(residuals**2, axis=1)), colour)
+            for residuals, colour in ((self.residuals_before, GREY), (self.residuals, BLUE))
+        )
+        return picture(curves, "sample", "residual before (grey), after [mm]")
 
     @property
     def converged(self) -> bool:
         """Return whether no other values near these fit notably better."""
         return self._solved.fit.converged
+
+    @cached_property
+    def refused(self) -> str | None:
+        """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
+
+        The log seems to have a slip, the fit did not converge, or samples left out fit worse than with the file's
+        robot.
+        """
+        if self.doubt is not None:
+            return self.doubt
+        if not self.converged:
+            return f"the fit did not converge in {self._solved.fit.steps} steps"
+        if not self.free:
+            return "the file predicts samples left out as well as any parameters would: there is nothing to change"
+        held_out = self.held_out
+        if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
+            before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
+            return f"samples left out fit worse than with the file's robot: {after}, {before} with the file"
+        return None
+
+    @property
+    def beyond_prior(self) -> tuple[tuple[str, float], ...]:
+        """Return parameters that moved by more than 5 standard deviations of the prior, and by how many, most first."""
+        of, state = self._solved.model.parameters, self._solved.fit.state
+        moved = np.abs(state.x - of.first) / self._solved.model.prior_sigmas
+        far = [i for i in np.argsort(-moved) if moved[i] > FAR]
+        return tuple((of.names[i], float(moved[i])) for i in far)
 
     @property
     def file(self) -> Robot:
@@ -78,7 +131,8 @@ class Calibration:
     def robot(self) -> Robot:
         """Return the robot with the calibrated parameters, its encoders, and its uncertainty."""
         parameters, x = self._solved.model.parameters, self._solved.fit.state.x
-        return parameters.calibrated(x, self.covariance if np.isfinite(self.noise) else None)
+        known = np.isfinite(self.noise) and np.abs(self.covariance).max(initial=0.0) <= LARGEST
+        return parameters.calibrated(x, self.covariance if known else None)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -250,6 +304,8 @@ class Calibration:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the robot as a robot file (YAML), whole or not at all, and return the path.
 
+        A result that should not be used (`refused`) is not saved; `robot.save` saves it all the same.
+
         Parameters
         ----------
         path
@@ -258,9 +314,13 @@ class Calibration:
         Raises
         ------
         InputError
-            If the file cannot be written.
+            If the result is refused, or the file cannot be written.
         """
-        return self.robot.save(path)
+        if self.refused is not None:
+            raise InputError(f"calibration must be one to use, to be saved, got one refused: {self.refused}")
+        from ..models.parsing import save_yaml
+
+        return save_yaml(self.robot, path, "path")
 
     def figures(self) -> dict[str, Figure]:
         """Draw residuals before and after, anchors with ellipsoids, and standard deviations: by name, to show or save.
@@ -296,10 +356,12 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data, as `towline calibrate --json` prints it."""
-        held_out = self.held_out
         return {
-            "robot": self.robot.name,
+            "robot": self.file.name,
             "converged": self.converged,
+            "refused": self.refused,
+            "doubt": self.doubt,
+            "beyond_prior": [{"name": name, "sigmas": sigmas} for name, sigmas in self.beyond_prior],
             "free": list(self.free),
             "samples": len(self._solved.model.measurements),
             "residual_before": self.residual_before,
@@ -313,7 +375,7 @@ class Calibration:
             ],
             "covariance": self.covariance.tolist(),
             "not_identifiable": list(self.not_identifiable),
-            "held_out": held_out.to_dict(),
+            "held_out": None if self.doubt else self.held_out.to_dict(),
             "outliers": [one._asdict() for one in self.outliers],
             "slips": [one._asdict() for one in self.slips],
         }

@@ -13,22 +13,22 @@ from ..errors import InputError
 from ..inputs import flag
 from ..models.files import as_robot
 from ..models.robot import Robot
-from .clock import CLOCK_RANGE, begin_with_clock
+from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
 from .measurements import Measurements, check_measurements, measured_poses
 from .model import Model, State
 from .normal_equations import metric, state_equations
 from .observability import Observability, observability
 from .outliers import Outlier, Slip, alike, find_outliers, find_slip
-from .parameters import Parameters, check_free, check_prior
+from .parameters import GROUPS, Parameters, check_free, check_prior
+from .plausibility import doubt
 from .pose_track import PoseTrack
 from .result import Calibration
-from .starts import start_poses
+from .starts import LARGEST_SHARE, fit_from, level_poses
 
 __all__ = ["Solved", "calibrate", "solve"]
 
 ROUNDS = 30  # of fits, each without the wrong readings of those before
-LARGEST_SHARE = 0.1  # of readings that may be left out; more are no exceptions
 FEW = 0.02  # of the samples
 MOST_SLIPS = 8
 
@@ -46,7 +46,7 @@ class Solved(NamedTuple):
 def calibrate(
     robot: Robot | str | os.PathLike[str],
     measurements: Measurements,
-    free: str | Sequence[str] = ("anchors", "offsets"),
+    free: str | Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
     outliers: bool = True,
 ) -> Calibration:
@@ -63,8 +63,9 @@ def calibrate(
         `Measurements` of the robot, or from `read_measurements`.
     free
         What to find, some of anchors, attachments, offsets (of the lengths), scales (of the lengths), radii (of the
-        pulleys) and clock (by how much the clock of the poses is ahead of that of the lengths). Or "auto": the smallest
-        set that predicts measurements left out nearly as well as any (`select`).
+        pulleys) and clock (by how much the clock of the poses is ahead of that of the lengths). Default: anchors and
+        offsets, and the clock if times and poses of a motion were measured. Or "auto": the smallest set that predicts
+        measurements left out nearly as well as any (`select`), none if that is the file.
     prior
         Standard deviations about the file's values by the names of `free`, [m], of scales [1], of the clock [s], such
         as {"anchors": 0.02}. Default: none; what the measurements leave open changes as little as possible.
@@ -80,16 +81,37 @@ def calibrate(
     chosen = as_robot(robot)
     given = check_measurements(chosen, measurements)
     flag("outliers", outliers)
+    slip = doubt(chosen, given)
+    outliers = outliers and slip is None  # nearly all readings would be
     if isinstance(free, str) and free == "auto":
         from .held_out import select
 
-        free = select(chosen, given, outliers)
-        prior = None if prior is None else {name: value for name, value in prior.items() if name in free}
-    groups = check_free(chosen, free)
+        check_prior(prior, GROUPS)
+        groups = select(chosen, given, outliers)
+        prior = None if prior is None else {name: value for name, value in prior.items() if name in groups}
+    else:
+        groups = usual(chosen, given) if free is None else check_free(chosen, free)
     priors = check_prior(prior, groups)
-    check_enough(chosen, given, groups, priors)
+    if groups:
+        check_enough(chosen, given, groups, priors)
     solved = solve(chosen, given, groups, priors, outliers)
-    return Calibration(solved, groups, priors)
+    return Calibration(solved, groups, priors, slip)
+
+
+def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
+    """Return the parameters that are found by default: the clock offset among them if a motion was measured."""
+    groups = ("anchors", "offsets", "clock")
+    known = measurements.times is not None and is_enough(robot, measurements, ("clock",))
+    return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
+
+
+def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:
+    """Return whether the measurements are enough for these parameters, without a prior."""
+    try:
+        check_enough(robot, measurements, groups, {})
+    except InputError:
+        return False
+    return True
 
 
 def solve(
@@ -99,7 +121,7 @@ def solve(
     model = model_of(robot, measurements, groups, prior)
     length = length_of(robot)
     state = begin_with_clock(model, length) if "clock" in groups else model.begin()
-    result = fit(model, state, length)
+    result, fitted = fit_from(model, state, length, outliers)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
     limit = LARGEST_SHARE * model.weights.size
@@ -114,15 +136,20 @@ def solve(
             parameters = replace(model.parameters, slips=(*model.parameters.slips, (slip.cable, slip.sample)))
             model = replace(model, parameters=parameters)
             result = fit(model, result.state._replace(x=np.append(result.state.x, slip.size)), length)
+            fitted = model.weights
             continue
         if not found or len(wrong) + len(found) > limit:
-            break
+            if np.array_equal(fitted, model.weights):
+                break
+            # Readings that looked wrong in the beginning are not.
+            result, fitted = fit(model, result.state, length), model.weights
+            continue
         wrong |= {(one.cable, one.sample): one for one in found}
         weights = model.weights.copy()
         for one in found:
             weights[one.cable, one.sample] = 0.0
         model = replace(model, weights=weights)
-        result = fit(model, result.state, length)
+        result, fitted = fit(model, result.state, length), model.weights
     S = state_equations(model, result.state, scale := metric(model)).S
     seen = observability(S, model.parameters, result.state, scale, length)
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
@@ -135,7 +162,7 @@ def model_of(
     prior: dict[str, float],
     start: np.ndarray | None = None,
 ) -> Model:
-    """Return the model of checked arguments; `start` are poses (N, 6) to begin with, default: from the lengths."""
+    """Return the model of checked arguments; `start` are poses (N, 6) to begin with, default: level ones."""
     parameters = Parameters(robot, groups)
     weights = np.ones((robot.m, len(measurements)))
     model = Model(parameters, measurements, prior, weights)
@@ -145,24 +172,11 @@ def model_of(
         rows = np.all(known[:, robot.dof_mask > 0], axis=1)
         model = replace(model, track=PoseTrack(measurements.times, position, rotation, rows))
     elif np.isinf(model.pose_sigmas[:, :3]).any():
-        model = replace(model, start=_starts(robot, measurements, groups) if start is None else start)
+        if start is None:
+            table = parameters.table(parameters.first)
+            start = level_poses(robot, table[:, 6] + table[:, 7] * measurements.lengths, "offsets" in groups)
+        model = replace(model, start=start)
     return model
-
-
-def _starts(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> np.ndarray:
-    """Return poses to begin with; readings without an offset are taken as they are, or as 0 at home if that fits."""
-    parameters = Parameters(robot, groups)
-    table = parameters.table(parameters.first)
-    lengths = table[:, 6] + table[:, 7] * measurements.lengths
-    poses, misfit = start_poses(robot, lengths)
-    if "offsets" in groups and np.median(misfit) > 0.05 * length_of(robot):
-        from .geometry import runs
-
-        run = runs(robot.home_anchors, np.zeros((robot.m, 3)), np.zeros(robot.m), robot.home_attachments[:, None])
-        from_home, other = start_poses(robot, lengths - lengths[0] + run.lengths[:, 0])
-        if np.median(other) < np.median(misfit):
-            return from_home
-    return poses
 
 
 def length_of(robot: Robot) -> float:

@@ -9,6 +9,7 @@ from towline import load
 from towline.calibration import Measurements, read_measurements
 from towline.errors import InputError
 from towline.models import points
+from towline.ocp.tasks.paths.point_file import read_points
 
 from .robots_as_built import as_built
 from .warm import towline
@@ -166,6 +167,17 @@ def test_bad_logs_are_refused_in_one_line(what, tmp_path):
     assert str(caught.value).isprintable()
 
 
+@pytest.mark.parametrize(
+    ("read", "header"),
+    [(read_measurements, "l0 [m]\n"), (read_measurements, ""), (lambda file: read_points(file.name, file.parent), "")],
+)
+def test_a_csv_field_without_end_is_refused_in_one_line(read, header, tmp_path):
+    (tmp_path / "log.csv").write_text(f'{header}"{"x" * 200_000}\n1\n2\n')
+    with pytest.raises(InputError, match=r"log\.csv must be CSV that can be read, got field larger than") as error:
+        read(tmp_path / "log.csv")
+    assert str(error.value).isprintable()
+
+
 def test_a_cut_netcdf_file_is_refused(built, tmp_path):
     path = built.measurements().save(tmp_path / "log.nc")
     content = path.read_bytes()
@@ -184,7 +196,6 @@ def test_a_cut_netcdf_file_is_refused(built, tmp_path):
         ({"lengths": [[1, np.nan]]}, "lengths must be finite numbers up to 1e.09, got nan at sample 0, column 1"),
         ({"lengths": [[1, -2e9]]}, "lengths must be finite numbers up to 1e.09, got -2e.09 at sample 0, column 1"),
         ({"poses": np.zeros((2, 5))}, r"poses must have the shape \(1, 6\), or \(1, 3\) of positions, got \(2, 5\)"),
-        ({"orientations": np.zeros((1, 3))}, "orientations must be None without poses"),
         ({"poses": np.zeros((1, 3)), "orientations": [[0, 0, 0, 2]]}, "orientations must be quaternions of length 1"),
         ({"times": [0, 1]}, r"times must have the shape \(1,\), got \(2,\)"),
         ({"tensions": [[1]]}, r"tensions must have the shape \(1, 2\), got \(1, 1\)"),

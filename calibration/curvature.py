@@ -1,0 +1,35 @@
+"""`curvature`: second derivatives of the lengths by the poses, of which the usual normal equations know nothing.
+
+Where two poses with the same lengths are about to merge, first derivatives say little about how far to go, and one such
+sample would make all steps of a fit short. With u the unit vector along a cable of length L and a the arm R b of its
+attachment, a shift d and a turn w change the length, beside the first derivative, by half of
+
+    v' (I - u u') v / L + (u . w) (a . w) - (u . a) w'w        v = d + w x a
+
+as of a cable between points; that of a pulley hardly differs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .model import Derivatives, Residuals
+
+__all__ = ["curvature"]
+
+
+def curvature(residuals: Residuals, derivatives: Derivatives) -> np.ndarray:
+    """Return the sum over the cables of residuals times their second derivatives by the pose, (N, 6, 6)."""
+    arms, along = derivatives.arms, derivatives.poses[..., :3]
+    M = np.zeros((*arms.shape, 6))  # v = M (d, w), (m, N, 3, 6)
+    M[..., :3] = np.eye(3)
+    M[..., 3:] = -np.cross(np.eye(3), arms[..., None, :], axisc=-1)
+    gain = np.linalg.norm(along, axis=2)  # of residuals by lengths [1/m], 0 of readings left out
+    unit = np.divide(along, gain[..., None], out=np.zeros_like(along), where=gain[..., None] > 0)
+    across = M - unit[..., None] * np.matmul(unit[..., None, :], M)
+    weight = residuals.readings * gain
+    result = np.einsum("mn,mnai,mnaj->nij", weight / derivatives.lengths, M, across)
+    both = np.einsum("mn,mni,mnj->nij", weight / 2, unit, arms)
+    both -= np.eye(3) * np.einsum("nii->n", both)[:, None, None]
+    result[:, 3:, 3:] += both + np.swapaxes(both, 1, 2)
+    return result

@@ -1,0 +1,126 @@
+"""Calibration without poses: which valley the fit ends in."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from towline import load
+from towline.calibration import Measurements, calibrate, read_measurements
+from towline.models import Dynamics
+
+from .robots_as_built import NOISE, moved_anchors
+
+PRIOR = {"anchors": 0.01, "offsets": 0.05}
+
+
+def shrunk(name, size):
+    """A library robot with a platform of another size [m]."""
+    robot = load(name)
+    factor = size / np.ptp(robot.attachments, axis=0).max()
+    cables = [
+        cable.model_copy(update={"attachment": tuple((factor * np.array(cable.attachment)).tolist())})
+        for cable in robot.cables
+    ]
+    return robot.model_copy(update={"cables": tuple(cables)})
+
+
+def a_log(robot, seed, turn, offsets=PRIOR["offsets"]):
+    """Return the robot as built, its offsets, poses and readings."""
+    draw = np.random.default_rng(seed)
+    built = moved_anchors(robot, draw, PRIOR["anchors"])
+    room = 0.25 * np.ptp(robot.home_anchors, axis=0)
+    poses = robot.home + draw.uniform(-1, 1, (120, 6)) * [*room, turn, turn, turn] * robot.dof_mask
+    own = draw.normal(0, offsets, robot.m)
+    readings = Dynamics(built).cable_lengths(poses) - own
+    return built, own, poses, readings + draw.normal(0, NOISE, readings.shape)
+
+
+def distance(result, built, offsets):
+    """Return the squared distance from the truth, over what 99.9 % of true results have."""
+    error = np.array([one.value for one in result.parameters]) - np.hstack([built.anchors, offsets[:, None]]).ravel()
+    return error @ np.linalg.solve(result.covariance, error) / chi2.ppf(0.999, len(error))
+
+
+def turned(found, poses):
+    """Return the median angle [deg] between found and true orientations, after one turn of all."""
+    apart = Rotation.from_euler("xyz", found[:, 3:]) * Rotation.from_euler("xyz", poses[:, 3:]).inv()
+    return np.degrees(np.median((apart * apart.mean().inv()).magnitude()))
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "turn"),
+    [
+        ("cogiro", 0.06, 0.4),
+        ("cogiro", 1.0, 1.0),
+        ("ipanema-2", 0.06, 0.4),
+        ("caroca", 0.3, 0.4),
+        ("planar-4", 0.06, 0.4),
+    ],
+)
+def test_the_truth_is_inside_the_ellipsoid(name, size, turn):
+    """A platform of 6 cm whose offsets are 5 cm off seems turned by a right angle at first."""
+    robot = shrunk(name, size)
+    for seed in range(4):
+        built, offsets, poses, readings = a_log(robot, seed, turn)
+        result = calibrate(robot, Measurements(readings), prior=PRIOR, outliers=False)
+        assert result.converged
+        assert distance(result, built, offsets) < 1
+        assert turned(result.poses, poses) < 8
+
+
+def test_readings_that_count_from_home():
+    """Offsets of metres are no errors of the file: they are found without a prior."""
+    robot = load("cogiro")
+    for seed in range(3):
+        built, offsets, poses, readings = a_log(robot, seed, 0.3)
+        poses[0] = robot.home
+        readings[0] = Dynamics(built).cable_lengths(robot.home) - offsets
+        result = calibrate(robot, Measurements(readings - readings[0]), outliers=False)
+        assert result.converged
+        assert result.residual_after < NOISE
+        assert turned(result.poses, poses) < 1
+
+
+def test_orientations_alone_help(tmp_path):
+    """An inertial sensor knows the orientation and no position: what is left open is less than without it."""
+    robot = load("cogiro")
+    _, _, poses, readings = a_log(robot, 0, 0.3)
+    header = [*(f"l{i} [m]" for i in range(8)), "roll [rad]", "pitch [rad]", "yaw [rad]"]
+    np.savetxt(
+        tmp_path / "log.csv", np.hstack([readings, poses[:, 3:]]), delimiter=",", header=",".join(header), comments=""
+    )
+    log = read_measurements(tmp_path / "log.csv", {"lengths": NOISE, "rotation": 1e-3})
+    assert np.isnan(log.poses[:, :3]).all()
+    np.testing.assert_allclose(log.poses[:, 3:], poses[:, 3:], atol=1e-9)
+    found, blind = (calibrate(robot, given, outliers=False) for given in (log, Measurements(readings)))
+    assert found.converged
+    assert len(found.not_identifiable) == 3 < 6 == len(blind.not_identifiable)
+    assert turned(found.poses, poses) < 0.1
+    same = Measurements(readings, orientations=poses[:, 3:], sigma={"lengths": NOISE, "rotation": 1e-3})
+    np.testing.assert_array_equal(same.poses, log.poses)
+
+
+@pytest.mark.parametrize(("name", "size", "seed"), [("cogiro", 1.0, 1), ("cogiro", 0.06, 4), ("caroca", 0.3, 4)])
+def test_no_pose_of_a_platform_that_turns_far_is_left_in_another_valley(name, size, seed):
+    """Attitudes up to 1 rad about each axis: no sample fits worse than noise does once in 100 000 samples."""
+    robot = shrunk(name, size)
+    built, offsets, _, readings = a_log(robot, seed, 1.0)
+    result = calibrate(robot, Measurements(readings), prior=PRIOR, outliers=False)
+    assert result.converged
+    assert distance(result, built, offsets) < 1
+    squares = ((result.residuals / NOISE) ** 2).sum(axis=1)
+    assert squares.max() < chi2.ppf(1 - 1e-5, robot.m)
+
+
+def test_wrong_readings_do_not_hide_in_poses_and_parameters():
+    """Four lengths of three coordinates tell which samples have a wrong reading, not which of the four it is."""
+    seed = 3
+    robot = shrunk("planar-4", 0.06)
+    built, offsets, _, readings = a_log(robot, seed, 0.4)
+    draw = np.random.default_rng(seed)
+    wrong = draw.random(readings.shape) < 0.01
+    readings = readings + wrong * draw.choice([-1, 1], wrong.shape) * draw.uniform(0.05, 0.3, wrong.shape)
+    result = calibrate(robot, Measurements(readings), prior=PRIOR)
+    assert {one.sample for one in result.outliers} == set(np.flatnonzero(wrong.any(axis=1)).tolist())
+    assert distance(result, built, offsets) < 1
