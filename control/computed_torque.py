@@ -18,18 +18,41 @@ from ..models.plant.packing import bodies_of, cables_of, settings_of
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.kernels.codes import OPTIMAL
+from .actuators import actuators
 from .authority import uncontrolled
+from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command
 from .controller import Controller
 from .machine import mechanics, thrusts
-from .mechanics import CARRIERS, DISTURBANCE, GAINS, HEARD, IS_CUT, KD, KI, KP, MEMORY, OBSERVER, SOMETHING
+from .mechanics import (
+    CARRIERS,
+    DISTURBANCE,
+    GAINS,
+    HEARD,
+    IS_CUT,
+    KD,
+    KI,
+    KP,
+    LAST,
+    MEASURED,
+    MEMORY,
+    OBSERVER,
+    PULLS,
+    SOMETHING,
+    WINCHES,
+)
 from .reference import Reference
 from .state import State
+from .tension_loop import TensionLoop
+from .thrusts import OTHER, OTHERS
 
 __all__ = ["ComputedTorque", "positive", "reach_of"]
 
+SLOW = 20.0  # [rad/s], see `mechanics.know`
+SHORTEST_LAG = 0.005  # [s]
 LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
+CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
 
 
 class ComputedTorque(Controller):
@@ -41,9 +64,11 @@ class ComputedTorque(Controller):
     with d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state is answered:
     with these tensions if there are any ("as planned"), else with those whose wrench is nearest ("soft wrench"), and a
     state that is no state (nan from a sensor) with the last command, which goes to the planned tensions as fast as the
-    rate permits ("hold"). Carriers follow the reference, or help the tensions within their `reach`: so the loads of
-    towing robots and of teams of quadrotors, with fewer cables than degrees of freedom, do not swing. Quadrotors have
-    loops of their own for place and attitude (see `thrusts`).
+    rate permits ("hold"). What is missing up to 0.1 % of the robot's weight counts as given; with fewer cables than
+    degrees of freedom, which never give all, up to 0.1 % along each cable and 10 % in all. Carriers follow the
+    reference, or help the tensions within their `reach`: so the loads of towing robots and of teams of quadrotors, with
+    fewer cables than degrees of freedom, do not swing. Quadrotors have loops of their own for place and attitude (see
+    `thrusts`).
 
     Parameters
     ----------
@@ -71,6 +96,13 @@ class ComputedTorque(Controller):
         How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
         others do without it. It is commanded its least tension then, and counts again once it reports some. Cables of a
         fixed length never count as cut.
+    tension_loop
+        Bandwidth of a loop on measured tensions [rad/s], for winches that do not give the tensions that they are sent:
+        the command grows until sensors report what is wanted, inside the limits of tensions and rates. 0: none, where
+        the observer alone makes up for winches; 20 does in a tenth of a second what that does in a third.
+    tension_lag
+        Time constant with which winches follow a command [s], at least 5 ms: the loop compares what is measured with
+        what was wanted then.
 
     Raises
     ------
@@ -94,9 +126,12 @@ class ComputedTorque(Controller):
         place: float = 5.0,
         attitude: float = 40.0,
         patience: float = 0.05,
+        tension_loop: float = 0.0,
+        tension_lag: float = 0.005,
     ):
         self.robot = as_robot(robot)
-        few = self.robot.m < len(self.robot.platform.dof)
+        few = self._few = self.robot.m < len(self.robot.platform.dof)
+        self._scale = self.robot.wrench_scale
         w = positive("bandwidth", (1.5 if few else 10.0) if bandwidth is None else bandwidth, 6)
         z = positive("damping", damping, 6)
         self._gains = np.zeros((GAINS, 6))
@@ -107,21 +142,25 @@ class ComputedTorque(Controller):
             number("carrier_acceleration", carrier_acceleration, 0.0, 1e4),
             float(few),
         )
+        # Cables of a fixed length have no winch that could be off: their tensions are what carriers make of them.
+        self._gains[CARRIERS, WINCHES] = SLOW if self.robot.fixed_lengths is None else 0.0
         patience = number("patience", patience, 1e-6, 1e6)
         self._patience = patience if self.robot.fixed_lengths is None else np.inf
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         self._reach = far if far.any() else np.zeros((0, 6))
         fastest = np.full(self.robot.m, np.inf) if rate is None else positive("rate", rate, self.robot.m)
         self._limits = np.stack([self.robot.t_min, self.robot.t_max, fastest])
+        loop = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1e3)
+        self._loop = TensionLoop(loop[0], max(loop[1], SHORTEST_LAG), *self._limits) if loop[0] else None
         self._little = np.maximum(self.robot.t_min, SOMETHING * self.robot.t_max)
-        self._boxes = _boxes(self.robot) if len(self._reach) else None
+        self._boxes = boxes(self.robot) if len(self._reach) else None
         bodies = bodies_of(self.robot)
         bodies[:, layout.MOTION] = layout.FREE  # where they are is measured, whatever moves them
         none, platform = np.zeros(self.robot.m), self.robot.platform
         settings = np.array([*settings_of(self.robot), *platform.com, platform.mass])
         self._robot = (bodies, cables_of(self.robot, none, none), settings, self.robot.dof_mask.astype(float))
         mechanics()  # loaded now, not in the first step
-        self._inverses, self._actuators, self._forces = _inverses(self.robot)
+        self._inverses, self._actuators, self._forces = actuators(self.robot)
         loops = number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3), self._gains[OBSERVER, 0]
         self._loops = np.array(loops)
         self._flies = bool(self._inverses.any())
@@ -142,7 +181,7 @@ class ComputedTorque(Controller):
     @property
     def disturbance_of_carriers(self) -> np.ndarray:
         """Return the estimated force on each flying carrier beside thrust, cables and weight, (n, c, 3) [N]."""
-        return self._others[:, :, 0].copy()
+        return self._others[:, :, OTHER].copy()
 
     @property
     def uncontrolled(self) -> np.ndarray:
@@ -165,18 +204,20 @@ class ComputedTorque(Controller):
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
-        self._pulls, self._integrates = np.zeros((rows, 2, m)), np.ones(rows, dtype=bool)
+        self._pulls, self._integrates = np.zeros((rows, PULLS, m)), np.ones(rows, dtype=bool)
         self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
         # Carriers have a command of their own where they react or fly.
         self._carriers = np.zeros((rows, count if self._moves_carriers else 0, 3, 6))
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
-        self._others = np.zeros((rows, count, 2, 3))  # forces on carriers that nothing explains
+        self._others = np.zeros((rows, count, OTHERS, 3))
         self._problems = InPlace(rows, 6, m, self.robot.length)
         self._heard = np.zeros((rows, HEARD, m))
         given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._heard)
         results = (self._carriers, self._problems.A, self._problems.w, self._problems.bounds)
         self._arrays = (*given, self._integrates, self._memory, self._reactions, *results)
+        if self._loop is not None:
+            self._loop.reset()
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
@@ -240,7 +281,7 @@ class ComputedTorque(Controller):
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
         if np.count_nonzero(self._heard[:, IS_CUT]):
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
-        rows, self._pulls[:, 1] = len(tensions), tensions
+        rows, self._pulls[:, LAST] = len(tensions), tensions
         if len(self._carriers[0]):
             own = self._carriers.copy()
             if self._boxes is not None:
@@ -254,11 +295,19 @@ class ComputedTorque(Controller):
             # A state that is no state leaves its actuators as they were.
             inside = np.clip(self._actuation, *self._actuators)
             actuation = self._held = np.where(np.isfinite(inside), inside, self._held)
+        tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
             return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)
         pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
+
+    def _sent(self, wanted: np.ndarray) -> np.ndarray:
+        """Return what winches are sent so that tensions are as wanted, (N, m) [N]."""
+        if self._loop is None:
+            return wanted
+        reports = self._pulls[:, MEASURED] if self._senses else None
+        return self._loop.sent(self._elapsed, wanted, reports, self.cut)
 
     def _take(self, state: State, reference: Reference) -> None:
         """Copy a state and a reference to where the kernel reads them."""
@@ -271,7 +320,8 @@ class ComputedTorque(Controller):
                 for order in range(3):
                     self._carriers[:, :, order] = reference[3 + order]
             self._problems.t_ref[:] = 0.0 if reference.tensions is None else reference.tensions
-            pulls[:, 0] = pulls[:, 1] if state.tensions is None else state.tensions
+            self._senses = state.tensions is not None
+            pulls[:, MEASURED] = pulls[:, LAST] if state.tensions is None else state.tensions
         except (ValueError, TypeError):
             raise InputError(self._misfit(state, reference)) from None
 
@@ -288,12 +338,19 @@ class ComputedTorque(Controller):
 
     def _answer_others(self) -> np.ndarray:
         """Give rows without tensions a command, and return how each row was answered."""
-        problems = self._problems
-        nearly = problems.shortfall <= NEGLIGIBLE * self.robot.force_scale  # false for nan
+        problems, force = self._problems, self.robot.force_scale
+        if self._few:
+            # What is missing along a cable, tensions would give if limits let them; the rest is for the carriers.
+            missing = self._scale * (problems.w - (problems.A @ problems.tensions[..., None])[..., 0])
+            along = np.abs((self._scale * missing)[:, None] @ problems.A)[:, 0].max(axis=1)
+            square = np.einsum("ij,ij->i", missing, missing)
+            nearly = (along <= NEGLIGIBLE * force) & (square <= (CARRIED * force) ** 2)
+        else:
+            nearly = problems.shortfall <= NEGLIGIBLE * force  # false for nan
         answered = np.where((problems.code == OPTIMAL) | nearly, PLANNED, SOFT).astype(np.int8)
         for row in np.flatnonzero(~np.isfinite(problems.tensions).all(axis=1)):
             answered[row] = HOLD
-            last, reference = self._pulls[row, 1], problems.t_ref[row]
+            last, reference = self._pulls[row, LAST], problems.t_ref[row]
             target = np.where(np.isfinite(reference), reference, last)
             problems.tensions[row] = np.clip(target, *problems.bounds[:, row])
         return answered
@@ -311,40 +368,6 @@ def reach_of(robot: Robot, reach: Any) -> np.ndarray:
         if carrier.efforts:
             row[3:] = 0.0  # its attitude follows from its thrust
     return result
-
-
-def _boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None if any."""
-    boxes = [carrier.motion_limits.reach for carrier in robot.carriers]
-    if not any(boxes):
-        return None
-    low = np.array([(-np.inf,) * 3 if box is None else box.min for box in boxes])
-    return low, np.array([(np.inf,) * 3 if box is None else box.max for box in boxes])
-
-
-def stay_inside(carriers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Let the carriers' motions, (N, c, 3, 6), end at the sides of their boxes, (c, 3) [m]."""
-    place = carriers[:, :, 0, :3]
-    outside = (place < low) | (place > high)
-    if outside.any():
-        np.clip(place, low, high, out=place)
-        carriers[:, :, 1, :3][outside] = carriers[:, :, 2, :3][outside] = 0.0
-
-
-def _inverses(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what actuators do: commands for units of force and moment on each carrier, (c, a, 6), limits, and forces.
-
-    The limits of commands are (2, c, a), the forces in the carriers' axes for units of commands (c, a, 3).
-    """
-    most = max(len(carrier.actuators) for carrier in robot.carriers)
-    inverses, limits = np.zeros((len(robot.carriers), most, 6)), np.zeros((2, len(robot.carriers), most))
-    forces = np.zeros((len(robot.carriers), most, 3))
-    for index, carrier in enumerate(robot.carriers):
-        if actuators := carrier.actuators:
-            inverses[index, : len(actuators)] = np.linalg.pinv(np.array([each.wrench for each in actuators]).T)
-            limits[:, index, : len(actuators)] = np.array([(each.low, each.high) for each in actuators]).T
-            forces[index, : len(actuators)] = np.array([each.wrench[:3] for each in actuators])
-    return inverses, limits, forces
 
 
 def positive(name: str, value: Any, size: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from ..kernel import Kernel, compile_function
 from ..models.plant import machine
 from ..models.plant.machine import joined
 
-__all__ = ["carriers_of", "directions", "mechanics", "stages", "thrusts"]
+__all__ = ["aim", "carriers_of", "directions", "mechanics", "stages", "thrusts"]
 
 _PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
 _SHARED = tuple(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines"))
@@ -29,6 +29,10 @@ _OF_THRUSTS = (
 _OF_STAGES = (
     f"void({_ROBOT}, int64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, ::1], "
     "float64[:, ::1], float64[:, :, :], float64[:, :, :], float64[:, :])"
+)
+_OF_AIM = (
+    "void(float64[::1], float64, float64[::1], float64[:, :, :], float64[:, :, :], float64[:, :], float64[:, :], "
+    "float64[:, :])"
 )
 _OF_DIRECTIONS = f"void({_ROBOT}, float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 _OF_CARRIERS = f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
@@ -50,6 +54,12 @@ def thrusts() -> Kernel:
 def stages() -> Kernel:
     """Return `prediction.write_stages` as machine code; compiling takes some seconds once on a machine."""
     return _compiled((*_TETHERS, _HERE / "prediction.py"), "write_stages", _OF_STAGES)
+
+
+@cache
+def aim() -> Kernel:
+    """Return `aiming.aim` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled((_PLANT / "layout.py", _HERE / "reaction.py", _HERE / "aiming.py"), "aim", _OF_AIM)
 
 
 @cache

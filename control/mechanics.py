@@ -33,19 +33,24 @@ from ..models.plant.layout import (
 from ..models.plant.lines import run_cables
 from .reaction import CORRECTS, add_offsets, react
 
-# Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has the bandwidth of their
-# reaction and its largest acceleration.
+# Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has what `reaction` reads,
+# and WINCHES, the bandwidth with which tensions are learned that differ from their commands [rad/s].
 KP, KD, KI, OBSERVER, CARRIERS, GAINS = 0, 1, 2, 3, 4, 5
+WINCHES = 3
 COM, TOTAL_MASS = SETTINGS, SETTINGS + 3
 # Rows of `limits`, and the share of its upper limit that a cable must be commanded to count as cut.
 LOWEST, HIGHEST, RATE_MAX = 0, 1, 2
 SOMETHING = 1e-3
 # No sensor reports more [m, rad, m/s, rad/s, N]; beyond, squares would fill the memory with infinities.
 LARGEST = 1e9
-# Rows of `heard`: tension reported and tension commanded, smoothed, and 1 for a cable that counts as cut. It does once
-# it reports less than `LITTLE` of what it is commanded, which takes the patience if it reports nothing. It counts again
-# once it reports `ENOUGH` of the little that it is commanded then.
-REPORTED, COMMANDED, IS_CUT, HEARD = 0, 1, 2, 3
+# Rows of `pulls`: tensions since the last step, by sensors or else as commanded, the last command, and what of the
+# first the observers know.
+MEASURED, LAST, KNOWN, PULLS = 0, 1, 2, 3
+# Rows of `heard`: tension reported and tension commanded, smoothed, 1 for a cable that counts as cut, and by how much
+# the report exceeds the command in the long run. It counts as cut once it reports less than `LITTLE` of what it is
+# commanded, which takes the patience if it reports nothing. It counts again once it reports `ENOUGH` of the little that
+# it is commanded then.
+REPORTED, COMMANDED, IS_CUT, EXCESS, HEARD = 0, 1, 2, 3, 4
 LITTLE, ENOUGH = 0.1, 0.5
 # Rows of `memory`: integral of the error, estimated disturbance, and momentum less what the estimate explains.
 INTEGRAL, DISTURBANCE, EXPLAINED, MEMORY = 0, 1, 2, 3
@@ -98,9 +103,9 @@ def write_rows(
     t_ref
         (N, m), tensions to stay near [N].
     pulls
-        (N, 2, m), tensions since the last step, by sensors or else as commanded, and the last command [N].
+        (N, 3, m), rows MEASURED, LAST and KNOWN [N]; the last of them is written.
     heard
-        (N, 3, m), rows REPORTED and COMMANDED [N], and IS_CUT.
+        (N, 4, m), rows REPORTED and COMMANDED [N], IS_CUT, and EXCESS [N].
     integrates
         (N,), whether the integral goes on.
     memory
@@ -121,7 +126,7 @@ def write_rows(
     spare = np.zeros_like(on_bodies), np.zeros_like(on_cables), np.zeros((6, m)), np.zeros(12), np.zeros(6)
     at_reference = np.zeros_like(state), command, *spare
     for row in range(measured.shape[0]):
-        write_bounds(limits, patience, dt, pulls[row], heard[row], bounds[:, row])
+        write_bounds(limits, gains[CARRIERS, WINCHES], patience, dt, pulls[row], heard[row], bounds[:, row])
         usable = is_usable(measured[row], reference[row], pulls[row], t_ref[row], carriers[row])
         if usable:
             for b in range(count):
@@ -146,7 +151,7 @@ def write_rows(
             wanted[k] = reference[row, 12 + k] + gains[KP, k] * error + gains[KI, k] * memory[row, INTEGRAL, k]
             wanted[k] += gains[KD, k] * (reference[row, 6 + k] - measured[row, 0, 6 + k])
         write_wrench(bodies, settings, state, wanted, measured[row, 0], on_bodies, w[row], momentum)
-        observe(settings, mask, gains, dt, A[row], pulls[row, 0], momentum, memory[row])
+        observe(settings, mask, gains, dt, A[row], pulls[row, KNOWN], momentum, memory[row])
         for k in range(6):
             w[row, k] = mask[k] * (w[row, k] - memory[row, DISTURBANCE, k])
         if reach.shape[0] > 0:
@@ -194,12 +199,14 @@ def planned_disturbance(robot, reference, carriers, t_ref, work, missing):
             missing[k] -= A[k, i] * t_ref[i]
 
 
-def write_bounds(limits, patience, dt, pulls, heard, bounds):
-    """Write the bounds of a row's tensions: limits and rates, and zero for a cable that counts as cut."""
+def write_bounds(limits, slow, patience, dt, pulls, heard, bounds):
+    """Write the bounds of a row's tensions, limits and rates, zero for cables that count as cut; and KNOWN tensions."""
     for i in range(limits.shape[1]):
-        step, last, highest = limits[RATE_MAX, i] * dt, pulls[1, i], limits[HIGHEST, i]
-        if abs(pulls[0, i]) <= LARGEST:
-            hear(dt / patience, pulls[0, i], last, max(limits[LOWEST, i], SOMETHING * highest), highest, heard, i)
+        step, last, highest = limits[RATE_MAX, i] * dt, pulls[LAST, i], limits[HIGHEST, i]
+        if abs(pulls[MEASURED, i]) <= LARGEST:
+            little = max(limits[LOWEST, i], SOMETHING * highest)
+            hear(dt / patience, pulls[MEASURED, i], last, little, highest, heard, i)
+            know(slow * dt, pulls, heard, i)
         if heard[IS_CUT, i] == 1.0:
             bounds[0, i] = bounds[1, i] = 0.0
         elif dt > 0.0:
@@ -224,6 +231,19 @@ def hear(elapsed, reported, commanded, little, highest, heard, i):
             heard[IS_CUT, i], heard[REPORTED, i] = 1.0, 0.0
 
 
+def know(share, pulls, heard, i):
+    """Write what the observers know of the tension of cable `i`: the report without its EXCESS from the command.
+
+    They so follow a winch that is late, and find the force that a winch or a sensor takes away all the time. With the
+    report as it is they would take this force for explained, and nothing would make up for it.
+    """
+    if heard[IS_CUT, i] == 1.0:
+        heard[EXCESS, i] = 0.0
+    else:
+        heard[EXCESS, i] += min(share, 1.0) * (pulls[MEASURED, i] - pulls[LAST, i] - heard[EXCESS, i])
+    pulls[KNOWN, i] = pulls[MEASURED, i] - heard[EXCESS, i]
+
+
 def is_usable(measured, reference, pulls, t_ref, carriers):
     """Return whether all numbers of a row are finite and at most LARGEST."""
     usable = is_measured(measured, pulls)
@@ -245,7 +265,7 @@ def is_measured(measured, pulls):
         for k in range(12):
             usable &= abs(measured[b, k]) <= LARGEST
     for i in range(pulls.shape[1]):
-        usable &= abs(pulls[0, i]) <= LARGEST
+        usable &= abs(pulls[MEASURED, i]) <= LARGEST
     return usable
 
 

@@ -84,6 +84,13 @@ class Moved(Protocol):
         """Write how carriers should move, (c, 3, 6), where there is no solution."""
         ...
 
+    def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
+        """Return how far they are off the reference (c, 3, 6) now, and how fast, as `reaction` has it, (2, c, 6).
+
+        None where each follows commands wherever it is.
+        """
+        ...
+
 
 class Freed:
     """Coordinates of carriers whose place is commanded: a solution starts where the last command left them."""
@@ -140,6 +147,16 @@ class Freed:
         """Write how carriers come to rest, (c, 3, 6)."""
         slower = np.clip(-self._placed[1] / stage, -self._strongest, self._strongest)
         self.order(slower, np.zeros(self.count), np.zeros(6), carriers)
+
+    def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
+        """Return how far they are off the reference (c, 3, 6) now, and how fast, as `reaction` has it, (2, c, 6)."""
+        result, (chosen, coordinate) = np.zeros((2, len(carriers), 6)), self.freed.T
+        for order in range(2):
+            result[order, chosen, coordinate] = self._placed[order] - carriers[chosen, order, coordinate]
+        c, s = np.cos(carriers[:, 0, 5]), np.sin(carriers[:, 0, 5])
+        roll, pitch = result[..., 3].copy(), result[..., 4].copy()
+        result[..., 3], result[..., 4] = c * roll - s * pitch, s * roll + c * pitch
+        return result
 
 
 class Flown(Freed):
@@ -230,6 +247,10 @@ class Tethered:
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Leave carriers to their reference."""
         self._pending.add(np.zeros(self.count))
+
+    def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
+        """Return nothing: carriers follow commands wherever they are."""
+        return None
 
 
 def _tethers(robot: Robot) -> np.ndarray:

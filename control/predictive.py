@@ -6,27 +6,34 @@ import os
 from collections.abc import Sequence
 from math import isfinite
 from typing import Any
+from warnings import warn
 
 import numpy as np
 from typing_extensions import override
 
 from ..distribution import tensions as tensions_at
 from ..errors import InputError
-from ..inputs import number, shown, whole_number
+from ..inputs import number, whole_number
 from ..models.files import as_robot
 from ..models.robot import Robot
 from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
-from .command import SHIFTED, Command
+from ..solvers.in_place import InPlace
+from .command import HOLD, OTHERWISE, SHIFTED, Command
 from .computed_torque import ComputedTorque, positive, reach_of
+from .machine import aim
 from .machine import stages as write_stages
-from .mechanics import DISTURBANCE, HIGHEST, LOWEST, RATE_MAX
+from .mechanics import DISTURBANCE, HIGHEST, KNOWN, LAST, LOWEST, OBSERVER, RATE_MAX, SOMETHING
 from .moved import Flown, Freed, Moved, Tethered
-from .preview import ROUNDING, rows_at
+from .preview import Preview, turns
 from .reference import Reference
+from .stability import grows
 from .state import State
 from .surroundings import Surroundings
-from .weights import CORRECTING, PATIENT, STILL, terminal, weights
+from .thrusts import TURN, TURNS
+from .turning import Turning
+from .watch import LATE, UNSTABLE, HandOver, Watch
+from .weights import CORRECTING, PATIENT, STILL, tensions_of, terminal, weights
 
 __all__ = ["Predictive"]
 
@@ -34,12 +41,10 @@ TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
 NEARLY = 0.1  # residuals of an iterate that the next step goes on from, though it is not used
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
-ALMOST = 1e-4  # of the largest entry of the gram matrix of efforts: wrenches that cost more are not corrected
 USUAL_REACH = 0.06  # of the cables' mean length
 LEAST_REACH = 0.02  # the same for cables of fixed length: with less, errors of the load are not corrected
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
-CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was announced
 
 
 class Predictive(ComputedTorque):
@@ -53,7 +58,13 @@ class Predictive(ComputedTorque):
     `ComputedTorque`, and are predicted to stay.
 
     Each step is answered with the solution ("as planned"), or else with the last one, as long as it lasts ("shifted
-    plan"), or as `ComputedTorque` answers ("soft wrench", "hold").
+    plan"), or as a `ComputedTorque` with its own usual gains answers ("soft wrench", "hold"), which runs beside.
+
+    The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. Where a tenth
+    of the weight is left unexplained, in the mean of some 50 ms, or there is no solution for that long, or noise of the
+    velocity asks for more tension than there is room for, or carriers turn too late (see `Turning`), this
+    `ComputedTorque` controls the robot until `reset` ("not as modelled"). It does from the start, with a warning, where
+    the loop is unstable at home with carriers that turn before they accelerate: with cables that begin below their CoM.
 
     Parameters
     ----------
@@ -75,8 +86,6 @@ class Predictive(ComputedTorque):
     carrier_bandwidth, carrier_acceleration
         With which those return [rad/s], default: 2, but 6 where they correct, and their largest acceleration beside the
         reference's [m/s^2 and rad/s^2].
-    rate
-        Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     tube
         How far the platform should be from its reference at most [m]; default: no limit.
     keep_out
@@ -84,8 +93,13 @@ class Predictive(ComputedTorque):
         bodies are kept wherever tensions can, by exact penalties; the reference may pass through a body.
     observer
         Bandwidth of the estimates of disturbances [rad/s], 0: none; default: 60, but 20 where carriers correct.
-    place, attitude, patience
-        As for `ComputedTorque`.
+    rate, place, attitude, patience, tension_loop, tension_lag
+        See `ComputedTorque`.
+
+    Attributes
+    ----------
+    handed_over
+        When computed torque took over and why, a `HandOver`; default: it did not.
 
     Raises
     ------
@@ -111,10 +125,12 @@ class Predictive(ComputedTorque):
         place: float = 5.0,
         attitude: float = 40.0,
         patience: float = 0.05,
+        tension_loop: float = 0.0,
+        tension_lag: float = 0.005,
     ):
         the_robot = as_robot(robot)
         correct = the_robot.fixed_lengths is not None or the_robot.m < len(the_robot.platform.dof)
-        if reach is None:
+        if (given := reach) is None:
             lengths = np.linalg.norm(the_robot.home_anchors - the_robot.home_attachments, axis=1)
             reach = (USUAL_REACH * float(lengths.mean()) if correct else 0.0, 0.0)
         far = reach_of(the_robot, reach)
@@ -131,9 +147,10 @@ class Predictive(ComputedTorque):
         self._steps = np.full(count, number("stage", usual.stage if stage is None else stage, 1e-4, 10.0))
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
         observer = usual.observer if observer is None else observer
-        super().__init__(
-            the_robot, observer=observer, rate=rate, reach=reach, place=place, attitude=attitude, patience=patience
-        )
+        loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": attitude, "patience": patience}
+        self._beside = ComputedTorque(the_robot, reach=given, **loops)
+        loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
+        super().__init__(the_robot, observer=observer, reach=reach, **loops)
         self._reach = reacts if reacts.any() else np.zeros((0, 6))
         self._followed = flies & ~far.any(axis=1)
         # What is under way for longer than half of the stages would leave nothing to decide.
@@ -149,6 +166,8 @@ class Predictive(ComputedTorque):
         m, f = self.robot.m, self._moved.count
         self._sizes = count, 12 + 2 * f, m + f
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
+        unknown = np.zeros(self.robot.m) if the_robot.fixed_lengths is None else self._statics
+        self._preview = Preview(self._steps, self._moved, unknown)
         A, B = self._at_home()
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
         self._weights = weights(self.robot, self._bandwidth, reaches, returning, self._steps[0], moves)
@@ -160,7 +179,17 @@ class Predictive(ComputedTorque):
         h = self._horizon = Horizon(*self._sizes, self._surroundings.rows)
         h.tolerance, h.iterations_max = TOLERANCE, ITERATIONS
         h.Q[:count], h.Q[count], h.R[:] = np.diag(self._weights.states), self._end, np.diag(self._weights.controls)
+        scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
+        usual = self.robot.force_scale / self.robot.platform.mass
+        self._watch = Watch(scale, usual, None if correct else self._ripple())
+        self._turning = Turning(self._loops[1]) if flies.any() else None
+        # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
+        self._has_winches, self._none = the_robot.fixed_lengths is None, np.zeros(self.robot.m)
+        self._from_the_start: HandOver | None = None
         self.reset()
+        if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
+            self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
+            warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
 
     def _at_home(self) -> tuple[np.ndarray, np.ndarray]:
         """Return A and B of a stage at rest at home, (n, n) and (n, u)."""
@@ -177,15 +206,31 @@ class Predictive(ComputedTorque):
         write_stages()(self._robot, self._moved.freed, self._moved.tethers, *about, A, B, c)
         return A[0], B[0]
 
+    def _ripple(self) -> np.ndarray | None:
+        """Return tensions that unit rates ask for, over the room for tensions at home, (m, 6) [s/m]."""
+        low, high = self._limits[LOWEST], self._limits[HIGHEST]
+        best = tensions_at(self.robot, self.robot.home, method="largest-margin")
+        if best.tensions is None:
+            return None
+        room = np.minimum(best.tensions - low, high - best.tensions)
+        asked = tensions_of(self.robot) * (2 * self._bandwidth + self._gains[OBSERVER])
+        return asked / np.maximum(room, SOMETHING * high)[:, None]
+
     @override
     def reset(self) -> None:
         super().reset()
+        self._beside.reset()
+        self._watch.reset()
+        if self._turning is not None:
+            self._turning.reset()
+            self._ordered = np.zeros((len(self.robot.carriers), 3))
+        self.handed_over = self._from_the_start
         count, n, u = self._sizes
         self._guess = np.zeros((count + 1, n)), np.zeros((count, u))
         self._solved = np.nan  # when it was [s]
         self._is_near = False  # whether the next solution may start from the last
         self._moved.reset()
-        self._announced: tuple[float, float, tuple[np.ndarray, ...]] | None = None
+        self._preview.reset()
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
@@ -204,25 +249,7 @@ class Predictive(ComputedTorque):
         InputError
             If an argument has a wrong type or value.
         """
-        if (
-            not isinstance(references, Sequence)
-            or not references
-            or not all(isinstance(r, Reference) for r in references)
-        ):
-            raise InputError(f"references must be a list of References, got {shown(references)}")
-        period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
-        self._announced = start, period, self._rows(references)
-
-    def _rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, ...]:
-        """Return platforms (K, 3, 6), carriers (K, c, 3, 6), moved coordinates (K, 3, f) and tensions (K, m)."""
-        platform = np.array([reference[:3] for reference in references])
-        carriers = np.stack([np.stack(reference[3:6], axis=1) for reference in references])
-        if len(references) > 1:
-            platform[:, 0, 3:] = np.unwrap(platform[:, 0, 3:], axis=0)
-            carriers[:, :, 0, 3:] = np.unwrap(carriers[:, :, 0, 3:], axis=0)
-        unknown = self._statics if self.robot.fixed_lengths is not None else np.zeros(self.robot.m)
-        tensions = [unknown if each.tensions is None else np.asarray(each.tensions, dtype=float) for each in references]
-        return platform, carriers, self._moved.along(platform, carriers), np.stack(tensions)
+        self._preview.follow(references, period, start)
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
@@ -236,22 +263,66 @@ class Predictive(ComputedTorque):
         dt = self._measure(time, state, reference)
         if len(self._wanted) != 1 or np.ndim(state.pose) != 1:
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
+        if self.handed_over is None:
+            self._compare(time, dt, reference)
+        beside = self._beside.step(time, state, reference)
+        unexplained = np.array(self._watch.unexplained)
+        if self.handed_over is not None:
+            answered = np.array(OTHERWISE if beside.answered != HOLD else HOLD, dtype=np.int8)
+            self._agree(self._beside, self)
+            tensions = self._sent(beside.tensions[None])[0]
+            return beside._replace(tensions=tensions, answered=answered, unexplained=unexplained)
         tensions, proof = self._predict(time, dt, reference), self._nowhere
         if tensions is None:
+            self._watch.interrupt()
             self._moved.rest(self._steps[0], self._carriers[0])
-            tensions, answered, proof = self._distribute()
+            tensions, answered = beside.tensions[None], np.reshape(beside.answered, 1)
+            proof = beside.direction[None], np.reshape(beside.shortfall, 1)
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
-        return self._command(reference, tensions, answered, proof, alone=True)
+        command = self._command(reference, tensions, answered, proof, alone=True)
+        self._agree(self, self._beside)
+        if self._turning is not None and self.handed_over is None:
+            if lag := self._turning.lag(dt, self._ordered, self._others[0, :, TURNS]):
+                self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._loops[1]:.0f}")
+            inside = (self._actuation[0] == self._held[0]).all(axis=1, keepdims=True)
+            self._ordered = np.where(inside, self._others[0, :, TURN], np.nan)
+        return command._replace(unexplained=unexplained)
+
+    def _compare(self, time: float, dt: float, reference: Reference) -> None:
+        """Compare the motion with predictions, and hand over where it is another."""
+        if not np.isfinite(self._problems.w).all():
+            self._watch.interrupt()
+            return
+        otherwise = self._pulls[0, KNOWN] - self._pulls[0, LAST] if self._has_winches else self._none
+        self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
+        if self.handed_over is not None and len(self._beside._reach):
+            carriers = np.stack(reference[3:6], axis=1)
+            self._moved.now(dt, self._measured[0], self._preview.rows([reference])[2][0])
+            offsets = self._moved.offsets(carriers)
+            if offsets is not None:
+                self._beside._reactions[0] = offsets
+                self._beside._reactions[0, 0] -= dt * offsets[1]  # which this step adds
+
+    @staticmethod
+    def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
+        """Let another controller of the same robot know what one has sent as if it were its own."""
+        other._pulls[:, LAST], other._held = sender._pulls[:, LAST], sender._held
+
+    @property
+    @override
+    def problems(self) -> InPlace:
+        """Return the problem of the computed torque beside: wrench matrix, wrench and bounds of the tensions."""
+        return self._beside.problems
 
     def _predict(self, time: float, dt: float, reference: Reference) -> np.ndarray | None:
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
-        bounds, now = self._problems.bounds[:, 0], self._rows([reference])
+        bounds, now = self._problems.bounds[:, 0], self._preview.rows([reference])
         placed = self._moved.now(dt, self._measured[0], now[2][0])
         if not all(np.isfinite(part).all() for part in (self._problems.w, *now)):
             self._solved = np.nan
             return None
-        wanted, carriers, planned, ramps = self._look_ahead(time, now)
+        wanted, carriers, planned, ramps = self._preview.at(time, now, self._measured[0, 0, 3:6])
         start = np.concatenate([self._measured[0, 0], *placed])
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
@@ -261,7 +332,9 @@ class Predictive(ComputedTorque):
         about = self._memory[0, DISTURBANCE], carriers, states, controls
         write_stages()(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
         h.c += ramps
-        self._aim(wanted, planned)
+        # The model knows what the reference does not, the estimated disturbance: a solution would be off by a balance
+        # of errors and tensions for as long as it stays.
+        aim()(self._steps, self.robot.length, self._efforts, h.A, h.B, h.c, wanted, planned)
         under_way = self._moved.under_way()
         for k, more in enumerate(under_way):
             h.c[k] += h.B[k, :, m:] @ (planned[k, m:] + more)
@@ -286,63 +359,16 @@ class Predictive(ComputedTorque):
             self._guess = states, controls
         elif not time - self._solved <= self._times[-1]:
             return None
+        pulls = np.clip(controls[:1, :m], *bounds)
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
+        gained = (wanted[1] - start - ramps[0] + h.c[0])[6:12] + h.A[0, 6:12] @ h.start
+        gained += h.B[0, 6:12, :m] @ (pulls[0] - planned[0, :m])
+        by_tensions = h.B[0, 6:12, :m] / self._steps[0]
+        self._watch.explain(time, gained / self._steps[0], by_tensions, self._solved == time)
         late = len(under_way)
         more = np.clip(controls[late, m:] - planned[late, m:], -self._strongest, self._strongest)
         self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
-        return np.clip(controls[:1, :m], *bounds)
-
-    def _look_ahead(
-        self, time: float, now: tuple[np.ndarray, ...]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
-
-        It is the one that was announced, if that has this reference now. Beyond it accelerations stay. The last result
-        is what the ramps of its accelerations add to states within each stage, (N, n): a control is held for a stage in
-        the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
-        early.
-        """
-        parts = None
-        if self._announced is not None:
-            start, period, rows = self._announced
-            steps = (time + self._times - start) / period
-            before = np.clip(np.floor(steps + ROUNDING), 0, len(rows[0]) - 1).astype(int)
-            announced = rows_at(rows, period * (steps - before), before, period)
-            off = announced[0][0, 0] - now[0][0, 0]
-            off[3:] -= _turns(off[3:])
-            if np.abs(off).max() <= CLOSE:
-                parts = announced
-        if parts is None:
-            parts = rows_at(now, self._times, np.zeros(len(self._times), dtype=int), 1.0)
-        platform, carriers, moved, tensions = parts
-        states = np.concatenate([platform[:, 0], platform[:, 1], moved[:, 0], moved[:, 1]], axis=1)
-        states[:, 3:6] += _turns(self._measured[0, 0, 3:6] - states[0, 3:6])
-        ramp, dt = np.diff(np.concatenate([platform[:, 2], moved[:, 2]], axis=1), axis=0), self._steps[:, None]
-        further, faster = dt * dt / 6 * ramp, dt / 2 * ramp
-        ramps = np.concatenate([further[:, :6], faster[:, :6], further[:, 6:], faster[:, 6:]], axis=1)
-        controls = np.concatenate([tensions, moved[:, 2]], axis=1)
-        still = np.ascontiguousarray(carriers[:, :, :2]).reshape(len(states), -1, 12)  # poses and velocities
-        return states, still, controls, ramps
-
-    def _aim(self, wanted: np.ndarray, planned: np.ndarray) -> None:
-        """Change tensions and moved places of the reference, the least, so that its motion obeys the model.
-
-        The model knows what the reference does not: the estimated disturbance. A solution would be off by a balance of
-        errors and tensions, for as long as the disturbance stays.
-        """
-        h, m, f, dt = self._horizon, self.robot.m, self._moved.count, self._steps
-        missed = wanted[1:] - np.einsum("kij,kj->ki", h.A, wanted[:-1]) - np.einsum("kij,kj->ki", h.B, planned[:-1])
-        by = np.repeat([1.0, self.robot.length], 3) / dt[:, None]  # accelerations, all of them in m/s^2
-        missing = by * (missed - h.c)[:, 6:12]
-        gains = by[:, :, None] * np.concatenate([h.B[:, 6:12, :m], h.A[:, 6:12, 12 : 12 + f]], axis=2)
-        weighted = gains / self._efforts
-        gram = np.einsum("kij,klj->kil", weighted, gains)  # of what may be no numbers, far off
-        size = np.einsum("kii->ki", gram)
-        gram[:, range(6), range(6)] += np.maximum(ALMOST * size.max(axis=1, keepdims=True), 1e-200)
-        change = np.einsum("kij,ki->kj", weighted, np.linalg.solve(gram, missing[..., None])[..., 0])
-        planned[:-1, :m] += change[:, :m]
-        wanted[:-1, 12 : 12 + f] += change[:, m:]
-        wanted[-1, 12 : 12 + f] += change[-1, m:]
+        return pulls
 
     def _shifted(
         self, time: float, start: np.ndarray, wanted: np.ndarray, planned: np.ndarray
@@ -356,7 +382,7 @@ class Predictive(ComputedTorque):
             states = (1 - share) * self._guess[0][first] + share * self._guess[0][second]
             first, second = np.minimum(first[:-1], count - 1), np.minimum(second[:-1], count - 1)
             controls = (1 - share) * self._guess[1][first] + share * self._guess[1][second]
-            states[:, 3:6] += _turns(start[3:6] - states[0, 3:6])
+            states[:, 3:6] += turns(start[3:6] - states[0, 3:6])
         else:
             states, controls = wanted.copy(), np.zeros(self._guess[1].shape)
             states[:, :12] += np.exp(-self._bandwidth.min() * self._times)[:, None] * (start - wanted[0])[:12]
@@ -369,7 +395,7 @@ class Predictive(ComputedTorque):
         h, m = self._horizon, self.robot.m
         low, high, rate = self._limits[LOWEST], self._limits[HIGHEST], self._limits[RATE_MAX]
         cut = self.cut[0]
-        last, room = self._pulls[0, 1], rate * self._times[1:, None]
+        last, room = self._pulls[0, LAST], rate * self._times[1:, None]
         if isfinite(self._solved):
             h.u_min[:, :m] = np.minimum(np.maximum(low, last - room), high)
             h.u_max[:, :m] = np.maximum(np.minimum(high, last + room), low)
@@ -380,8 +406,3 @@ class Predictive(ComputedTorque):
         most = np.where(np.abs(controls[:, m:] - usual) > NEAR * self._strongest, self._strongest, np.inf)
         h.u_min[:, m:], h.u_max[:, m:] = usual - most, usual + most
         h.u_min[:, :m][:, cut] = h.u_max[:, :m][:, cut] = 0.0
-
-
-def _turns(off: np.ndarray) -> np.ndarray:
-    """Return the whole turns that are nearest to differences of angles [rad]."""
-    return 2 * np.pi * np.rint(off / (2 * np.pi))

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..display import record
+
 __all__ = ["Reference"]
 
 
@@ -29,3 +31,5 @@ class Reference(NamedTuple):
     carrier_velocity: np.ndarray
     carrier_acceleration: np.ndarray
     tensions: np.ndarray | None = None
+
+    __repr__ = record

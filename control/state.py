@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..display import record
+
 __all__ = ["State"]
 
 
@@ -27,3 +29,5 @@ class State(NamedTuple):
     carrier_pose: np.ndarray
     carrier_velocity: np.ndarray
     tensions: np.ndarray | None = None
+
+    __repr__ = record

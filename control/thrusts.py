@@ -33,10 +33,11 @@ from ..models.plant.layout import (
     U,
 )
 from ..models.plant.lines import run_cables
-from .mechanics import is_measured, move_to_com, put_body
+from .mechanics import KNOWN, is_measured, move_to_com, put_body
 
-# Rows of `memory`: the estimated force, and momentum less what the estimate explains.
-OTHER, ACCOUNTED = 0, 1
+# Rows of `memory`: the estimated force, momentum less what the estimate explains, and, in the carrier's axes, the
+# angular acceleration that is ordered and the rate that is measured.
+OTHER, ACCOUNTED, TURN, TURNS, OTHERS = 0, 1, 2, 3, 4
 
 
 def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensions, pulls, given, memory, actuation):
@@ -61,11 +62,11 @@ def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensio
     tensions
         (N, m) [N], as commanded.
     pulls
-        (N, 2, m), in its first row the tensions since the last step [N].
+        (N, 3, m), whose row KNOWN has the tensions since the last step [N].
     given
         (N, c, a), the actuators' commands since then.
     memory
-        (N, c, 2, 3), the estimate and what it explains.
+        (N, c, 4, 3), rows OTHER, ACCOUNTED, TURN and TURNS.
     actuation
         Result, (N, c, a).
     """
@@ -86,11 +87,11 @@ def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensio
                 if is_measured(measured[row], pulls[row]):
                     observe_carrier(
                         bodies[1 + c, MASS], settings, gains[2], dt, on_bodies[1 + c], on_cables, cables, c,
-                        measured[row, 1 + c], pulls[row, 0], forces[c], given[row, c], memory[row, c],
+                        measured[row, 1 + c], pulls[row, KNOWN], forces[c], given[row, c], memory[row, c],
                     )  # fmt: skip
                 wrench_of_carrier(
                     bodies[1 + c], settings, gains, state, BODY * (1 + c), on_bodies[1 + c], cables, on_cables, c,
-                    measured[row, 1 + c], carriers[row, c], tensions[row], memory[row, c, OTHER], wrench,
+                    measured[row, 1 + c], carriers[row, c], tensions[row], memory[row, c], wrench,
                 )  # fmt: skip
                 for a in range(inverses.shape[1]):
                     actuation[row, c, a] = 0.0
@@ -117,16 +118,16 @@ def observe_carrier(mass, settings, gain, dt, R, on_cables, cables, carrier, mot
 
 
 def wrench_of_carrier(
-    body, settings, gains, state, at, R, cables, on_cables, carrier, motion, wanted, tensions, other, wrench
+    body, settings, gains, state, at, R, cables, on_cables, carrier, motion, wanted, tensions, memory, wrench
 ):
     """Write the force and the moment that a carrier needs of its actuators, in its own axes."""
     place, turn, mass = gains[0], gains[1], body[MASS]
     fx = mass * (wanted[2, 0] + place * (2.0 * (wanted[1, 0] - motion[6]) + place * (wanted[0, 0] - motion[0])))
     fy = mass * (wanted[2, 1] + place * (2.0 * (wanted[1, 1] - motion[7]) + place * (wanted[0, 1] - motion[1])))
     fz = mass * (wanted[2, 2] + place * (2.0 * (wanted[1, 2] - motion[8]) + place * (wanted[0, 2] - motion[2])))
-    fx -= mass * settings[GRAVITY] + other[0]
-    fy -= mass * settings[GRAVITY + 1] + other[1]
-    fz -= mass * settings[GRAVITY + 2] + other[2]
+    fx -= mass * settings[GRAVITY] + memory[OTHER, 0]
+    fy -= mass * settings[GRAVITY + 1] + memory[OTHER, 1]
+    fz -= mass * settings[GRAVITY + 2] + memory[OTHER, 2]
     mx = my = mz = 0.0
     for i in range(cables.shape[0]):
         if int(cables[i, OWNER]) == carrier + 1:
@@ -164,6 +165,8 @@ def wrench_of_carrier(
     ap = turn * (turn * gap[0] + 2.0 * (d_roll - sp * d_yaw - p)) + dd_roll - sp * dd_yaw
     aq = turn * (turn * gap[1] + 2.0 * (cr * d_pitch + sr * cp * d_yaw - q)) + cr * dd_pitch + sr * cp * dd_yaw
     ar = turn * (turn * gap[2] + 2.0 * (cr * cp * d_yaw - sr * d_pitch - r)) + cr * cp * dd_yaw - sr * dd_pitch
+    memory[TURN, 0], memory[TURN, 1], memory[TURN, 2] = ap, aq, ar
+    memory[TURNS, 0], memory[TURNS, 1], memory[TURNS, 2] = p, q, r
     J = body[INERTIA : INERTIA + 9]
     hx, hy, hz = J[0] * p + J[1] * q + J[2] * r, J[3] * p + J[4] * q + J[5] * r, J[6] * p + J[7] * q + J[8] * r
     wrench[0] = wrench[1] = 0.0

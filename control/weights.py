@@ -9,7 +9,7 @@ import numpy as np
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 
-__all__ = ["CORRECTING", "PATIENT", "STILL", "Usual", "Weights", "terminal", "weights"]
+__all__ = ["CORRECTING", "PATIENT", "STILL", "Usual", "Weights", "tensions_of", "terminal", "weights"]
 
 
 class Usual(NamedTuple):
@@ -92,6 +92,16 @@ def weights(
     pose, rate = bandwidth**4 * of_acceleration, 2 * bandwidth**2 * of_acceleration
     states = np.concatenate([pose, rate, far, 2 * far / carrier_bandwidth**2])
     return Weights(duration * states, duration * np.concatenate([np.ones(robot.m), far / carrier_bandwidth**4]))
+
+
+def tensions_of(robot: Robot) -> np.ndarray:
+    """Return the least tensions for unit accelerations of the pose at rest at home, (m, 6) [N]."""
+    dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
+    still = dynamics.required_wrench(robot.home, rest, rest)
+    M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
+    scale = np.repeat([1.0, 1 / robot.length], 3) * mask
+    A = scale[:, None] * dynamics.wrench_matrix(robot.home, robot.carrier_home)
+    return np.linalg.pinv(A, SINGULAR) @ (scale[:, None] * M * mask)
 
 
 def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:

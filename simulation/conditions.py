@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..control import Reference
+from ..display import record
 from .faults import Fault
 from .noise import Noise
 
@@ -52,15 +53,21 @@ class Conditions(NamedTuple):
     noise: Noise
     faults: tuple[Fault, ...]
 
+    __repr__ = record
+
     def should_pull(self, t_min: np.ndarray, periods: np.ndarray) -> np.ndarray:
         """Return where a slack cable is a failure, (n, m): one with a lowest tension (m,) [N] that no fault has cut.
 
         `periods`, (n,), are their numbers.
         """
-        result = np.tile(t_min > 0, (len(periods), 1))
+        return (t_min > 0) & ~self.cut(len(t_min), periods)
+
+    def cut(self, cables: int, periods: np.ndarray) -> np.ndarray:
+        """Return which cables are cut when periods begin, (n, cables); `periods`, (n,), are their numbers."""
+        result = np.zeros((len(periods), cables), dtype=bool)
         for fault in self.faults:
             if fault.kind == "cut":
-                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.part] = False
+                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.part] = True
         return result
 
     def to_dict(self) -> dict[str, Any]:

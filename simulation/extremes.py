@@ -29,7 +29,9 @@ class Extremes:
 
     def __init__(self, conditions: Conditions, t_min: np.ndarray, t_max: np.ndarray, flights: int):
         self._references, self._t_max, self._range = conditions.references, t_max, t_max - t_min
-        self._taut = conditions.should_pull(t_min, np.arange(len(conditions.references)))
+        periods = np.arange(len(conditions.references))
+        self._taut = conditions.should_pull(t_min, periods)
+        self._cut = conditions.cut(len(t_min), periods + 1)  # also inside the period
         self._rows = np.arange(flights)
         self.squares, self.slack = np.zeros(flights), np.zeros(flights, dtype=int)
         self.answers = np.zeros((flights, len(ANSWERS)), dtype=int)
@@ -46,8 +48,9 @@ class Extremes:
         square = off[:, 0] + off[:, 1] + off[:, 2]
         self.squares[rows] += square
         self._largest[rows] = np.maximum(self._largest[rows], square)
-        self._least[rows] = np.minimum(self._least[rows], tensions)
-        self._most[rows] = np.maximum(self._most[rows], tensions)
+        whole = ~self._cut[period.number]
+        self._least[rows] = np.minimum(self._least[rows], tensions, where=whole, out=self._least[rows])
+        self._most[rows] = np.maximum(self._most[rows], tensions, where=whole, out=self._most[rows])
         if not tensions.min() > 0:
             self.slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
         answered = np.broadcast_to(command.answered, len(self._rows))[rows]
@@ -63,13 +66,15 @@ class Extremes:
 
     @property
     def tension_min(self) -> np.ndarray:
-        """Return the smallest tension [N], (N,)."""
-        return self._least.min(axis=1)
+        """Return the smallest tension of cables that are not cut [N], (N,); 0 if all are."""
+        least = self._least.min(axis=1)
+        return np.where(np.isinf(least), 0.0, least)
 
     @property
     def tension_max(self) -> np.ndarray:
-        """Return the largest tension [N], (N,)."""
-        return self._most.max(axis=1)
+        """Return the largest tension of cables that are not cut [N], (N,); 0 if all are."""
+        most = self._most.max(axis=1)
+        return np.where(np.isinf(most), 0.0, most)
 
     @property
     def exceeded(self) -> np.ndarray:

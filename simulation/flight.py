@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control import ANSWERS, Reference
+from ..control.command import OTHERWISE
+from ..display import Displayed, Fact, tensions_over_time
 from ..inputs import check_ending, file_path
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
@@ -20,6 +22,7 @@ from ..models.robot import Robot
 from ..netcdf import Contents, Variable, save_netcdf
 from ..text import quantity
 from .conditions import Conditions
+from .events import events, sentence
 from .record import Record
 
 if TYPE_CHECKING:
@@ -32,7 +35,7 @@ TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
+class Flight(Displayed):
     """A flown motion.
 
     Attributes
@@ -99,6 +102,12 @@ class Flight:
         pulls = self.conditions.should_pull(self.robot.t_min, np.arange(self._recorded))
         return (self.record.tensions[: self._recorded] <= 0) & pulls
 
+    @cached_property
+    def above(self) -> np.ndarray:
+        """Return by how much tensions exceed t_max with its tolerance [N], (n, m); below zero where they do not."""
+        robot = self.robot
+        return self.record.tensions[: self._recorded] - robot.t_max - TENSION_TOLERANCE * (robot.t_max - robot.t_min)
+
     @property
     def passed(self) -> bool:
         """Return whether the flight lasted, near its reference, with tensions inside their limits and cables taut."""
@@ -119,9 +128,8 @@ class Flight:
                 f"(tolerance {quantity(1e3 * self.tolerance, 'mm')})"
             )
         tensions = self.record.tensions[: self._recorded]
-        above = tensions - self.robot.t_max - TENSION_TOLERANCE * (self.robot.t_max - self.robot.t_min)
-        row, cable = np.unravel_index(np.nanargmax(above), above.shape)
-        if above[row, cable] > 0:
+        row, cable = np.unravel_index(np.nanargmax(self.above), self.above.shape)
+        if self.above[row, cable] > 0:
             lines.append(
                 f"{quantity(tensions[row, cable], 'N')} in cable {cable + 1} at t = {self.times[row]:.3f} s "
                 f"(t_max {quantity(self.robot.t_max[cable], 'N')})"
@@ -144,19 +152,29 @@ class Flight:
         counts = np.bincount(self.record.answered[: self._recorded], minlength=len(ANSWERS))
         return dict(zip(ANSWERS, counts.tolist(), strict=True))
 
+    @property
+    def handed_over(self) -> float | None:
+        """Return when computed torque took over [s], as the robot does not move as its controller predicts, or None."""
+        steps = np.flatnonzero(self.record.answered[: self._recorded] == OTHERWISE)
+        return float(self.times[steps[0]]) if steps.size else None
+
     def figures_of_merit(self) -> dict[str, Any]:
         """Return what the flight is judged by, without times of the machine: the same for the same seed."""
+        periods = np.arange(self._recorded)
         tensions = self.record.tensions[: self._recorded]
+        pulling = tensions[~self.conditions.cut(self.robot.m, periods + 1)]  # where no cut falls inside the period
         shortfall = self.record.shortfall[: self._recorded]
         return {
             "passed": self.passed,
             "failures": list(self.failures),
+            "events": [event.to_dict() for event in events(self)],
             "error_rms": float(np.sqrt(np.mean(self.error**2))),
             "error_max": float(self.error.max()),
-            "tension_min": float(tensions.min()),
-            "tension_max": float(tensions.max()),
+            "tension_min": float(pulling.min()) if pulling.size else 0.0,
+            "tension_max": float(pulling.max()) if pulling.size else 0.0,
             "slack_s": self.slack_s,
             "answered": self.answered,
+            "handed_over": self.handed_over,
             "shortfall_max": None if np.isnan(shortfall).all() else float(np.nanmax(shortfall)),
             "duration": self.lasted * self.period,
         }
@@ -215,6 +233,9 @@ class Flight:
         missing = np.nan_to_num(record.shortfall[rows])
         variables["violation"] = over(("time",), missing, "N", "shortfall of the wrench, moments over length")
         variables["tracking_error"] = over(("time",), self.error, "m", "distance from the reference")
+        if np.isfinite(record.unexplained[rows]).any():
+            about = "mean acceleration of the platform that was not predicted, angles times the robot's length"
+            variables["unexplained"] = over(("time",), record.unexplained[rows], "m/s^2", about)
         words = {"flag_values": np.arange(len(ANSWERS), dtype=np.int8), "flag_meanings": " ".join(_flags())}
         about = {"long_name": "how the step was answered", **words}
         variables["answered"] = Variable(("time",), record.answered[rows], about)
@@ -222,6 +243,8 @@ class Flight:
         if actuators:
             about = "what the actuators of each carrier are commanded"
             variables["actuation"] = over(("time", "carrier", "actuator"), record.actuation[rows], "N, N m", about)
+        if (gone := self.conditions.cut(self.robot.m, np.arange(self._recorded))).any():
+            variables["cut"] = Variable(cable, gone.astype(np.int8), {"long_name": "1 from when a cable is cut"})
         if self.wind is not None:
             variables["wind"] = over(("time", "axis"), self.wind[rows], "m/s", "velocity of the air in G")
         variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
@@ -301,10 +324,18 @@ class Flight:
 
     def report(self) -> str:
         """Return the report as text: the result in the first line, then the facts behind it."""
-        merit = self.figures_of_merit()
+        return "\n".join([self._headline(), *(f"    {name:<24}{text}" for name, text in self._facts())])
+
+    def _headline(self) -> str:
+        largest = f"error of at most {quantity(1e3 * self.error.max(), 'mm')}"
+        lasted = quantity(self.lasted * self.period, "s")
         word = "PASSED" if self.passed else "FAILED"
-        title = f"{self.robot.name}, flight of {quantity(merit['duration'], 's')}: {word}"
-        rows = {
+        return f"{self.robot.name}, flight of {lasted}: {word}, {'; '.join(self.failures) or largest}"
+
+    def _facts(self) -> list[Fact]:
+        merit, happened = self.figures_of_merit(), events(self)
+        rows = {"in this order": sentence(happened)} if happened else {}
+        rows |= {
             "error of the position": f"{quantity(1e3 * merit['error_rms'], 'mm')} rms, "
             f"{quantity(1e3 * merit['error_max'], 'mm')} at most",
             "tensions": f"{quantity(merit['tension_min'], 'N')} to {quantity(merit['tension_max'], 'N')}",
@@ -314,12 +345,27 @@ class Flight:
             ),
             "controller": f"{np.median(1e6 * self.seconds):.0f} us a step, one every {quantity(self.period, 's')}",
         }
+        if merit["handed_over"] is not None:
+            rows["not as modelled"] = self._why()
         if merit["shortfall_max"] is not None:
             rows["shortfall of the wrench"] = f"up to {quantity(merit['shortfall_max'], 'N')}"
-        largest = f"error of at most {quantity(1e3 * merit['error_max'], 'mm')}"
-        lines = [f"{title}, {'; '.join(self.failures) or largest}"]
-        lines += [f"    {name:<24}{text}" for name, text in rows.items()]
-        return "\n".join(lines)
+        return list(rows.items())
+
+    def _picture(self) -> str:
+        tensions = self.record.tensions[: self._recorded]
+        return tensions_over_time(self.times, tensions, self.robot.t_min, self.robot.t_max)
+
+    def _why(self) -> str:
+        """Return since when computed torque controls the robot instead of predictions, and why."""
+        at = self.handed_over
+        assert at is not None
+        if at == 0:
+            return "computed torque from the start: predictions are unstable at home"
+        missed = self.record.unexplained[round(at / self.period)]
+        return (
+            f"computed torque from t = {at:.3f} s on: {quantity(missed, 'm/s^2')} of the platform's acceleration "
+            "was not predicted"
+        )
 
 
 def _flags() -> list[str]:

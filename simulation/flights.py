@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control import ANSWERS, Controller
+from ..errors import InputError
 from ..inputs import check_ending, file_path
 from ..models.parsing import parse_yaml, to_yaml
 from ..models.plant import Plant
@@ -24,7 +26,7 @@ from .flying import fly
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIGURES", "flights", "fly_block", "passed", "report", "save", "summary"]
+__all__ = ["FIGURES", "copies", "flights", "fly_block", "passed", "report", "save", "summary"]
 
 
 # What is kept of a flight: the periods that it lasted, errors [m], tensions [N], by how much they exceed t_max in
@@ -39,11 +41,31 @@ FIGURES = np.dtype(
 )
 
 
+def copies(controller: Controller, count: int) -> list[Controller]:
+    """Return a controller for each of so many flights, or the one that accepts batches.
+
+    Raises
+    ------
+    InputError
+        If it cannot be copied.
+    """
+    if controller.batches:
+        return [controller]
+    try:
+        return [copy.deepcopy(controller) for _ in range(count)]
+    except Exception as error:  # a user's object, and whatever it raises
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(
+            f"controller must be one that can be copied for each of many runs, got {type(controller).__name__} "
+            f"({reason}): fly one run at a time, open such handles in reset, or give it __deepcopy__"
+        ) from None
+
+
 def fly_block(plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int]) -> np.ndarray:
     """Fly a block of flights side by side, and return the figures of each, (N,) of `FIGURES`."""
     robot = plant.robot
     kept = Extremes(conditions, robot.t_min, robot.t_max, len(seeds))
-    lasted, _ = fly(plant, controller, conditions, seeds, kept)
+    lasted, _ = fly(plant, copies(controller, len(seeds)), conditions, seeds, kept)
     figures = np.zeros(len(seeds), dtype=FIGURES)
     figures["lasted"], figures["error_rms"] = lasted, np.sqrt(kept.squares / np.maximum(lasted, 1))
     figures["answered"] = kept.answers

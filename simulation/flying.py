@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from math import isfinite
 from time import perf_counter
@@ -59,11 +58,11 @@ class Sensors:
 
 
 class Pilot:
-    """A controller for all flights, or a copy for each if it does not accept batches."""
+    """The controllers of all flights: one that accepts batches, or one for each."""
 
-    def __init__(self, controller: Controller, flights: int, conditions: Conditions):
-        self._controllers = [controller] if controller.batches else [copy.deepcopy(controller) for _ in range(flights)]
-        self._alone, self._together = flights == 1, controller.batches
+    def __init__(self, controllers: Sequence[Controller], flights: int, conditions: Conditions):
+        self._controllers, self._alone = controllers, flights == 1
+        self._together = controllers[0].batches
         for each in self._controllers:
             each.reset()
             each.follow(conditions.references, conditions.period)
@@ -99,9 +98,13 @@ def _stacked(commands: list[Command]) -> Command:
 
 
 def fly(
-    plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int], recorder: Recorder
+    plant: Plant,
+    controllers: Sequence[Controller],
+    conditions: Conditions,
+    seeds: Sequence[int],
+    recorder: Recorder,
 ) -> tuple[np.ndarray, list[float]]:
-    """Fly one flight for each seed, from the reference's beginning on.
+    """Fly one flight for each seed, from the reference's beginning on, with a controller each or one for all.
 
     Returns
     -------
@@ -122,7 +125,7 @@ def fly(
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
     history, tensions = np.zeros((flights, 2, states.shape[1])), np.zeros((flights, 2, m))
     pulls = np.tile(start, (flights, 1))  # means of the last period
-    sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controller, flights, conditions)
+    sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
     sense, periods = sense_rows(), Periods(plant, period, conditions.substeps)
@@ -143,7 +146,7 @@ def fly(
         if command is None or time >= silent_until:
             command = pilot.step(time, *reported, reference)
         else:
-            command = command._replace(answered=np.full(np.shape(command.answered), HOLD, dtype=np.int8))
+            command = _held(command, period)
         # Only shapes are compared in each period, since all checks take longer than a step: NumPy broadcasts silently.
         shapes = [np.shape(part) for part in command if part is not None] if isinstance(command, Command) else None
         if shapes is None or shapes != expected:
@@ -173,6 +176,20 @@ def fly(
         lasted += alive
         states = history[:, 1].copy()
     return np.maximum(lasted, 1), pilot.seconds
+
+
+def _held(command: Command, period: float) -> Command:
+    """Return what goes on a period after a command without another: tensions, and the velocities of carriers.
+
+    A drive that hears nothing has no reason to return to the last pose, as the reference would if it were repeated.
+    """
+    pose, velocity, acceleration = (np.asarray(part, dtype=float) for part in command[1:4])
+    return command._replace(
+        carrier_pose=pose + period * (velocity + 0.5 * period * acceleration),
+        carrier_velocity=velocity + period * acceleration,
+        carrier_acceleration=np.zeros_like(acceleration),
+        answered=np.full(np.shape(command.answered), HOLD, dtype=np.int8),
+    )
 
 
 def _square(values: np.ndarray) -> float:

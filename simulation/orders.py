@@ -22,7 +22,7 @@ class Orders:
 
     Tensions are commanded as they are if the plant's drive has them, or winches that pull with a force. Elastic cables
     without winches in their file are assumed to have some that measure their tension and reach it within the period,
-    see `winding`.
+    see `winding`. Carriers are commanded for one instant; until the next they move as the reference does.
 
     Parameters
     ----------
@@ -44,22 +44,35 @@ class Orders:
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
-        self._rows = np.tile(plant.command(np.ones(robot.m), wind=calm, wrench=conditions.disturbance), (len(seeds), 1))
+        row = plant.command(np.ones(robot.m), wind=calm, wrench=conditions.disturbance)
+        self._moves, count = any(carrier.moves for carrier in robot.carriers), len(robot.carriers)
+        self._rows = np.tile(row, (len(seeds), 1 + self._moves, 1))  # a second, of the next period, has only carriers
         m, first = robot.m, layout.REFERENCE_POSE
-        carriers = self._rows[:, layout.COMMANDS + m :].reshape(len(seeds), len(robot.carriers), layout.CARRIER)
+        blocks = self._rows[:, :, layout.COMMANDS + m :].reshape(len(seeds), -1, count, layout.CARRIER)
+        rows, carriers = self._rows[:, 0], blocks[:, 0]
         # Views of the parts of all rows.
-        self._cables = self._rows[:, layout.COMMANDS : layout.COMMANDS + m]
+        self._cables = rows[:, layout.COMMANDS : layout.COMMANDS + m]
         self._poses, self._velocities = carriers[..., first : first + 6], carriers[..., first + 6 : first + 12]
         self._accelerations = carriers[..., first + 12 : first + 18]
         self._actuation = carriers[..., : max(len(carrier.actuators) for carrier in robot.carriers)]
-        self._moves = any(carrier.moves for carrier in robot.carriers)
+        if self._moves:
+            self._ends = blocks[:, 1, :, first:].reshape(len(seeds), count, 3, 6)
+            # What a constant acceleration misses of the next reference: pose, velocity and acceleration, (K, 3, c, 6).
+            motion = np.array([reference[3:6] for reference in conditions.references])
+            self._missed = np.zeros_like(motion)
+            self._missed[:-1] = motion[1:] - np.stack(self._steadily(*np.moveaxis(motion[:-1], 1, 0)), axis=1)
+
+    def _steadily(self, pose: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return pose, velocity and acceleration at the end of a period in which the acceleration is constant."""
+        h = self._period
+        return pose + h * (velocity + 0.5 * h * acceleration), velocity + h * acceleration, acceleration
 
     def rows(self, k: int, command: Command, lengths: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Return the rows of period `k`, (N, k), from lengths and rates (N, 2, m) and states (N, n) at its beginning.
+        """Return the rows of period `k`, (N, 1 or 2, k); lengths and rates are (N, 2, m), states (N, n), as it begins.
 
-        Each call overwrites the rows of the last.
+        Where carriers move, the second has their references at the end. Each call overwrites the rows of the last.
         """
-        rows = self._rows
+        rows = self._rows[:, 0]
         if self.wind is not None:
             rows[:, layout.WIND : layout.WRENCH] = self.wind[k]
         if self._drive != "lengths":
@@ -68,14 +81,16 @@ class Orders:
             self._cables[:] = self._fixed
         else:
             tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._last_rates.shape)
-            at = self._period, layout.SHORTEST, rows, layout.COMMANDS
+            at = self._period, layout.SHORTEST, self._rows.reshape(len(rows), -1), layout.COMMANDS
             self._write(states, self._first, lengths, self._last_rates, tensions, *self._elastic, *at)
         if self._moves:
             self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
             self._accelerations[:] = command.carrier_acceleration
+            for order, end in enumerate(self._steadily(self._poses, self._velocities, self._accelerations)):
+                np.add(end, self._missed[k, order], out=self._ends[:, :, order])
         if command.actuation is not None:
             self._actuation[:] = command.actuation
-        return rows
+        return self._rows
 
 
 def _air(wind: Wind, times: np.ndarray, seed: int) -> np.ndarray:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..control import ANSWERS
+from ..display import Displayed
 from ..models.robot import Robot
 from .recorder import Period
 
 __all__ = ["Record"]
 
 
-class Record:
+class Record(Displayed):
     """Keep motions, lengths, tensions and commands of one flight, a row for each period."""
 
     def __init__(self, robot: Robot, periods: int):
@@ -21,6 +22,7 @@ class Record:
         self.lengths, self.tensions, self.commanded = (np.full((periods, m), np.nan) for _ in range(3))
         self.answered = np.zeros(periods, dtype=np.int8)
         self.direction, self.shortfall = np.full((periods, 6), np.nan), np.full(periods, np.nan)
+        self.unexplained = np.full(periods, np.nan)
         self.orders = np.full((periods, carriers, 6), np.nan)
 
     def take(self, period: Period) -> None:
@@ -32,5 +34,6 @@ class Record:
             if not 0 < command.answered < len(ANSWERS):
                 raise IndexError(command.answered)
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
+        self.unexplained[k] = command.unexplained
         if command.actuation is not None:
             self.actuation[k] = command.actuation

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext, suppress
 from pathlib import Path
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,19 +20,23 @@ from ..errors import InputError
 from ..execution import start_workers
 from ..models.plant import Plant
 from .conditions import Conditions, Wind
-from .flights import FIGURES, fly_block, passed
+from .flights import FIGURES, copies, fly_block, passed
 from .identity import identity
 from .winds import ConstantWind
 
 __all__ = ["Execution", "fly_many"]
 
-SIDE_BY_SIDE = 250  # flights in one block
+SIDE_BY_SIDE = 250  # flights in one block, at most
+BLOCK_TIME = 3.0  # [s] that a block should take: what is computed is stored so often, and lost if the process ends
+TRIED = 10  # periods of one flight, which tell how large the first block may be
+FASTER = 8  # times as many flights in a block as in the longest that has been measured, at most
 PARTS = 4  # blocks for each worker, as far as there are flights, so that none waits long for the last
-FEWEST = 25  # flights in a block; with fewer side by side each takes longer
+FEWEST = 25  # flights in a block, unless they take long; with fewer side by side each takes longer
 
 _HEAD = struct.Struct("<QI")  # number of the first flight, flights
 KIND = Kind(b"towline flights checkpoint 1\n", "block", _HEAD.size + SIDE_BY_SIDE * FIGURES.itemsize)
 Progress = Callable[[int, int, int], None]
+Part = tuple[int, np.ndarray, float]  # of all flights: the first, figures, and the time that they took [s]
 
 
 class Execution(NamedTuple):
@@ -57,11 +62,12 @@ def fly_many(
     Raises
     ------
     InputError
-        If the controller or the wind cannot be sent to a process or stored, the checkpoint cannot be used, or there is
-        no such scheduler.
+        If the controller cannot be copied, it or the wind cannot be sent to a process or stored, the checkpoint cannot
+        be used, or there is no such scheduler.
     SolverError
         If workers end before their work is done.
     """
+    copies(controller, 1)  # before anything else that needs one: this is the message that names what to do
     everything = plant, controller, conditions
     figures, done = np.zeros(len(seeds), dtype=FIGURES), np.zeros(len(seeds), dtype=bool)
     workers, scheduler, checkpoint, resume, progress = execution
@@ -72,25 +78,60 @@ def fly_many(
     with start_workers(workers, scheduler) as started, opened as stored:
         if stored is not None:
             _restore(stored, figures, done)
-        blocks = list(_blocks(done, 1 if packed is None else workers if scheduler is None else started.limit()))
-        fly = (lambda some: fly_block(*everything, some)) if packed is None else fly_packed
-        jobs = [(seeds[some.start : some.stop],) for some in blocks]
-        results = started.map(fly, jobs if packed is None else [(packed, *job) for job in jobs])
-        for some, result in zip(blocks, results, strict=True):
+        shares = None if packed is None else started.limit if scheduler is not None else lambda: workers
+        sizes = _Sizes(_estimated(everything, seeds), shares)
+        fly = (lambda *job: fly_part(everything, *job)) if packed is None else fly_packed
+        jobs = ((some.start, seeds[some.start : some.stop]) for some in _blocks(done, sizes))
+        jobs = jobs if packed is None else ((packed, *job) for job in jobs)
+        for first, result, seconds in started.as_completed(fly, jobs):
+            sizes.learn(len(result), seconds)
             if stored is not None:
-                stored.append(_HEAD.pack(some.start, len(some)) + result.tobytes())
-            figures[some.start : some.stop] = result
-            done[some.start : some.stop] = True
+                stored.append(_HEAD.pack(first, len(result)) + result.tobytes())
+            figures[first : first + len(result)] = result
+            done[first : first + len(result)] = True
             if progress is not None:
                 good = passed(figures[done], len(conditions.references), tolerance)
                 progress(int(done.sum()), len(seeds), int(good.sum()))
     return figures
 
 
-def fly_packed(packed: bytes, seeds: range) -> np.ndarray:
+class _Sizes:
+    """Choose how many flights the next block has, by the time that flights have taken."""
+
+    def __init__(self, each: float, workers: Callable[[], int] | None):
+        self._each, self._longest, self._workers = each, SIDE_BY_SIDE, workers
+
+    def learn(self, count: int, seconds: float) -> None:
+        """Use that a block of `count` flights took `seconds`."""
+        self._each, self._longest = seconds / count, FASTER * count
+
+    def choose(self, left: int) -> int:
+        """Return the number for the next block if `left` flights have not been given away yet."""
+        if self._workers is not None:
+            left = max(FEWEST, -(-left // (self._workers() * PARTS)))
+        return max(1, min(SIDE_BY_SIDE, left, self._longest, int(BLOCK_TIME / max(self._each, 1e-9))))
+
+
+def _estimated(everything: tuple[Plant, Controller, Conditions], seeds: range) -> float:
+    """Return how long a flight takes by itself [s], from the first periods of one."""
+    plant, controller, conditions = everything
+
+    def lasts(periods: int) -> float:  # the first of two loads what flights need
+        short = plant, controller, conditions._replace(references=conditions.references[:periods])
+        return min(fly_part(short, 0, seeds[:1])[2] for _ in range(2))
+
+    return max(lasts(1 + TRIED) - lasts(1), 0.0) / TRIED * len(conditions.references)
+
+
+def fly_part(everything: tuple[Plant, Controller, Conditions], first: int, seeds: range) -> Part:
+    """Fly a block; return the number of its first flight, its figures and how long it took [s]."""
+    start = perf_counter()
+    return first, fly_block(*everything, seeds), perf_counter() - start
+
+
+def fly_packed(packed: bytes, first: int, seeds: range) -> Part:
     """Fly a block in another process or thread, with a controller of its own."""
-    plant, controller, conditions = pickle.loads(packed)
-    return fly_block(plant, controller, conditions, seeds)
+    return fly_part(pickle.loads(packed), first, seeds)
 
 
 def _packed(everything: tuple[Plant, Controller, Conditions], scheduler: str | None) -> bytes:
@@ -107,14 +148,15 @@ def _packed(everything: tuple[Plant, Controller, Conditions], scheduler: str | N
         ) from None
 
 
-def _blocks(done: np.ndarray, workers: int) -> Iterator[range]:
+def _blocks(done: np.ndarray, sizes: _Sizes) -> Iterator[range]:
     """Yield the flights still to be flown, block after block."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], done, [True]]).astype(int))).reshape(-1, 2)
     left = int((~done).sum())
-    together = min(SIDE_BY_SIDE, max(FEWEST, -(-left // (workers * PARTS)))) if workers > 1 else SIDE_BY_SIDE
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], done, [True]]).astype(int)))
-    for first, end in edges.reshape(-1, 2).tolist():
-        for start in range(first, end, together):
-            yield range(start, min(start + together, end))
+    for start, end in edges.tolist():
+        while start < end:
+            stop = min(start + sizes.choose(left), end)
+            yield range(start, stop)
+            left, start = left - (stop - start), stop
 
 
 def _restore(stored: Checkpoint, figures: np.ndarray, done: np.ndarray) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..figures.animation import Scene
 from ..models import Dynamics
+from ..models.rotor_discs import rotor_discs
 from .flight import Flight
 
 __all__ = ["scene"]
@@ -33,6 +34,8 @@ def scene(flight: Flight, times: np.ndarray) -> Scene:
         boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
         obstacles=[],
         tensions=record.tensions[rows],
+        cut=flight.conditions.cut(robot.m, rows),
         t_min=robot.t_min,
         t_max=robot.t_max,
+        rotors=rotor_discs(robot, carriers),
     )

@@ -66,8 +66,10 @@ def write_motion(R, state, at, motion):
     for k in range(3):
         motion[k], motion[6 + k] = state[at + k], state[at + VELOCITY + k]
     cp = math.sqrt(R[7] * R[7] + R[8] * R[8])
-    motion[3], motion[4], motion[5] = math.atan2(R[7], R[8]), math.atan2(-R[6], cp), math.atan2(R[3], R[0])
+    motion[3], motion[4] = math.atan2(R[7], R[8]), math.atan2(-R[6], cp)
     p, q, r = state[at + RATE], state[at + RATE + 1], state[at + RATE + 2]
     sr, cr = math.sin(motion[3]), math.cos(motion[3])
+    # The yaw that belongs to this roll: at a pitch of 90 degrees both are rounding, and only together an attitude.
+    motion[5] = math.atan2(sr * R[2] - cr * R[1], cr * R[4] - sr * R[5])
     across = (sr * q + cr * r) / cp if cp > 0.0 else math.nan
     motion[9], motion[10], motion[11] = p - R[6] * across, cr * q - sr * r, across

@@ -72,7 +72,8 @@ def simulate(
     reference
         A plan, the NetCDF file of one, a timing, a path (also as a mapping, as in a task), or a pose (6,) to stay at.
     controller
-        Default: `ComputedTorque(robot)`.
+        Default: `ComputedTorque(robot)`. One run calls its `reset` and uses it as it is; many use copies, unless it
+        accepts batches.
     wind
         Velocity of the air in {G} [m/s], (3,), or a function of times (K,) [s] and a seed that returns (K, 3); default:
         no air, and so no drag.
@@ -106,7 +107,7 @@ def simulate(
     scheduler
         Address of a Dask scheduler whose workers are used instead (extra `cluster`).
     checkpoint
-        File to which the figures of many flights are appended as they come.
+        File to which the figures of many flights are appended every few seconds.
     resume
         Whether to continue the checkpoint if the file exists. It must be of the same flights.
     progress
@@ -202,7 +203,7 @@ def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int
     robot, periods = plant.robot, len(conditions.references)
     record = Record(robot, periods)
     start = perf_counter()
-    lasted, seconds = fly(plant, controller, conditions, [seed], record)
+    lasted, seconds = fly(plant, [controller], conditions, [seed], record)
     wall = perf_counter() - start
     wind = Orders(plant, conditions, [seed]).wind
     return Flight(

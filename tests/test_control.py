@@ -8,10 +8,11 @@ from towline.benchmarks.control_steps import random_steps
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State, mechanics
 from towline.control.computed_torque import reach_of
 from towline.control.reaction import write_columns
+from towline.control.tension_loop import TensionLoop
 from towline.distribution import tensions as distribute
 from towline.errors import InputError
 from towline.models import Dynamics, load
-from towline.models.plant import layout
+from towline.models.plant import Plant, layout
 from towline.models.plant.bodies import place_bodies
 from towline.models.plant.lines import run_cables
 from towline.simulation import simulate
@@ -160,6 +161,52 @@ def test_a_cable_that_was_slack_for_long_counts_again_once_it_pulls():
     assert not cut[:140, 0].any()
     assert cut[160:300, 0].all()
     assert not cut[350:, 0].any()
+
+
+@pytest.mark.parametrize(("options", "largest"), [({}, 5e-3), ({"tension_loop": 20.0}, 3e-3)])
+def test_winches_that_give_nine_tenths_leave_no_offset(options, largest):
+    """Their sensors report it. An observer that takes reports as they are leaves 0.1 g / w^2: 10 mm for ever."""
+    robot = load("cogiro")
+    plant, controller = Plant(robot, drive="tensions"), ComputedTorque(robot, **options)
+    (_, reference), pulls = at_home(robot), distribute(robot, robot.home).tensions
+    state, off = plant.start(tensions=pulls), np.zeros(1500)
+    for k in range(len(off)):
+        now = plant.read(state)
+        off[k] = np.linalg.norm(now.pose[:3] - robot.home[:3])
+        measured = State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls)
+        command = controller.step(1e-3 * k, measured, reference)
+        assert ((command.tensions >= robot.t_min) & (command.tensions <= robot.t_max)).all()
+        pulls = 0.9 * command.tensions
+        state = plant.step(state, plant.command(pulls), 1e-3)
+    assert off[-1] < 1e-4
+    assert off.max() < largest
+
+
+def test_the_tension_loop_stands_still_at_limits_and_for_cables_that_are_cut():
+    low, high, none = np.array([1.0, 1.0]), np.array([20.0, 10.5]), np.array([[False, False]])
+    loop = TensionLoop(20.0, 0.005, low, high, np.full(2, np.inf))
+    wanted, pulls = np.array([[10.0, 10.0]]), np.array([[10.0, 10.0]])
+    for _ in range(1000):
+        pulls = 0.9 * loop.sent(1e-3, wanted, pulls, none)
+    np.testing.assert_allclose(pulls, [[10.0, 0.9 * 10.5]], rtol=1e-6)
+    lower = loop.sent(1e-3, wanted - 5.0, pulls, none)  # nothing has wound up beyond the limit
+    assert lower[0, 1] == pytest.approx(5.5, abs=0.02)  # one step on
+    np.testing.assert_array_equal(loop.sent(1e-3, wanted, pulls, np.array([[True, False]]))[0, 0], 10.0)
+    np.testing.assert_array_equal(loop.sent(1e-3, wanted, np.full((1, 2), np.nan), none)[0, 0], 10.0)
+
+
+@pytest.mark.parametrize("name", ["multi-quadrotor-3", "multi-quadrotor-4", "wang-ctmrts"])
+def test_fewer_cables_than_coordinates_give_what_they_can(name):
+    """A calm motion is as planned in all steps; a push of half the weight takes more than carriers can bring."""
+    robot = load(name)
+    end = (robot.home[:3] + np.array([0.2, 0.1, 0.1])).tolist()
+    line = {"kind": "line", "start": robot.home[:3].tolist(), "end": end}
+    calm = simulate(robot, line, ComputedTorque(robot), duration=2.0)
+    assert calm.answered["as planned"] == 2000
+    push = 0.5 * robot.weight * np.array([1, 0.4, 0, 0, 0, 0])
+    pushed = simulate(robot, robot.home, ComputedTorque(robot), duration=1.5, disturbance=push)
+    assert pushed.error.max() > 0.2
+    assert pushed.answered["soft wrench"] > 500
 
 
 def test_carriers_react_to_what_the_plan_does_not_know_alone():

@@ -352,7 +352,7 @@ class Wrong(Controller):
         (tuple, "must return a Command"),
         ({"tensions": np.zeros(3)}, "tensions of shape"),
         ({"tensions": np.full(8, np.nan)}, "finite tensions"),
-        ({"answered": 4}, "answered from 0 to 3, got 4"),
+        ({"answered": 5}, "answered from 0 to 4, got 5"),
         ({"carrier_pose": np.zeros(6)}, "carrier_pose of shape"),
     ],
 )

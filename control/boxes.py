@@ -1,0 +1,27 @@
+"""`boxes`: where carriers may be commanded to be, and `stay_inside` of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..models.robot import Robot
+
+__all__ = ["boxes", "stay_inside"]
+
+
+def boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None if any."""
+    each = [carrier.motion_limits.reach for carrier in robot.carriers]
+    if not any(each):
+        return None
+    low = np.array([(-np.inf,) * 3 if box is None else box.min for box in each])
+    return low, np.array([(np.inf,) * 3 if box is None else box.max for box in each])
+
+
+def stay_inside(carriers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Let the carriers' motions, (N, c, 3, 6), end at the sides of their boxes, (c, 3) [m]."""
+    place = carriers[:, :, 0, :3]
+    outside = (place < low) | (place > high)
+    if outside.any():
+        np.clip(place, low, high, out=place)
+        carriers[:, :, 1, :3][outside] = carriers[:, :, 2, :3][outside] = 0.0

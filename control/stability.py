@@ -1,0 +1,64 @@
+"""`grows`: whether small errors at home grow in the whole closed loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..models.plant import Plant
+from ..models.robot import Robot
+from .command import OTHERWISE
+from .controller import Controller
+from .reference import Reference
+from .state import State
+
+__all__ = ["grows"]
+
+PERIOD = 2e-3  # [s] between steps
+LEAST, SLOW, MOST = 400, 4.0, 1500  # steps, time constants of the errors, and steps again
+FAR = 0.3  # of the robot's length: errors that have grown
+MORE = 1.2  # of the velocities in the second third of the steps are in the last: a motion nobody damps has as many
+PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is that of first order
+
+
+def grows(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
+    """Return whether an error at rest at home grows, with flying carriers that turn as they do and their own loops.
+
+    The loop is closed around `Plant` after a small push in all coordinates, which the unstable motions of first order
+    soon dominate. So every state takes part: the attitudes of carriers, commands that are under way, observers.
+
+    Parameters
+    ----------
+    controller
+        It is reset before and afterwards.
+    robot
+        Its robot.
+    tensions
+        At rest at home, (m,) [N].
+    bandwidth
+        With which errors of the pose decay [rad/s].
+    """
+    plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
+    still = np.zeros_like(robot.carrier_home)
+    reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)
+    scale = np.repeat([1.0, robot.length], 3) * robot.dof_mask
+    push = PUSH * robot.force_scale * scale * np.random.default_rng(0).normal(size=6)
+    state = plant.start(tensions=tensions)
+    steps = int(np.clip(SLOW / bandwidth / PERIOD, LEAST, MOST))
+    sizes, pulls = np.zeros(steps), tensions
+    controller.reset()
+    for k in range(steps):
+        now = plant.read(state)
+        measured = State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls)
+        off, sizes[k] = np.linalg.norm(scale * (now.pose - robot.home)), np.linalg.norm(scale * now.velocity)
+        command = controller.step(PERIOD * k, measured, reference)
+        cables = command.tensions if robot.fixed_lengths is None else robot.fixed_lengths
+        wrench = push if PERIOD * k < PUSHED else None
+        row = plant.command(cables, command.actuation, *command[1:4], wrench=wrench)
+        run = plant.run(state, row[None], PERIOD)
+        state, pulls = run.states[-1], run.tensions.mean(axis=0)
+        if not off < FAR * robot.length or command.answered == OTHERWISE:
+            controller.reset()
+            return True
+    controller.reset()
+    third = steps // 3
+    return bool(np.linalg.norm(sizes[-third:]) > MORE * np.linalg.norm(sizes[third : 2 * third]))

@@ -1,0 +1,59 @@
+"""`TensionLoop`: tensions that are sent to winches so that sensors report those that are wanted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["TensionLoop"]
+
+
+class TensionLoop:
+    """Add the integral of wanted less measured tensions to wanted ones, for winches that give others.
+
+        u = t + i,   di/dt = k (late t - t_measured)
+
+    with t late by as much as winches are. A command stays inside limits and rates, where the integral stands still.
+
+    Parameters
+    ----------
+    bandwidth
+        k [rad/s].
+    lag
+        Time constant with which winches follow their commands [s].
+    lowest, highest, fastest
+        Limits of commands, (m,) [N], and of their rates [N/s].
+    """
+
+    def __init__(self, bandwidth: float, lag: float, lowest: np.ndarray, highest: np.ndarray, fastest: np.ndarray):
+        self._bandwidth, self._lag, self._fastest = bandwidth, lag, fastest
+        self._lowest, self._highest = lowest, highest
+        self._wanted: np.ndarray | None = None
+
+    def reset(self) -> None:
+        """Forget all earlier steps."""
+        self._wanted = None
+
+    def sent(self, dt: float, wanted: np.ndarray, measured: np.ndarray | None, cut: np.ndarray) -> np.ndarray:
+        """Return the tensions to send, (N, m) [N].
+
+        Parameters
+        ----------
+        dt
+            Time since the last step [s].
+        wanted, measured
+            Tensions, (N, m) [N]; those that are no numbers, and None, change nothing.
+        cut
+            Where cables count as cut, (N, m): these are sent what is wanted.
+        """
+        if self._wanted is None:
+            self._wanted = self._late = self._sent = wanted.copy()
+            self._more = np.zeros_like(wanted)
+        self._late = self._late + (1.0 - np.exp(-dt / self._lag)) * (self._wanted - self._late)
+        if measured is not None:
+            lacking = np.where(np.isfinite(measured), self._late - measured, 0.0)
+            self._more = self._more + min(self._bandwidth * dt, 1.0) * lacking
+        room = self._fastest * dt if dt > 0 else np.inf
+        sent = np.clip(wanted + self._more, self._sent - room, self._sent + room)
+        sent = np.where(cut, wanted, np.clip(sent, self._lowest, self._highest))
+        self._more, self._wanted, self._sent = sent - wanted, wanted.copy(), sent
+        return sent.copy()

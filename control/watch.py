@@ -1,0 +1,131 @@
+"""`Watch`: whether a robot moves as its model predicts; `HandOver`, when and why another controller took over."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = ["LATE", "UNSTABLE", "HandOver", "Watch"]
+
+BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and permitted
+UNSTABLE = "small errors at home grow with predictions, whose model has no carriers that turn before they accelerate"
+LATE = "carriers turn nearly as late after their orders as makes their attitude loop unstable"
+LOUD = "noise of its measured rates asks for more than tensions have room for: lower bandwidth and observer"
+WINDOW = 0.05  # [s], in which a motion is compared
+QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
+OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off
+SMOOTH, MEAN = 0.005, 0.04  # [s], of the difference, against noise, and of the mean of its size
+EARLY = 1e-6  # of the window
+KNOWN = 0.5  # of an acceleration that sensors find missing in the tensions: observers follow it, predictions do not
+
+
+class HandOver(NamedTuple):
+    """A hand-over to computed torque.
+
+    Attributes
+    ----------
+    time
+        Since when [s]; minus infinity: from the start.
+    reason
+        Why.
+    """
+
+    time: float
+    reason: str
+
+
+class Watch:
+    """Compare measured velocities with those that a model gives for the commands that were sent.
+
+    Over the last `WINDOW` the velocity should change by the integral of the accelerations that the model had for each
+    step, from its measured state and estimated disturbance and with its command. The mean of what is left, over the
+    window, is the acceleration that is unexplained. Neither a new plan nor a jump of the reference counts: both change
+    commands. Steps that are further apart than the window are not compared.
+
+    Parameters
+    ----------
+    scale
+        Factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for those
+        that the platform does not have.
+    usual
+        Acceleration that the robot's scale of forces gives its platform [m/s^2]: `BOUND` times it is permitted, and a
+        step without any solution counts as it.
+    ripple
+        Tensions that are commanded for unit rates of the pose, over the room that tensions have inside their limits,
+        (m, 6) [s/m, s/rad]. Noise of the rates makes commands that limits cut off, on one side more than on the other,
+        and `OFTEN` standard deviations that have no room are a reason to hand over. None: whatever the noise.
+    """
+
+    def __init__(self, scale: np.ndarray, usual: float, ripple: np.ndarray | None = None):
+        self._scale, self._usual = scale, usual
+        self._ripple = None if ripple is None else (OFTEN * ripple) ** 2
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all earlier steps."""
+        self.unexplained = 0.0  # mean acceleration [m/s^2]
+        self._noise = np.zeros(6)  # variance of the rates
+        self._solved = np.inf  # time of the last solution [s]
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Forget all steps but how long there was no solution: the robot was not controlled, or not measured."""
+        self._left: deque[tuple[float, np.ndarray]] = deque()  # times, and velocities less what explains them
+        self._explained, self._off = np.zeros(6), np.zeros(6)
+        self._acceleration: np.ndarray | None = None
+        self._trend: np.ndarray | None = None
+
+    def explain(self, time: float, acceleration: np.ndarray, by_tensions: np.ndarray, solved: bool) -> None:
+        """Receive the acceleration of the pose, (6,), that the model gives for the command of now.
+
+        Another one of its tensions changes it by `by_tensions`, (6, m).
+        """
+        self._acceleration, self._by_tensions = acceleration, by_tensions
+        if solved:
+            self._solved = time
+
+    def compare(self, time: float, dt: float, rate: np.ndarray, otherwise: np.ndarray) -> HandOver | None:
+        """Compare the rate of the pose now, (6,), and return why predictions are not to be used, or None.
+
+        Since the last step tensions were `otherwise` than commanded, (m,) [N], as far as sensors know.
+        """
+        if dt > WINDOW:
+            self._solved = max(self._solved, time)
+        if self._acceleration is None or dt > WINDOW:
+            self.interrupt()
+        else:
+            self._explained += dt * (self._acceleration + KNOWN * (self._by_tensions @ otherwise))
+        left, steps = rate - self._explained, self._left
+        if self._ripple is not None and self._is_loud(dt, left):
+            return HandOver(time, LOUD)
+        left = self._scale * left
+        steps.append((time, left))
+        while time - steps[0][0] >= WINDOW * (1 - EARLY) and time - steps[1][0] >= WINDOW * (1 - EARLY):
+            steps.popleft()
+        since = time - steps[0][0]
+        if time - self._solved > WINDOW:
+            self._add(dt, self._usual)
+        elif since >= WINDOW * (1 - EARLY):
+            self._off += min(dt / SMOOTH, 1.0) * (left - steps[0][1] - self._off)
+            self._add(dt, sqrt(self._off @ self._off) / since)
+        if self.unexplained <= BOUND * self._usual:
+            return None
+        return HandOver(time, f"{self.unexplained:.2g} m/s^2 of its acceleration are not as predicted")
+
+    def _is_loud(self, dt: float, left: np.ndarray) -> bool:
+        """Update the noise, what is left beside a line, and return whether it is too much."""
+        if self._trend is None or dt > QUICK:
+            self._trend, self._slope = left.copy(), np.zeros(6)
+        share = min(dt / QUICK, 0.5)
+        self._trend += dt * self._slope
+        off = left - self._trend
+        self._trend += 2 * share * off
+        self._slope += share / QUICK * off
+        self._noise += min(dt / LONG, 1.0) * (off * off - self._noise)
+        return bool((self._ripple @ self._noise).max() > 1.0)
+
+    def _add(self, dt: float, acceleration: float) -> None:
+        self.unexplained += min(dt / MEAN, 1.0) * (acceleration - self.unexplained)

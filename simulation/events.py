@@ -1,0 +1,62 @@
+"""Events of a flight in the order of their times: faults, and where its limits were first exceeded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..text import quantity
+
+if TYPE_CHECKING:
+    from .flight import Flight
+
+__all__ = ["Event", "events", "sentence"]
+
+
+class Event(NamedTuple):
+    """Something that happened at a time [s].
+
+    Its kind is "fault", "slack", "tension", "error" or "end".
+    """
+
+    at: float
+    kind: str
+    what: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it ready for JSON."""
+        return {"at_s": self.at, "kind": self.kind, "what": self.what}
+
+
+def events(flight: Flight) -> list[Event]:
+    """Return the faults of a flight and the first instants at which a limit was exceeded, the earliest first."""
+    found = [Event(fault.at, "fault", _words(fault, flight)) for fault in flight.conditions.faults]
+    if flight.slack.any():
+        row, cable = np.argwhere(flight.slack)[0]
+        found.append(Event(float(flight.times[row]), "slack", f"the first cable to slacken was {cable + 1}"))
+    if (above := flight.above > 0).any():
+        row, cable = np.argwhere(above)[0]
+        found.append(Event(float(flight.times[row]), "tension", f"cable {cable + 1} was the first above its t_max"))
+    if (beyond := ~(flight.error <= flight.tolerance)).any():
+        within = quantity(1e3 * flight.tolerance, "mm")
+        found.append(Event(float(flight.times[np.argmax(beyond)]), "error", f"the error left {within}"))
+    if flight.lasted < len(flight.references):
+        found.append(Event(flight.lasted * flight.period, "end", "the motion grew beyond all numbers"))
+    shown = [event for event in found if event.at <= max(flight.lasted, 1) * flight.period]
+    return sorted(shown, key=lambda event: event.at)
+
+
+def sentence(of: list[Event]) -> str:
+    """Return events in one sentence."""
+    return "; ".join(f"{event.what} at {event.at:.4g} s" for event in of)
+
+
+def _words(fault: Any, flight: Flight) -> str:
+    if fault.kind == "cut":
+        return f"cable {fault.part + 1} was cut"
+    if fault.kind == "stick":
+        return f"the winch of cable {fault.part + 1} stuck"
+    if fault.kind == "lose":
+        return f"the actuators of {flight.robot.carriers[fault.part].name} were lost"
+    return f"the controller missed {quantity(fault.lasting, 's')}"
