@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from functools import lru_cache, reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from ..errors import InputError
+from .carrier_answers import Actuator, Drawing, Effort, MotionLimits, RigidBody
 from .part import (
     AT_ORIGIN,
     BodyInertia,
     Box,
     Finite,
-    Inertia,
     Name,
     NonNegative,
     Part,
@@ -53,53 +53,8 @@ __all__ = [
 ]
 
 Drive = Literal["both", "fixed-length", "variable-length"]
+USUAL_RADIUS = 0.3  # [m] of a quadrotor of 1 kg
 POSITION, TILT, YAW = (0, 1, 2), (3, 4), (5,)
-
-
-class MotionLimits(NamedTuple):
-    """The limits of a carrier's own motion; default: no limit."""
-
-    speed: float | None = None  # [m/s]
-    acceleration: float | None = None  # [m/s^2]
-    tilt: float | None = None  # of its z axis to the vertical [rad]
-    reach: Box | None = None  # where its origin may be, in {G} [m]
-
-
-class RigidBody(NamedTuple):
-    """The mass of a body [kg], and its inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]."""
-
-    mass: float
-    inertia: Inertia
-
-
-class Actuator(NamedTuple):
-    """An actuator of a carrier: force [N] and moment [N m] for each unit of its command, in the carrier's axes."""
-
-    name: str
-    wrench: tuple[float, ...]  # (6,)
-    low: float  # of the command
-    high: float
-
-
-class Effort(NamedTuple):
-    """An effort that a motion requires of a carrier, with the range that it has."""
-
-    name: str
-    unit: str
-    values: Matrix  # (k, 1)
-    low: float
-    high: float
-    axes: tuple[str, ...] = ("",)  # (k,) names of the values, if there are several
-    scale: float | None = None  # a typical size; default: the robot's scale of forces
-
-
-class Drawing(NamedTuple):
-    """Describe what figures and viewer draw of a carrier beside its anchors."""
-
-    body: bool  # at its pose, with its name and path
-    axes: bool  # of its frame, since it turns
-    boxes: tuple[Box, ...]  # around it in {G} [m]
-    arm: float | None = None  # of its four rotors, from its origin [m]
 
 
 class Carrier(Part):
@@ -108,6 +63,7 @@ class Carrier(Part):
     This base describes a carrier that never moves. A kind of its own overrides what differs.
     """
 
+    tows: ClassVar[bool] = False  # by cables without winches, unless the robot's file has winches or states its drive
     efforts: ClassVar[tuple[str, ...]] = ()  # names of what must hold it, against gravity and the pull of its cables
 
     name: Name
@@ -157,6 +113,13 @@ class Carrier(Part):
     def body(self) -> RigidBody | None:
         """Return mass and inertia if forces determine its motion, or None if its motion is imposed on it."""
         return None
+
+    def body_radius(self, anchors: np.ndarray) -> float:
+        """Return the radius [m] of the ball about its origin that holds its body, from its anchors (k, 3) [m]; 0: none.
+
+        It keeps this far from places to keep out of, and figures, films and viewer draw it so large.
+        """
+        return 0.0
 
     @property
     def actuators(self) -> tuple[Actuator, ...]:
@@ -238,6 +201,8 @@ class PrescribedCarrier(Carrier):
 class MobileCarrier(Carrier):
     """A robot end that moves inside a reach box (paper C): a point, its orientation stays as at home."""
 
+    tows: ClassVar[bool] = True
+
     kind: Literal["mobile"]
     reach: Box = Field(description="where the carrier's origin may be, in {G} [m]")
     speed_max: Positive = Field(description="[m/s]")
@@ -266,6 +231,7 @@ class QuadrotorCarrier(Carrier):
     Its frame sits in its CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
     """
 
+    tows: ClassVar[bool] = True
     efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force across the thrust")
 
     kind: Literal["quadrotor"]
@@ -279,6 +245,11 @@ class QuadrotorCarrier(Carrier):
     )
     speed_max: Positive = Field(default=10.0, description="[m/s]; for planners")
     acceleration_max: Positive = Field(default=10.0, description="[m/s^2]; for planners")
+    radius: Positive | None = Field(
+        default=None,
+        description="of the ball about its CoM that holds its rotors [m]; default: 0.3 m times the root of its mass in "
+        "kg (rotors of equal disc loading), at least as far as its anchors are from its z axis",
+    )
 
     @model_validator(mode="after")
     def _thrusts_in_order(self) -> Self:
@@ -316,10 +287,16 @@ class QuadrotorCarrier(Carrier):
             ),
         )
 
+    def body_radius(self, anchors: np.ndarray) -> float:
+        """Return the radius of the file, or one that fits its mass and holds its anchors."""
+        if self.radius is not None:
+            return self.radius
+        return float(max(USUAL_RADIUS * np.sqrt(self.mass), *np.hypot(anchors[:, 0], anchors[:, 1]), 0.0))
+
     @property
     def drawing(self) -> Drawing:
-        """Return its axes and four rotors, on arms at which a third of its mass has its inertia about the z axis."""
-        return super().drawing._replace(arm=float(np.sqrt(3 * self.inertia[2] / self.mass)))
+        """Return its axes and four rotors."""
+        return super().drawing._replace(rotors=True)
 
     def required_effort(
         self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray

@@ -30,9 +30,12 @@ import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser, ParseError
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import shown
-from .parsing import read_bytes, validate
+from ..reading import read_bytes
+from . import points
+from .parsing import validate
 from .part import COORDINATES, LARGEST, Coordinate, inertia_matrix
 from .robot import Cable, Platform, Robot
 from .rotation import rotation
@@ -56,7 +59,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
-class CasprImport:
+class CasprImport(Displayed):
     """A robot, and what else the folder contains.
 
     Attributes
@@ -281,7 +284,8 @@ def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
     q = np.array(joint.numbers(7 if kind == "SPATIAL_QUATERNION" else len(dof), "q_initial"))
     if len(dof) == len(COORDINATES):
         pose[:3] += q[:3]
-        pose[3:] = _angles(_from_quaternion(joint, q[3:]) if kind == "SPATIAL_QUATERNION" else _from_xyz(q[3:]))
+        R = _from_quaternion(joint, q[3:]) if kind == "SPATIAL_QUATERNION" else _from_xyz(q[3:])
+        pose[3:] = points.angles(R) + 0.0  # -0 would only puzzle a reader
     else:
         pose[[COORDINATES.index(name) for name in dof]] += q
     return pose.tolist()
@@ -302,14 +306,6 @@ def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> np.ndarray:
     x, y, z = v
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew
-
-
-def _angles(R: np.ndarray) -> np.ndarray:
-    """Return (roll, pitch, yaw) of R = Rz Ry Rx [rad], also at pitch = +-90 degrees, where any roll is valid."""
-    roll = math.atan2(R[2, 1], R[2, 2])
-    level = R @ rotation(ca.DM([roll, 0, 0])).full().T  # Rz Ry
-    pitch, yaw = math.atan2(-level[2, 0], level[2, 2]), math.atan2(-level[0, 1], level[1, 1])
-    return np.array([roll, pitch, yaw]) + 0.0  # -0 would only puzzle a reader
 
 
 def _choose(cables: _Node, requested: str | None) -> tuple[_Node, list[str]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..display import Displayed
 from ..text import quantity, quantity_row
 from .dynamics import Dynamics
 from .robot import Robot
@@ -16,7 +17,7 @@ LEVEL_POSES = 50
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Displayed):
     """The diagnosis of a robot at its home pose.
 
     Attributes

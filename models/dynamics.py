@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import flag, required
 from . import elasticity, points
@@ -34,7 +35,7 @@ def _dynamics_of(robot: Any) -> Dynamics:
     return Dynamics(robot)
 
 
-class Dynamics:
+class Dynamics(Displayed):
     """Compute what a motion needs and what the cables can give, for one robot.
 
     Everything is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Arguments may have

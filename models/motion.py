@@ -7,6 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ..display import record
 from .arrays import Array
 
 __all__ = ["Motion"]
@@ -29,6 +30,8 @@ class Motion(NamedTuple):
     carrier_pose: Array = None
     carrier_velocity: Array = None
     carrier_acceleration: Array = None
+
+    __repr__ = record
 
     @classmethod
     def symbols(cls, *carriers: int) -> Motion:

@@ -6,7 +6,6 @@ import difflib
 import io
 import os
 import re
-import stat
 import warnings
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,12 +19,13 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 
 from ..errors import InputError
 from ..inputs import LONGEST_TEXT, check_ending, file_path, printable, shown
+from ..reading import read_bytes
 from ..writing import whole_file
 from .schema import json_schema
 
 ENDINGS = (".yaml", ".yml")
-LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
+MOST_ITEMS = 30_000  # values and keys, some 50 us each; a file with the covariance of 24 cables has 29 200
 NAMES = 'must have only letters, digits, ".", "_" and "-", and begin with a letter or digit'  # `part.Name`
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -40,15 +40,15 @@ def to_yaml(model: BaseModel) -> str:
     return stream.getvalue()
 
 
-def save_yaml(model: BaseModel, file: str | os.PathLike[str]) -> Path:
-    """Save the YAML text of a model, whole or not at all, and return the path.
+def save_yaml(model: BaseModel, file: str | os.PathLike[str], argument: str = "file") -> Path:
+    """Save the YAML text of a model, whole or not at all, and return the path; errors name the `argument`.
 
     Raises
     ------
     InputError
         If the file cannot be written, or its name does not end in .yaml or .yml.
     """
-    path = check_ending("file", file_path("file", file), *ENDINGS)
+    path = check_ending(argument, file_path(argument, file), *ENDINGS)
     with whole_file(path) as temporary:
         temporary.write_text(to_yaml(model), encoding="utf-8")
     return path
@@ -68,30 +68,6 @@ def read_yaml(path: Path, model: type[Model]) -> Model:
     except UnicodeDecodeError as error:
         raise InputError(f"{where} must be a YAML file in UTF-8, got another text (byte {error.start})") from None
     return parse_yaml(text, model, where, path.parent)
-
-
-def read_bytes(path: Path, what: str, largest: int = LARGEST_FILE) -> bytes:
-    """Return the content of `path`, or raise InputError if it cannot be read or is too large; `what` describes it."""
-    where = printable(str(path))
-    try:
-        kind = path.stat().st_mode
-        if stat.S_ISDIR(kind):
-            raise InputError(f"{where} is a folder, not a file")
-        if not stat.S_ISREG(kind):
-            raise InputError(f"{where} must be {what}, got a device or a pipe")
-        with path.open("rb") as stream:
-            content = stream.read(largest + 1)
-        if len(content) > largest:
-            size = max(len(content), path.stat().st_size)
-            raise InputError(f"{where} must be {what} of at most {largest / 1e6:g} MB, got {size / 1e6:.1f} MB")
-        return content
-    except InputError:
-        raise
-    except FileNotFoundError:
-        raise InputError(f"{where}: no such file") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{where}: cannot be read ({reason})") from None
 
 
 def parse_yaml(text: str, model: type[Model], where: str, folder: Path | None = None) -> Model:
@@ -249,14 +225,19 @@ def _without_lengths(details: list[Any]) -> list[Any]:
 
 
 class _PlainComposer(Composer):
-    """Refuses aliases and tags, which no file of towline needs.
+    """Refuses aliases and tags, which no file of towline needs, and more items than one of its files has.
 
     An alias is a few bytes that stand for a whole tree: nested ones make a small file explode. A tag makes sets,
     bytes and dates of what reads like numbers.
     """
 
+    _items = 0
+
     def compose_node(self, parent: Any, index: Any) -> Any:
         event = self.parser.peek_event()
+        self._items += 1
+        if self._items > MOST_ITEMS:
+            raise ComposerError(problem=f"has more than {MOST_ITEMS} values and keys", problem_mark=event.start_mark)
         if isinstance(event, AliasEvent):
             raise ComposerError(problem="has a YAML alias (*name)", problem_mark=event.start_mark)
         if getattr(event, "tag", None) is not None:

@@ -6,12 +6,14 @@ R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 from typing_extensions import override
 
+from ..display import Displayed, Fact, brief
 from ..errors import InputError
 
 LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
@@ -39,7 +41,7 @@ COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class Part(BaseModel):
+class Part(Displayed, BaseModel):
     """The base of all parts: they are frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -71,6 +73,15 @@ class Part(BaseModel):
             return super().model_validate(obj, **options)
         except ValidationError as error:
             raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
+
+    @override
+    def __str__(self) -> str:
+        return repr(self)
+
+    def _facts(self) -> Iterable[Fact]:
+        """Return the fields that were given."""
+        given = (name for name in type(self).model_fields if name in self.model_fields_set)
+        return [(name, brief(getattr(self, name))) for name in given]
 
     @override
     def __eq__(self, other: object) -> bool:

@@ -8,6 +8,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ..display import Displayed
 from ..errors import InputError
 from . import kinematics, relative, wind
 from .arrays import Array, one_array, several_arrays
@@ -17,7 +18,7 @@ from .motion import Motion
 from .robot import Robot
 
 
-class RelativeDynamics:
+class RelativeDynamics(Displayed):
     """Compute the dynamics as paper F does: in {A}, with the carrier's motion in a term of its own, D_B (Eq. 38).
 
     `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, in the axes of {A};

@@ -10,13 +10,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self, cast
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from . import parameters, points
-from .carriers import AnyCarrier
+from .carriers import AnyCarrier, Drive
+from .displayed_robot import DisplayedRobot
+from .drive import lengths_to_keep, usual_drive
 from .part import (
     COORDINATES,
     BodyInertia,
@@ -30,6 +32,7 @@ from .part import (
     Vector3,
     inertia_matrix,
 )
+from .pulleys import check_pulleys
 from .uncertainty import Uncertainty, draw
 
 # Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
@@ -159,7 +162,10 @@ class Cable(Part):
     t_max: Positive = Field(description="largest tension [N]")
     stiffness: Positive | None = Field(default=None, description="E A [N]; default: the cable does not stretch")
     damping: NonNegative | None = Field(default=None, description="C [N s/m]")
-    length: Positive | None = Field(default=None, description="[m]; required where the drive is fixed-length")
+    length: Positive | None = Field(
+        default=None,
+        description="[m], where the drive is fixed-length; default there: from anchor to attachment at home",
+    )
     pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
     winch: Winch | None = Field(
         default=None, description="what moves the cable, for simulation; default: its length follows commands exactly"
@@ -175,7 +181,12 @@ class Cable(Part):
         return self
 
 
-class Robot(Part):
+def _without_default(schema: dict[str, Any]) -> None:
+    """Remove a default that stands for one that depends on other fields."""
+    del schema["default"]
+
+
+class Robot(DisplayedRobot):
     """A cable robot: one platform, carriers, cables. Frozen; built by `load` or by `Robot.model_validate`.
 
     The arrays below are what computations read; each has one row per cable or carrier, in the order of the file.
@@ -184,10 +195,12 @@ class Robot(Part):
     name: Name
     source: str = Field(min_length=1, description="where the numbers come from, and which are assumed")
     gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
-    drive: Literal["both", "fixed-length", "variable-length"] = Field(
-        default="both",
+    drive: Drive = Field(
+        default=cast(Any, None),
+        json_schema_extra=_without_default,
         description="what moves (paper C). fixed-length: the carriers, each cable keeps its length; "
-        "variable-length: the winches, mobile carriers stay at home; both: carriers and winches",
+        "variable-length: the winches, mobile carriers stay at home; both: carriers and winches. Default: fixed-length "
+        "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
     )
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
@@ -208,38 +221,22 @@ class Robot(Part):
             if cable.carrier not in names:
                 raise ValueError(f"cables[{index}].carrier must be one of {', '.join(names)}, got {cable.carrier!r}")
         lengths = np.linalg.norm(self.home_anchors - self.home_attachments, axis=1)
-        if self.drive == "fixed-length":
-            for index, cable in enumerate(self.cables):
-                if cable.length is None:
-                    raise ValueError(
-                        f"cables[{index}].length must be a number > 0 [m] if drive is fixed-length, got none"
-                    )
+        if (self.drive or usual_drive(self)) == "fixed-length":
+            object.__setattr__(self, "cables", lengths_to_keep(self, lengths))
+        object.__setattr__(self, "drive", self.drive or usual_drive(self))
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(
                 f"cables[{shortest}] must have a length > 0 m at home, got an anchor and an attachment that coincide"
             )
         if self.pulley_radii.any():
-            self._check_pulleys()
+            check_pulleys(self)
         for index, name in enumerate(self.uncertainty.parameters if self.uncertainty else ()):
             try:
                 parameters.locate(name, self.cables)
             except ValueError as error:
                 raise ValueError(f"uncertainty.parameters[{index}] {error}") from None
         return self
-
-    def _check_pulleys(self) -> None:
-        offsets = self.home_attachments - self.home_anchors
-        turned = points.rotations(self.carrier_home[self.carrier_of_cable, 3:])
-        axes = np.einsum("mij,mj->mi", turned, self.pulley_axes)
-        up = np.sum(offsets * axes, axis=1)
-        across = np.linalg.norm(offsets - up[:, None] * axes, axis=1)
-        outside = (across > 1e-9) & (across**2 - 2 * across * self.pulley_radii + up**2 > 0)
-        for index in np.flatnonzero((self.pulley_radii > 0) & ~outside):
-            raise ValueError(
-                f"cables[{index}].attachment must lie off the swivel axis and outside the sheave of its pulley at "
-                f"home, got {self.cables[index].attachment}"
-            )
 
     def parameter_values(self, names: Iterable[str]) -> np.ndarray:
         """Return numbers of the cables by name, as `cables[2].anchor.x` or `cables[2].pulley.radius`, (p,) [m].
@@ -345,11 +342,15 @@ class Robot(Part):
         return np.array([carrier.home for carrier in self.carriers])  # (c, 6)
 
     @property
+    def carrier_radius(self) -> np.ndarray:
+        """Return the radii of the balls about the carriers' origins that hold their bodies, (c,) [m]; 0: a point."""
+        anchors, owner = self.anchors, self.carrier_of_cable
+        return np.array([each.body_radius(anchors[owner == i]) for i, each in enumerate(self.carriers)])  # (c,)
+
+    @property
     def home(self) -> np.ndarray:
         """Return the home pose of the platform in {G}, (6,) [m, rad]: the file's, or else amid or below the anchors."""
-        if self.platform.home is not None:
-            return np.array(self.platform.home)  # (6,)
-        return points.default_home(self.home_anchors, self.attachments)
+        return np.array(self.platform.home or points.default_home(self.home_anchors, self.attachments))  # (6,)
 
     @property
     def home_anchors(self) -> np.ndarray:

@@ -76,8 +76,8 @@ def inverse_rate_matrix(angles: Matrix) -> Matrix:
 
 def angles_of(R: Matrix) -> Matrix:
     """Return (roll, pitch, yaw) of R, (3, 1), in [rad]: pitch in [-90, 90] degrees, roll and yaw in (-180, 180]."""
-    return ca.vertcat(
-        ca.atan2(R[2, 1], R[2, 2]),
-        ca.atan2(-R[2, 0], ca.sqrt(R[2, 1] ** 2 + R[2, 2] ** 2)),
-        ca.atan2(R[1, 0], R[0, 0]),
-    )
+    roll = ca.atan2(R[2, 1], R[2, 2])
+    sr, cr = ca.sin(roll), ca.cos(roll)
+    # The yaw that belongs to this roll: at a pitch of 90 degrees both are rounding, and only together an attitude.
+    yaw = ca.atan2(sr * R[0, 2] - cr * R[0, 1], cr * R[1, 1] - sr * R[1, 2])
+    return ca.vertcat(roll, ca.atan2(-R[2, 0], ca.sqrt(R[2, 1] ** 2 + R[2, 2] ** 2)), yaw)

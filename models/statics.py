@@ -27,6 +27,7 @@ import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import required, whole_number
 from . import points
@@ -41,7 +42,7 @@ SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(Displayed):
     """A pose at which the platform rests stably.
 
     Attributes

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs import printable
-from .parsing import read_bytes
+from ..reading import read_bytes
 from .part import LARGEST
 
 __all__ = ["read_stl"]

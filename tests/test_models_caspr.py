@@ -348,12 +348,12 @@ def test_attacks_are_one_line(attack, which, tmp_path):
     secret.write_text("the secret")
     text = ATTACKS[attack].replace("{secret}", str(secret))
     write(tmp_path, **{which: text if which == "bodies" else text.replace("bodies_system", "cables")})
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(
         InputError, match=rf"my_{which}\.xml must be plain XML.*, got a DTD or entities of its own"
     ) as caught:
         read_caspr(tmp_path)
-    assert time.perf_counter() - start < 1
+    assert time.process_time() - start < 1
     assert len(str(caught.value).splitlines()) == 1
     assert "the secret" not in str(caught.value)
 

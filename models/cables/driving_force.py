@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...display import Displayed
 from ...errors import InputError
 from ...inputs import one_of, whole_number
 from ..batch import as_array
@@ -27,7 +28,7 @@ SINGULAR = 1e-9  # of the largest singular value of A: what is below counts as z
 
 
 @dataclass(frozen=True)
-class DrivingForce:
+class DrivingForce(Displayed):
     """The result of `driving_force`, at N instants for m cables.
 
     Attributes

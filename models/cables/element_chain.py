@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...display import Displayed
 from ...inputs import whole_number
 from ..batch import as_array
 from . import checks
@@ -41,7 +42,7 @@ if TYPE_CHECKING:  # scipy.sparse takes a tenth of a second to import
 
 
 @dataclass(frozen=True)
-class ElementChain:
+class ElementChain(Displayed):
     """One cable as n axial elements, straight from its anchor to its attachment, in {G} or any other frame.
 
     Parameters

@@ -25,13 +25,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ...inputs import whole_number
 from ..batch import as_array
 from . import checks, elastic
 
 
 @dataclass(frozen=True)
-class LumpedChain:
+class LumpedChain(Displayed):
     """A cable of point masses. Its state is (positions, velocities) of the inner nodes from start to end, in {G}.
 
     Parameters

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ...display import Displayed
 from ...errors import InputError, SolverError
 from ..batch import arrays, as_array
 from . import checks
@@ -35,7 +36,7 @@ VERTICAL = 1e-13  # horizontal distance in unstrained lengths: below, the cable 
 
 
 @dataclass(frozen=True)
-class SaggingCable:
+class SaggingCable(Displayed):
     """Elastic catenaries at rest, one or a batch of shape (...).
 
     Attributes

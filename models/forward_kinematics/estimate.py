@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ...display import Displayed, Fact, brief
+from ...text import quantity, quantity_range, quantity_row
 from .. import points
 from ..dynamics import dynamics_of
 from ..robot import Robot
@@ -20,7 +23,7 @@ MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standar
 SINGULAR = 1e-9  # of the gradient, relative to its largest singular value
 
 
-class PoseEstimate:
+class PoseEstimate(Displayed):
     """The pose of the platform that fits measured cable lengths best; arrays have the leading dimensions of these.
 
     Attributes
@@ -38,8 +41,8 @@ class PoseEstimate:
     carrier_pose
         Of the carriers, (c, 6) or (..., c, 6), or None for those at home.
     ambiguous
-        Whether the search met another pose that may be the true one, (...): it fits, or would by a test at 0.01 %. None
-        of an estimate with a start, which is the one nearby.
+        Whether the search met another pose that may be the true one, (...): it fits, or would by a test at 0.01 %, even
+        if cables cannot hold it with the file's CoM and load. None of an estimate with a start, the one nearby.
     by_gravity
         Whether the lengths alone leave the pose open, and the platform is at rest under its weight, (...).
     """
@@ -59,6 +62,19 @@ class PoseEstimate:
         self.robot, self.pose, self.residuals, self.converged = robot, pose, residuals, converged
         self.sigma, self.carrier_pose = sigma, carrier_pose
         self.ambiguous, self.by_gravity, self._covariance = ambiguous, by_gravity, covariance
+
+    def _headline(self) -> str:
+        shape = self.pose.shape[:-1]
+        return f"{self.robot.name}: {f'{quantity(int(np.prod(shape)))} poses' if shape else 'pose'} from cable lengths"
+
+    def _facts(self) -> Iterable[Fact]:
+        names = ("converged", "consistent", "determined", "ambiguous", "by_gravity")
+        verdicts = {name: np.asarray(getattr(self, name)) for name in names if getattr(self, name) is not None}
+        return [
+            ("pose", f"({quantity_row(self.pose)}) [m, rad]" if self.pose.ndim == 1 else brief(self.pose)),
+            ("residual", quantity_range(1e3 * np.ravel(self.residual), "mm")),
+            *((name, quantity(int(of.sum())) if of.ndim else brief(bool(of))) for name, of in verdicts.items()),
+        ]
 
     def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
         """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
@@ -159,13 +175,6 @@ class PoseEstimate:
         finite = np.where(np.isfinite(self.covariance), self.covariance, np.nan).astype(object)
         finite[finite != finite] = None  # JSON has no infinity
         return plain | {"covariance": finite.tolist(), "ambiguous": np.asarray(self.ambiguous).tolist()}
-
-    def __repr__(self) -> str:
-        """Return the pose of one estimate, or the number of poses."""
-        if self.pose.ndim > 1:
-            return f"PoseEstimate({self.robot.name!r}, {self.pose.shape[:-1]} poses)"
-        pose = np.round(self.pose, 6).tolist()
-        return f"PoseEstimate({self.robot.name!r}, pose={pose}, residual={self.residual:.3g})"
 
     def _weighted_gradient(self) -> np.ndarray:
         return gradient(self.robot, self.pose, self.carrier_pose) / self.sigma[:, None]

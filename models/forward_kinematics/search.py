@@ -3,8 +3,8 @@
 A level platform with the given lengths is often near the true one, and home often is, so these come first; those that
 do not fit exactly go on from the level platform turned by 45 and 90 degrees about one axis. Of several poses that fit
 the likeliest is taken, if angles from home are spread by 30 degrees. With as many cables as coordinates many poses
-fit, so that six cables go on from turns about oblique axes; those poses in which the cables cannot hold the weight are
-left out, since their lengths cannot have been measured.
+fit, so that six cables go on from turns about oblique axes; a pose in which the cables can hold the weight comes before
+those in which they cannot, which make it ambiguous all the same, since CoM and load are not exact.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class _Best:
     poses, errors, ended
         As `search` returns them.
     ambiguous
-        Where another pose fits too, (N,).
+        Where another pose fits too, held by the cables or not, (N,).
     left
         The problems that are to be searched on.
     """
@@ -68,7 +68,7 @@ class _Best:
         self._doubtful = largest_cost(redundancy, RARE)
         self.poses, self.errors = np.tile(problem.home, (count, 1)), np.full((count, robot.m), np.inf)
         self.ended, self.ambiguous, self.left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
-        self._score = np.full(count, np.inf)
+        self._score, self._plausible = np.full(count, np.inf), np.zeros(count, bool)
 
     def offer(
         self, rows: np.ndarray, poses: np.ndarray, errors: np.ndarray, ended: np.ndarray, carriers: np.ndarray | None
@@ -76,6 +76,8 @@ class _Best:
         """Keep the poses of `rows` that are better than those so far."""
         cost = np.sum(errors**2, axis=1)
         fits = ended & (cost <= self._most)
+        # The true pose may be one that hardly fits, or one that is not held with the file's CoM and load.
+        plausible = ended & (cost <= self._doubtful)
         if self._square and fits.any():
             of_fits = carriers if carriers is None or carriers.ndim == 2 else carriers[fits]
             fits[fits] = taut(self._robot, poses[fits], of_fits)
@@ -83,16 +85,14 @@ class _Best:
         turned = np.einsum("nij,ij->n", R, self._home)  # the trace of R R_home^T
         angle = np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))
         score = np.where(fits, cost + (angle / USUAL) ** 2, np.where(np.isfinite(cost), MISFIT + cost, np.inf))
-        # The true pose may be the one that hardly fits, so that one counts here too.
-        plausible = fits if self._square else ended & (cost <= self._doubtful)
-        known = self._score[rows] < (MISFIT if self._square else MISFIT + self._doubtful)
         apart = np.abs(poses[:, :3] - self.poses[rows, :3]).max(axis=1) > APART * self._robot.length
         apart |= np.abs(R - points.rotations(self.poses[rows, 3:])).max(axis=(1, 2)) > APART
-        self.ambiguous[rows] |= plausible & known & self.ended[rows] & apart
+        self.ambiguous[rows] |= plausible & self._plausible[rows] & apart
         better = score < self._score[rows]
         kept = rows[better]
         self.poses[kept], self.errors[kept] = poses[better], errors[better]
         self.ended[kept], self._score[kept] = ended[better], score[better]
+        self._plausible[kept] = plausible[better]
         if not self._square:
             # Errors that are rounding leave no doubt: two poses of a redundant robot hardly share all their lengths.
             self.left = rows[~(fits & (cost <= EXACT**2))]

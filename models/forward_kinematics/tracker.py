@@ -7,6 +7,7 @@ import os
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...display import Displayed
 from ...errors import InputError
 from ...inputs import finite_array
 from ..batch import as_array
@@ -19,7 +20,7 @@ from .machine import load
 __all__ = ["PoseTracker"]
 
 
-class PoseTracker:
+class PoseTracker(Displayed):
     """Follow a platform: each estimate starts from the one before, and a search begins where that does not fit.
 
     Parameters

@@ -3,8 +3,8 @@
     R(q), omega = R Omega                     for a unit quaternion q and a rate Omega in the body's axes
     dq = q (0, Omega) / 2
 
-An imposed carrier follows its reference, p + v s + a s^2 / 2 for each of its six coordinates, s after the step began.
-Its attitude goes from Euler angles to the quaternion here, with Omega = P dTheta and alpha = dP dTheta + P ddTheta.
+Each coordinate of an imposed carrier is a polynomial of time, see `carrier_motion`. Its attitude goes from Euler angles
+to the quaternion here, with Omega = P dTheta and alpha = dP dTheta + P ddTheta.
 """
 
 import math
@@ -24,22 +24,35 @@ from .layout import (
     LIMITS,
     MOMENT,
     MOTION,
+    MOVES,
     OMEGA,
+    POLYNOMIAL,
     QUATERNION,
     RATE,
     REFERENCE_POSE,
     RESTS,
+    TURNS,
     VELOCITY,
 )
 
 
 def place_bodies(bodies, command, state, change, on_bodies, cable_count, time):
-    """Put imposed carriers where they are `time` [s] after the step began; write R and omega of all bodies."""
+    """Put imposed carriers where they are `time` [s] after the command began; write R and omega of all bodies.
+
+    The references of lagged carriers at that time go to their places in the command.
+    """
+    carriers = COMMANDS + cable_count
+    polynomials = carriers + CARRIER * (bodies.shape[0] - 1)
     for b in range(bodies.shape[0]):
         at, turned = BODY * b, bodies[b, MOTION] == FREE or time == 0.0
         if bodies[b, MOTION] == IMPOSED:
-            reference = COMMANDS + cable_count + CARRIER * (b - 1) + REFERENCE_POSE
-            turned = _impose(command, reference, state, change, at, time)
+            turned = _impose(command, polynomials + POLYNOMIAL * (b - 1), state, change, at, time)
+        elif bodies[b, MOTION] == LAGGED:
+            reference, polynomial = carriers + CARRIER * (b - 1) + REFERENCE_POSE, polynomials + POLYNOMIAL * (b - 1)
+            for i in range(3 if command[polynomial + MOVES] != 0.0 else 0):
+                command[reference + i] = _position(command, polynomial + 6 * i, time)
+                command[reference + 6 + i] = _velocity(command, polynomial + 6 * i, time)
+                command[reference + 12 + i] = _acceleration(command, polynomial + 6 * i, time)
         if not turned:
             continue  # it has the attitude of the beginning
         w, x = state[at + QUATERNION], state[at + QUATERNION + 1]
@@ -61,27 +74,49 @@ def place_bodies(bodies, command, state, change, on_bodies, cable_count, time):
         on_bodies[b, OMEGA + 2] = on_bodies[b, 6] * p + on_bodies[b, 7] * q + on_bodies[b, 8] * r
 
 
-def _impose(command, reference, state, change, at, time):
+def _position(command, at, time):
+    c = command
+    return c[at] + time * (c[at + 1] + time * (c[at + 2] + time * (c[at + 3] + time * (c[at + 4] + time * c[at + 5]))))
+
+
+def _velocity(command, at, time):
+    c = command
+    return c[at + 1] + time * (
+        2.0 * c[at + 2] + time * (3.0 * c[at + 3] + time * (4.0 * c[at + 4] + time * 5.0 * c[at + 5]))
+    )
+
+
+def _acceleration(command, at, time):
+    c = command
+    return 2.0 * c[at + 2] + time * (6.0 * c[at + 3] + time * (12.0 * c[at + 4] + time * 20.0 * c[at + 5]))
+
+
+def _impose(command, polynomial, state, change, at, time):
     """Write an imposed body's motion; return whether its attitude may be another than before."""
     for i in range(3):
-        velocity, acceleration = command[reference + 6 + i], command[reference + 12 + i]
-        state[at + i] = command[reference + i] + time * (velocity + 0.5 * time * acceleration)
-        state[at + VELOCITY + i] = velocity + time * acceleration
-        change[at + VELOCITY + i] = acceleration
-    turns = time == 0.0
-    for i in range(9, 12):
-        turns = turns or command[reference + i] != 0.0 or command[reference + 6 + i] != 0.0
-    if not turns:
+        first = polynomial + 6 * i
+        if command[polynomial + MOVES] == 0.0:
+            state[at + i], state[at + VELOCITY + i], change[at + VELOCITY + i] = command[first], 0.0, 0.0
+        else:
+            state[at + i] = _position(command, first, time)
+            state[at + VELOCITY + i] = _velocity(command, first, time)
+            change[at + VELOCITY + i] = _acceleration(command, first, time)
+    if time != 0.0 and command[polynomial + TURNS] == 0.0:
         for i in range(3):
             state[at + RATE + i] = change[at + RATE + i] = 0.0
         return False
-    d_roll = command[reference + 9] + time * command[reference + 15]
-    d_pitch = command[reference + 10] + time * command[reference + 16]
-    d_yaw = command[reference + 11] + time * command[reference + 17]
-    roll = command[reference + 3] + 0.5 * time * (command[reference + 9] + d_roll)
-    pitch = command[reference + 4] + 0.5 * time * (command[reference + 10] + d_pitch)
-    yaw = command[reference + 5] + 0.5 * time * (command[reference + 11] + d_yaw)
-    dd_roll, dd_pitch, dd_yaw = command[reference + 15], command[reference + 16], command[reference + 17]
+    roll, pitch, yaw = polynomial + 18, polynomial + 24, polynomial + 30
+    d_roll, d_pitch, d_yaw = (
+        _velocity(command, roll, time),
+        _velocity(command, pitch, time),
+        _velocity(command, yaw, time),
+    )
+    dd_roll, dd_pitch, dd_yaw = (
+        _acceleration(command, roll, time),
+        _acceleration(command, pitch, time),
+        _acceleration(command, yaw, time),
+    )
+    roll, pitch, yaw = _position(command, roll, time), _position(command, pitch, time), _position(command, yaw, time)
     set_quaternion(state, at + QUATERNION, roll, pitch, yaw)
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     state[at + RATE] = d_roll - sp * d_yaw
@@ -156,7 +191,7 @@ def _follow(bodies, settings, command, reference, state, change, b):
 
     Without limits that is a critically damped lag of second order with bandwidth w. The wanted velocity v* is inside
     the limit of speed, and so v stays inside. From farther away it grows with the root of the distance, so that a
-    carrier can brake with 0.8 of its largest acceleration.
+    carrier can brake with 0.8 of its largest acceleration. `place_bodies` has written the reference of the time.
     """
     at, rate = BODY * b, 0.5 * settings[CARRIER_BANDWIDTH]
     dx, dy, dz = (

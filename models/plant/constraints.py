@@ -8,7 +8,7 @@ With the Jacobian J of their elongations and the mass matrix M, tensions change 
 with c what the elongations would do without cables. These are the conditions of min 1/2 x G x - c x over x >= 0, a
 non-negative least-squares problem in the metric M^-1 (Gauss's principle of least constraint). An impact changes the
 kinetic energy by -1/2 p G p where nothing else moves: it never grows. Where more cables are taut than their Jacobian
-has rank, tensions are not unique, and the solution has as many positive ones as the rank at most.
+has rank, tensions are not unique: the solution has those of cables that stretch a little, all of the same E A.
 
 Source: C. Lawson, R. Hanson, Solving Least Squares Problems, 1974, chapter 23, with a Cholesky factor of G.
 """
@@ -27,19 +27,25 @@ from .layout import (
     DEPENDENT,
     DRIVE,
     FORCES,
+    FREE,
+    GIVE,
+    GIVING,
     IMPULSE,
     INERTIA_OF_WINCH,
     INVERSE_INERTIA,
     INVERSE_MASS,
     LENGTH_RATE,
+    MOTION,
     OMEGA,
     OWNER,
     PICKED,
     RATE,
+    REFINED,
     SLIP,
     TURN,
     VELOCITY,
     WORKS,
+    L,
     U,
 )
 
@@ -49,14 +55,21 @@ def gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square):
     m, places = cables.shape[0], BODY * bodies.shape[0]
     for i in range(m):
         _turning(bodies, on_bodies, on_cables, i, 0, ARM, TURN)
-        _turning(bodies, on_bodies, on_cables, i, int(cables[i, OWNER]), CARRIER_ARM, CARRIER_TURN)
+        if bodies[int(cables[i, OWNER]), MOTION] == FREE:
+            _turning(bodies, on_bodies, on_cables, i, int(cables[i, OWNER]), CARRIER_ARM, CARRIER_TURN)
     for i in range(m):
         for j in range(i + 1):
             total = _coupling(bodies, on_cables, i, j, 0, ARM, TURN)
-            if cables[i, OWNER] == cables[j, OWNER]:
+            if cables[i, OWNER] == cables[j, OWNER] and bodies[int(cables[i, OWNER]), MOTION] == FREE:
                 total += _coupling(bodies, on_cables, i, j, int(cables[i, OWNER]), CARRIER_ARM, CARRIER_TURN)
             square[i, j] = square[j, i] = total
         square[i, i] += yielding(cables, settings, state, on_cables, places, i)
+    total, length = 0.0, 1e-300
+    for i in range(m):
+        total += square[i, i]
+        length += on_cables[i, L]
+    for i in range(m):
+        on_cables[i, GIVE] = GIVING * total * on_cables[i, L] / length
 
 
 def yielding(cables, settings, state, on_cables, places, i):
@@ -130,10 +143,10 @@ def _moved(state, change, on_bodies, on_cables, i, b, arm):
     )
 
 
-def _append(square, picks, at):
+def _append(on_cables, square, picks, at):
     """Write row `at` of the Cholesky factor of G over the picked cables; return False if it depends on those before."""
     m, one = square.shape[1], picks[PICKED, at]
-    left = square[one, one]
+    left = square[one, one] + on_cables[one, GIVE]
     for b in range(at):
         total = square[one, picks[PICKED, b]]
         for k in range(b):
@@ -145,38 +158,49 @@ def _append(square, picks, at):
     return left > DEPENDENT * square[one, one]
 
 
-def _solve_picked(square, picks, count, on_cables):
-    """Solve G z = c over the picked cables, with c in `IMPULSE`, into row 2 m of `square`."""
+def _solve_picked(square, picks, count, on_cables, rounds):
+    """Solve G z = c over the picked cables, with c in `IMPULSE`, into row 2 m of `square`.
+
+    The factor is that of cables that give a little: each round after the first refines the solution to one of G.
+    """
     m = square.shape[1]
-    z = square[2 * m]
+    z, step = square[2 * m], square[2 * m + 2]
     for a in range(count):
-        z[a] = on_cables[picks[PICKED, a], IMPULSE]
-        for k in range(a):
-            z[a] -= square[m + a, k] * z[k]
-        z[a] /= square[m + a, a]
-    for a in range(count - 1, -1, -1):
-        for k in range(a + 1, count):
-            z[a] -= square[m + k, a] * z[k]
-        z[a] /= square[m + a, a]
+        z[a] = 0.0
+    for _ in range(rounds):
+        for a in range(count):
+            step[a] = on_cables[picks[PICKED, a], IMPULSE]
+            for b in range(count):
+                step[a] -= square[picks[PICKED, a], picks[PICKED, b]] * z[b]
+            for k in range(a):
+                step[a] -= square[m + a, k] * step[k]
+            step[a] /= square[m + a, a]
+        for a in range(count - 1, -1, -1):
+            for k in range(a + 1, count):
+                step[a] -= square[m + k, a] * step[k]
+            step[a] /= square[m + a, a]
+        for a in range(count):
+            z[a] += step[a]
 
 
 def solve_pulling(on_cables, square, picks):
-    """Solve G x = c for the candidates; c is in `IMPULSE`, where x goes. Dependent ones, and all others, get 0."""
+    """Solve G x = c for the candidates; c is in `IMPULSE`, where x goes. All others get 0."""
     m, count = square.shape[1], 0
     for i in range(m):
         if picks[CANDIDATE, i] == 1:
             picks[PICKED, count] = i
-            if _append(square, picks, count):
+            if _append(on_cables, square, picks, count):
                 count += 1
-    _solve_picked(square, picks, count, on_cables)
-    _store(square, picks, count, on_cables, 2 * m)
+    _solve_picked(square, picks, count, on_cables, REFINED)
+    _store(square, picks, count, on_cables)
 
 
-def _store(square, picks, count, on_cables, row):
-    for i in range(square.shape[1]):
+def _store(square, picks, count, on_cables):
+    m = square.shape[1]
+    for i in range(m):
         on_cables[i, IMPULSE] = 0.0
     for a in range(count):
-        on_cables[picks[PICKED, a], IMPULSE] = square[row, a]
+        on_cables[picks[PICKED, a], IMPULSE] = square[2 * m, a]
 
 
 def solve_non_negative(on_cables, square, picks):
@@ -200,11 +224,12 @@ def solve_non_negative(on_cables, square, picks):
             break
         picks[BARRED, best] = 1
         picks[PICKED, count] = best
-        if not _append(square, picks, count):
+        if not _append(on_cables, square, picks, count):
             continue
         x[count] = 0.0
         count = _bring_inside(on_cables, square, picks, count + 1, x)
-    _store(square, picks, count, on_cables, 2 * m + 1)
+    _solve_picked(square, picks, count, on_cables, REFINED)
+    _store(square, picks, count, on_cables)
 
 
 def _bring_inside(on_cables, square, picks, count, x):
@@ -212,7 +237,7 @@ def _bring_inside(on_cables, square, picks, count, x):
     m = square.shape[1]
     z = square[2 * m]
     while True:
-        _solve_picked(square, picks, count, on_cables)
+        _solve_picked(square, picks, count, on_cables, 1)
         share, first = 1.0, -1
         for a in range(count):
             if z[a] <= 0.0 and (first < 0 or x[a] < share * (x[a] - z[a])):
@@ -227,7 +252,7 @@ def _bring_inside(on_cables, square, picks, count, x):
         for a in range(count):
             if a != first:
                 picks[PICKED, kept], x[kept] = picks[PICKED, a], x[a]
-                _append(square, picks, kept)
+                _append(on_cables, square, picks, kept)
                 kept += 1
         count = kept
         for a in range(count):

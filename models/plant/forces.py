@@ -53,7 +53,12 @@ def geometry(robot, command, state, change, work, time):
 
 def forces(robot, command, state, change, work, time):
     """Write the derivative `change` of a state whose geometry is written, and all tensions."""
-    _forces(robot, command, state, change, work, time)
+    _forces(robot, command, state, change, work, time, True)
+
+
+def forces_after_hold(robot, command, state, change, work, time):
+    """Write them after the end of a step, where `hold` has written G for a state that is hardly another."""
+    _forces(robot, command, state, change, work, time, False)
 
 
 def evaluate(robot, command, state, change, work, time):
@@ -61,7 +66,7 @@ def evaluate(robot, command, state, change, work, time):
     _geometry(robot, command, state, change, work, time)
     if robot[2][LOCATE] == 0.0:
         set_modes(robot[1], state, work[1], BODY * robot[0].shape[0])
-    _forces(robot, command, state, change, work, time)
+    _forces(robot, command, state, change, work, time, True)
 
 
 def _geometry(robot, command, state, change, work, time):
@@ -139,7 +144,7 @@ def move_winches(cables, settings, command, state, change, on_cables, places, ti
         )
 
 
-def _forces(robot, command, state, change, work, time):
+def _forces(robot, command, state, change, work, time, writes_g):
     bodies, cables, settings = robot
     on_bodies, on_cables, square, picks = work
     m, places, constrained = cables.shape[0], BODY * bodies.shape[0], False
@@ -157,7 +162,8 @@ def _forces(robot, command, state, change, work, time):
         if not constrained:
             break
         constrained = False
-        gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
+        if writes_g:
+            gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
         for i in range(m):
             on_cables[i, IMPULSE] = free_stretch_acceleration(bodies, cables, state, change, on_bodies, on_cables, i)
             picks[CANDIDATE, i] = 1 if cables[i, STIFFNESS] == 0.0 and on_cables[i, MODE] == PULLS else 0

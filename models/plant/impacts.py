@@ -2,7 +2,7 @@
 
 from .bodies import normalise
 from .constraints import free_stretch_acceleration, gram_matrix, solve_non_negative, solve_pulling, yielding
-from .forces import forces, geometry
+from .forces import forces, forces_after_hold, geometry
 from .layout import (
     BODY,
     CANDIDATE,
@@ -22,13 +22,16 @@ from .layout import (
     PULLS,
     QUATERNION,
     RATE,
+    RESTING,
     SLACK,
     STIFFNESS,
+    STILL,
     TOUCHING,
     TURN,
     VELOCITY,
     E,
     L,
+    T,
     U,
 )
 
@@ -67,11 +70,16 @@ def _shift_body(bodies, state, on_bodies, on_cables, i, b, turn, size, places_to
 
 
 def _choose_touching(cables, settings, state, on_cables, picks, places, least_rate):
-    """Make candidates of the taut cables without stiffness whose elongation does not fall faster than a rate [m/s]."""
+    """Make candidates of the taut cables without stiffness whose elongation does not fall faster than a rate [m/s].
+
+    One that hardly moves is treated as taut also where rounding, far from the origin, has made it a little short.
+    """
     m = cables.shape[0]
     for i in range(m):
         intact = cables[i, STIFFNESS] == 0.0 and state[places + CONDITION * m + i] != CUT
-        taut = on_cables[i, E] >= -TOUCHING * settings[LENGTH_SCALE] and on_cables[i, E_RATE] >= least_rate
+        rests = abs(on_cables[i, E_RATE]) <= PARTING
+        taut = on_cables[i, E] >= -(RESTING if rests else TOUCHING) * settings[LENGTH_SCALE]
+        taut = taut and on_cables[i, E_RATE] >= least_rate
         picks[CANDIDATE, i] = 1 if intact and taut and on_cables[i, L] > 1e-12 else 0
 
 
@@ -83,17 +91,56 @@ def _any_too_long(cables, settings, state, on_cables, places):
     return False
 
 
-def resolve(robot, command, state, change, work, time):
-    """Apply the impact of cables that have got taut, and choose those that pull from now on."""
+def _any_stretches(on_cables, picks):
+    fastest = 0.0
+    for i in range(on_cables.shape[0]):
+        if picks[CANDIDATE, i] == 1:
+            fastest = max(fastest, on_cables[i, E_RATE])
+    return fastest > STILL
+
+
+def _as_before(cables, settings, state, on_cables, places):
+    """Return whether cables that pulled are still taut, and all others are not."""
+    for i in range(cables.shape[0]):
+        if cables[i, STIFFNESS] == 0.0 and state[places + CONDITION * cables.shape[0] + i] != CUT:
+            e, rate = on_cables[i, E], on_cables[i, E_RATE]
+            if on_cables[i, MODE] == PULLS:
+                if abs(e) > TOUCHING * settings[LENGTH_SCALE] or abs(rate) > STILL:
+                    return False
+            elif e > -RESTING * settings[LENGTH_SCALE]:
+                return False
+        elif cables[i, STIFFNESS] == 0.0 and on_cables[i, MODE] == PULLS:
+            return False
+    return True
+
+
+def _none_pushes(cables, on_cables):
+    for i in range(cables.shape[0]):
+        if cables[i, STIFFNESS] == 0.0 and on_cables[i, MODE] == PULLS and on_cables[i, T] <= 0.0:
+            return False
+    return True
+
+
+def resolve(robot, command, state, change, work, time, parting):
+    """Apply the impact of cables that have got taut, and choose those that pull from now on.
+
+    A taut cable gets slack where its tension would be negative, or where the impact shortens it faster than `parting`.
+    """
     bodies, cables, settings = robot
     on_bodies, on_cables, square, picks = work
     m, places = cables.shape[0], BODY * bodies.shape[0]
+    if parting == PARTING and _as_before(cables, settings, state, on_cables, places):
+        forces_after_hold(robot, command, state, change, work, time)
+        if _none_pushes(cables, on_cables):
+            return
     for i in range(m):
         if cables[i, STIFFNESS] == 0.0:
             on_cables[i, MODE] = SLACK
     for stage in range(MOST_SHIFTS + 1):  # places until they fit, and then velocities
         places_too = stage < MOST_SHIFTS and _any_too_long(cables, settings, state, on_cables, places)
         _choose_touching(cables, settings, state, on_cables, picks, places, -1e300)
+        if not places_too and not _any_stretches(on_cables, picks):
+            break
         gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
         for i in range(m):
             on_cables[i, IMPULSE] = on_cables[i, E if places_too else E_RATE]
@@ -103,7 +150,7 @@ def resolve(robot, command, state, change, work, time):
         if not places_too:
             break
     forces(robot, command, state, change, work, time)
-    _choose_touching(cables, settings, state, on_cables, picks, places, -PARTING)
+    _choose_touching(cables, settings, state, on_cables, picks, places, -parting)
     gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
     for i in range(m):
         on_cables[i, IMPULSE] = free_stretch_acceleration(bodies, cables, state, change, on_bodies, on_cables, i)
@@ -111,6 +158,9 @@ def resolve(robot, command, state, change, work, time):
     for i in range(m):
         if on_cables[i, IMPULSE] > 0.0:
             on_cables[i, MODE] = PULLS
+    if parting > PARTING:
+        hold(robot, command, state, change, work, time)
+    forces(robot, command, state, change, work, time)
 
 
 def hold(robot, command, state, change, work, time):
@@ -123,8 +173,8 @@ def hold(robot, command, state, change, work, time):
         any_pulls = any_pulls or picks[CANDIDATE, i] == 1
     if not any_pulls:
         return
+    gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)  # the places hardly change it
     for stage in range(2):
-        gram_matrix(bodies, cables, settings, state, on_bodies, on_cables, square)
         for i in range(m):
             on_cables[i, IMPULSE] = on_cables[i, E if stage == 0 else E_RATE]
         solve_pulling(on_cables, square, picks)

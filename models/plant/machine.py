@@ -18,19 +18,20 @@ __all__ = ["MODULES", "joined", "run_rows"]
 _FOLDER = Path(__file__).parent
 MODULES = tuple(
     _FOLDER / f"{name}.py"
-    for name in ("layout", "bodies", "lines", "constraints", "forces", "impacts", "steps", "rows")
+    for name in ("layout", "carrier_motion", "bodies", "lines", "constraints", "forces", "impacts", "steps", "rows")
 )
 
 # Called once or twice in each evaluation: a call hands seven words over for each array.
 INLINED = {
-    *("place_bodies", "_impose", "set_quaternion", "normalise", "move_bodies", "_follow"),
+    *("place_bodies", "_impose", "_position", "_velocity", "_acceleration"),
+    *("set_quaternion", "normalise", "move_bodies", "_follow"),
     *("run_cables", "pull_of", "load_bodies", "pull_bodies"),
     *("set_modes", "elastic_tensions", "_geometry", "_forces"),
 }
 
 _SIGNATURE = (
     f"void(intp, intp, {', '.join(['float64[:, ::1]'] * 2)}, float64[::1], {GIVEN.format(2)}, {GIVEN.format(3)}, "
-    f"float64, intp, intp, {RESULT.format(3)}, {RESULT.format(3)})"
+    f"intp, float64, intp, intp, {RESULT.format(3)}, {RESULT.format(3)})"
 )
 
 

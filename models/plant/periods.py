@@ -41,9 +41,9 @@ class Periods:
         Parameters
         ----------
         states, commands
-            (N, n) and (N, k), see `Plant`.
+            (N, n) and (N, K, k), see `Plant`: the first command is that of the period; carriers move on to a second.
         history, tensions
             Results, (N, 2, n) and (N, 2, m) [N].
         """
-        of = (states, commands[:, None], self._period, self._substeps, 1)
+        of = (states, commands, 1, self._period, self._substeps, 1)
         self._run(0, len(states), *self._arrays, *of, history, tensions)

@@ -21,6 +21,7 @@ from . import layout
 from .machine import run_rows
 from .packing import bodies_of, cables_of, place, settings_of
 from .reading import Reading
+from .samples import complete
 
 __all__ = ["History", "Plant"]
 
@@ -226,9 +227,10 @@ class Plant:
             Commands of the actuators of each carrier, in its order, (..., c, a): for a quadrotor thrust [N] and torques
             about its axes [N m]. The plant cuts them at their limits. Default: zeros.
         carrier_pose, carrier_velocity, carrier_acceleration
-            Reference of the carriers at the beginning of the step, (..., c, 6). Prescribed carriers are there, and move
-            with this acceleration; mobile ones follow position and velocity with a lag of second order, inside
-            their limits of speed and acceleration. Default: at home, at rest.
+            Reference of the carriers at the beginning of the step, (..., c, 6). It moves on to that of the next command
+            of a `run`, or without one with this acceleration. Prescribed carriers are there; mobile ones follow it with
+            a lag of second order, inside their limits of speed and acceleration. Default: at home, at rest; of poses
+            without velocities or accelerations, those that the poses of a `run` have, see `samples`.
         wind
             Velocity of the air in {G} [m/s], (..., 3); default: no air at all, also no drag of the motion.
         wrench
@@ -256,8 +258,11 @@ class Plant:
             "carrier_pose": as_array("carrier_pose", home if carrier_pose is None else carrier_pose, home.shape),
         }
         for name, value in (("velocity", carrier_velocity), ("acceleration", carrier_acceleration)):
-            still = np.zeros_like(home) if value is None else value
-            of_carriers[f"carrier_{name}"] = as_array(f"carrier_{name}", still, home.shape)
+            of_carriers[f"carrier_{name}"] = (
+                np.full(home.shape, 0.0 if carrier_pose is None else np.nan)  # which `complete` replaces
+                if value is None
+                else as_array(f"carrier_{name}", value, home.shape)
+            )
         if self.drive == "lengths" and not (parts["cables"] >= layout.SHORTEST).all():
             least = parts["cables"].min()
             raise InputError(f"cables must be lengths >= {layout.SHORTEST:g} m, got {least:g} m")
@@ -276,23 +281,41 @@ class Plant:
                 row[..., at : at + 6] = of_carriers[f"carrier_{name}"][..., index, :]
         return row
 
-    def step(self, state: np.ndarray, command: np.ndarray, dt: float) -> np.ndarray:
-        """Return the state [m, rad, s] after `dt` [s] under one command, (..., n). Arguments as in `run`."""
+    def step(self, state: np.ndarray, command: np.ndarray, dt: float, after: np.ndarray | None = None) -> np.ndarray:
+        """Return the state [m, rad, s] after `dt` [s] under one command, (..., n).
+
+        Parameters
+        ----------
+        state, command, dt
+            As in `run`.
+        after
+            The next command, (..., k): carriers move on to its reference as in a `run`, and otherwise with constant
+            acceleration.
+
+        Raises
+        ------
+        InputError, SolverError
+            As in `run`.
+        """
+        try:
+            rows = np.stack([command] if after is None else np.broadcast_arrays(command, after), axis=-2)
+        except ValueError:
+            raise InputError(f"after must be a command like {shown(command)}, got {shown(after)}") from None
         both = isinstance(state, np.ndarray) and isinstance(command, np.ndarray)
-        if both and state.shape == (self.size,) and command.shape == (self._command_size,):
-            end = self._step_one(state, command, number("dt", dt, SHORTEST_STEP, LONGEST_STEP))
+        if both and state.shape == (self.size,) and rows.shape[:-2] == () and rows.shape[-1] == self._command_size:
+            end = self._step_one(state, rows, number("dt", dt, SHORTEST_STEP, LONGEST_STEP))
             if end is not None:
                 return end
-        return self.run(state, np.expand_dims(np.asarray(command), -2), dt).states[..., -1, :]
+        return self._run(state, rows, 1, dt, 1, 1, None).states[..., -1, :]
 
-    def _step_one(self, state: np.ndarray, command: np.ndarray, dt: float) -> np.ndarray | None:
+    def _step_one(self, state: np.ndarray, rows: np.ndarray, dt: float) -> np.ndarray | None:
         """Step from one state, in a third of the time of `run`; return None for what that has to report."""
-        if state.dtype != np.float64 or command.dtype != np.float64:
+        if state.dtype != np.float64 or rows.dtype != np.float64:
             return None
-        if not math.isfinite(np.vdot(state, state) + np.vdot(command, command)):
+        if not math.isfinite(np.vdot(state, state) + np.vdot(rows, rows)):
             return None
         history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
-        run_rows()(0, 1, *self.arrays, state[None], command[None, None], dt, 1, 1, history, tensions)
+        run_rows()(0, 1, *self.arrays, state[None], rows[None], 1, dt, 1, 1, history, tensions)
         return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
 
     def run(
@@ -329,21 +352,37 @@ class Plant:
         SolverError
             If the motion grows beyond all numbers, as it does for steps too long for stiff cables.
         """
+        rows = np.asarray(commands)
+        if rows.ndim < 2 or not rows.shape[-2]:
+            raise InputError(f"commands must have the shape (..., K, {self._command_size}), got {shown(commands)}")
+        return self._run(state, rows, rows.shape[-2], dt, substeps, keep, threads)
+
+    def _run(
+        self,
+        state: np.ndarray,
+        rows: np.ndarray,
+        steps: int,
+        dt: float,
+        substeps: int,
+        keep: int,
+        threads: int | None,
+    ) -> History:
+        """Simulate the first `steps` commands."""
         substeps, keep = whole_number("substeps", substeps, 1, 10**6), whole_number("keep", keep, 1, 10**9)
         period = number("dt", dt, SHORTEST_STEP, LONGEST_STEP)
         states = as_array("state", state, (self.size,))
-        rows = np.asarray(commands)
-        if rows.ndim < 2 or rows.shape[-1] != self._command_size or not rows.shape[-2]:
-            raise InputError(f"commands must have the shape (..., K, {self._command_size}), got {shown(commands)}")
+        if rows.shape[-1] != self._command_size:
+            raise InputError(f"commands must have the shape (..., K, {self._command_size}), got {shown(rows)}")
+        rows = complete(rows, self.robot.m, len(self.robot.carriers), period)
         rows = as_array("commands", rows, rows.shape[-2:])
         batch = leading({"state": states.shape[:-1], "commands": rows.shape[:-2]})
-        count, steps = math.prod(batch), rows.shape[-2]
-        kept = 1 + steps // keep
+        count, kept = math.prod(batch), 1 + steps // keep
         history, tensions = np.empty((count, kept, self.size)), np.empty((count, kept, self.robot.m))
         arguments = (
             *self.arrays,
             np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size),
             np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:]),
+            steps,
             period,
             substeps,
             keep,

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import points
 from ..robot import Robot
 from . import layout
 
@@ -50,9 +51,7 @@ class _Bodies:
         pose[..., :3] = self._blocks[..., :3]
         if self._com.any():
             pose[..., :3] -= R @ self._com
-        pose[..., 3] = np.arctan2(R[..., 2, 1], R[..., 2, 2])
-        pose[..., 4] = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 2, 1], R[..., 2, 2]))
-        pose[..., 5] = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+        pose[..., 3:] = points.angles(R)
         return pose
 
     @cached_property

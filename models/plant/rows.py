@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from .carrier_motion import set_motions
 from .forces import geometry
 from .layout import (
     BODY,
     BODY_WORK,
     CABLE_WORK,
+    CARRIER,
     COMMANDS,
     CONDITION,
     CONSTRAINED,
@@ -19,6 +21,7 @@ from .layout import (
     LENGTH_RATE,
     LENGTHS,
     PICKS,
+    POLYNOMIAL,
     RATES,
     REFERENCE,
     REFERENCE_RATE,
@@ -33,7 +36,7 @@ from .layout import (
 from .steps import advance, begin
 
 
-def run_rows(start, stop, bodies, cables, settings, states, commands, period, substeps, keep, history, tensions):
+def run_rows(start, stop, bodies, cables, settings, states, commands, steps, period, substeps, keep, history, tensions):
     """Run the states of the rows from `start` to `stop`.
 
     Parameters
@@ -43,22 +46,24 @@ def run_rows(start, stop, bodies, cables, settings, states, commands, period, su
     states
         (N, n), where each row begins.
     commands
-        (N, K, k), each held for `period` [s], in `substeps` steps.
+        (N, K, k). The first `steps` of them are held for `period` [s] each, in `substeps` steps; carriers move on to
+        the reference of one after them.
     history, tensions
-        (N, 1 + K // keep, n) and (.., m): filled with every state of which the number is a multiple of `keep`, after
-        the impacts of the command that begins there, and the tensions there [N] under that command; at the end, with
-        the state that the last command leaves, and the tensions under it.
+        (N, 1 + steps // keep, n) and (.., m): filled with every state of which the number is a multiple of `keep`,
+        after the impacts of the command that begins there, and the tensions there [N] under that command; at the end,
+        with the state that the last command leaves, and the tensions under it.
     """
     m, places, length = cables.shape[0], BODY * bodies.shape[0], states.shape[1]
     robot = (bodies, cables, settings)
     work = (
         np.zeros((bodies.shape[0], BODY_WORK)),
         np.zeros((m, CABLE_WORK)),
-        np.zeros((2 * m + 2, m)),
+        np.zeros((2 * m + 3, m)),
         np.zeros((PICKS, m), np.int64),
     )
     slopes, spare, state = np.zeros((5, length)), np.zeros((3, length)), np.zeros(length)
-    command = np.zeros(commands.shape[2])
+    polynomials = COMMANDS + m + CARRIER * (bodies.shape[0] - 1)
+    command = np.zeros(polynomials + POLYNOMIAL * (bodies.shape[0] - 1))
     kind = ELASTIC
     if settings[DRIVE] != TENSIONS:
         for i in range(m):
@@ -70,8 +75,12 @@ def run_rows(start, stop, bodies, cables, settings, states, commands, period, su
     for row in range(start, stop):
         state[:] = states[row]
         slopes[:], work[0][:], work[1][:] = 0.0, 0.0, 0.0  # nothing is left of the row before
-        for k in range(commands.shape[1]):
-            command[:] = commands[row, k]
+        for k in range(steps):
+            for j in range(polynomials):
+                command[j] = commands[row, k, j]
+            is_next = k + 1 < commands.shape[1]
+            after = commands[row, k + 1 if is_next else k]
+            set_motions(bodies, commands[row, k], after, is_next, command, state, m, period)
             _take_command(cables, settings, command, state, work[1], places, period)
             for s in range(substeps):
                 begin(robot, command, state, slopes[0], work, step * s, kind)
@@ -82,11 +91,11 @@ def run_rows(start, stop, bodies, cables, settings, states, commands, period, su
                 _limit(cables, settings, state, places)
             for i in range(m):
                 state[places + REFERENCE * m + i] = command[COMMANDS + i]
-        if commands.shape[1] % keep == 0:
+        if steps % keep == 0:
             geometry(robot, command, state, slopes[0], work, period)  # puts imposed carriers where they are
-            _record_state(state, history[row], commands.shape[1] // keep)
+            _record_state(state, history[row], steps // keep)
             begin(robot, command, state, slopes[0], work, period, kind)
-            _record_tensions(work[1], tensions[row], commands.shape[1] // keep)
+            _record_tensions(work[1], tensions[row], steps // keep)
 
 
 def _take_command(cables, settings, command, state, on_cables, places, period):

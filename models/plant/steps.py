@@ -9,7 +9,7 @@ motions. A cable that gets taut and slack again inside of one step is noticed by
 import math
 
 from .bodies import normalise
-from .forces import evaluate, forces, geometry, set_modes
+from .forces import evaluate, forces, forces_after_hold, geometry, set_modes
 from .impacts import hold, resolve
 from .layout import (
     BODY,
@@ -22,6 +22,7 @@ from .layout import (
     DRIVE,
     E_RATE,
     ELASTIC,
+    FEW_EVENTS,
     FORCE_MAX,
     FORCE_SCALE,
     FORCES,
@@ -32,6 +33,7 @@ from .layout import (
     LOCATE,
     MODE,
     MOST_EVENTS,
+    PARTING,
     PULLS,
     SLACK,
     SLIP,
@@ -50,7 +52,7 @@ def begin(robot, command, state, change, work, time, kind):
     bodies, cables, _ = robot
     geometry(robot, command, state, change, work, time)
     set_modes(cables, state, work[1], BODY * bodies.shape[0])
-    _choose_slips(robot, command, state, change, work, time, kind, True)
+    _choose_slips(robot, command, state, change, work, time, kind, True, PARTING)
 
 
 def advance(robot, command, state, slopes, spare, work, time, step, kind):
@@ -76,39 +78,75 @@ def advance(robot, command, state, slopes, spare, work, time, step, kind):
                     at_high = _attempt(robot, command, state, slopes, trial, work, time, high, kind)
         changes = at_high > 0.0 and located and events < MOST_EVENTS
         if changes:
-            high = _locate(robot, command, state, slopes, trial, work, time, high, kind, at_low, at_high)
+            high = _locate(robot, command, state, slopes, spare, work, time, high, kind, at_low, at_high)
         for j in range(len(state)):
             state[j] = trial[j]
         if changes:
             events += 1
-            _change_modes(robot, command, state, slopes[0], work, time + high, kind)
+            parting = PARTING * 16.0 ** max(events - FEW_EVENTS, 0)
+            _change_modes(robot, command, state, slopes[0], work, time + high, kind, parting)
         time += high
         left -= high
 
 
-def _locate(robot, command, state, slopes, trial, work, time, high, kind, at_low, at_high):
-    """Return the length of the step [s] that ends just after the earliest change of a mode; `trial` is its end."""
-    low, side, reached, last = 0.0, 0, at_high, high
-    narrow, close = 1e-15 * high, 1e-17 * robot[2][LENGTH_SCALE]
+def _locate(robot, command, state, slopes, spare, work, time, high, kind, at_low, at_high):
+    """Return the length of the step [s] that ends just after the earliest change of a mode; `trial` is its end.
+
+    A slack cable is caught where the cubic through its elongations and their rates at both ends of the bracket rises
+    above zero; false position finds the other changes. Both aim at half of `CAUGHT`, which ends the search.
+    """
+    on_cables, trial, close = work[1], spare[2], CAUGHT * robot[2][LENGTH_SCALE]
+    at_low, at_high = at_low - 0.5 * close, at_high - 0.5 * close
+    low, side, last, width, weighted = 0.0, 0, high, high, at_high
+    caught, rate = _caught(on_cables, at_high + 0.5 * close)
     for attempt in range(150):
-        if high - low <= narrow or reached <= close:
+        if at_high <= 0.5 * close or high - low <= 1e-15 * high:
             break
-        middle = high - at_high * (high - low) / (at_high - at_low)
-        if attempt % 3 == 2 or not low < middle < high:
+        step = high - low
+        middle = high - weighted * step / (weighted - at_low)
+        if caught >= 0:
+            below = spare[0, caught] - on_cables[caught, E] + on_cables[caught, CONTACT] - 0.5 * close
+            middle = low + step * _rise(below, step * spare[1, caught], at_high, step * rate)
+        if attempt % 3 == 2:
+            middle = 0.5 * (low + high) if step > 0.25 * width else middle
+            width = step
+        if not low < middle < high:
             middle = 0.5 * (low + high)
-        value, last = _attempt(robot, command, state, slopes, trial, work, time, middle, kind), middle
-        if value > 0.0:
-            high, at_high, reached = middle, value, value
-            if side == 1:
-                at_low *= 0.5
+        found, last = _attempt(robot, command, state, slopes, trial, work, time, middle, kind), middle
+        if found > 0.0:
+            high, at_high = middle, found - 0.5 * close
+            weighted, at_low = at_high, at_low * (0.5 if side == 1 else 1.0)
+            caught, rate = _caught(on_cables, found)
             side = 1
         else:
-            low, at_low = middle, value
-            if side == -1:
-                at_high *= 0.5
-            side = -1
+            low, at_low = middle, found - 0.5 * close
+            weighted, side = weighted * (0.5 if side == -1 else 1.0), -1
+            for i in range(on_cables.shape[0]):
+                spare[0, i], spare[1, i] = on_cables[i, E], on_cables[i, E_RATE]
     if last != high:
         _attempt(robot, command, state, slopes, trial, work, time, high, kind)
+    return high
+
+
+def _caught(on_cables, most):
+    """Return which slack cable is beyond its mode by `most`, or -1, and the rate of its elongation."""
+    for i in range(on_cables.shape[0]):
+        if on_cables[i, MODE] == SLACK and on_cables[i, CONTACT] == most:
+            return i, on_cables[i, E_RATE]
+    return -1, 0.0
+
+
+def _rise(e0, d0, e1, d1):
+    """Return where in (0, 1) the cubic with these values and slopes at the ends, e0 <= 0 < e1, gets above zero."""
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        s = 0.5 * (low + high)
+        if (1.0 - s) * (1.0 - s) * (e0 * (1.0 + 2.0 * s) + s * d0) + s * s * (
+            e1 * (3.0 - 2.0 * s) - (1.0 - s) * d1
+        ) > 0.0:
+            high = s
+        else:
+            low = s
     return high
 
 
@@ -131,7 +169,8 @@ def _attempt(robot, command, start, slopes, state, work, time, step, kind):
     geometry(robot, command, state, slopes[4], work, time + step)
     if kind == CONSTRAINED:
         hold(robot, command, state, slopes[4], work, time + step)
-    if kind != ELASTIC:
+        forces_after_hold(robot, command, state, slopes[4], work, time + step)
+    elif kind != ELASTIC:
         forces(robot, command, state, slopes[4], work, time + step)
     return _largest_violation(cables, settings, command, state, work[1], places)
 
@@ -181,7 +220,7 @@ def _graze(on_cables, before, step):
     return step
 
 
-def _change_modes(robot, command, state, change, work, time, kind):
+def _change_modes(robot, command, state, change, work, time, kind, parting):
     """Bring cables and winches that are beyond their modes into other ones, and write derivative and tensions."""
     bodies, cables, _ = robot
     on_cables, places, m = work[1], BODY * bodies.shape[0], cables.shape[0]
@@ -197,10 +236,10 @@ def _change_modes(robot, command, state, change, work, time, kind):
         if on_cables[i, STICKING] > 0.0:
             state[places + LENGTH_RATE * m + i] = 0.0
     geometry(robot, command, state, change, work, time)
-    _choose_slips(robot, command, state, change, work, time, kind, False)
+    _choose_slips(robot, command, state, change, work, time, kind, False, parting)
 
 
-def _choose_slips(robot, command, state, change, work, time, kind, all_winches):
+def _choose_slips(robot, command, state, change, work, time, kind, all_winches, parting):
     """Choose the modes of winches, and of cables without stiffness, and write derivative and tensions.
 
     Whether friction holds a winch depends on the tension with the winch at rest, so that is computed first.
@@ -216,8 +255,9 @@ def _choose_slips(robot, command, state, change, work, time, kind, all_winches):
     slipped = True
     while slipped:
         if kind == CONSTRAINED:
-            resolve(robot, command, state, change, work, time)
-        forces(robot, command, state, change, work, time)
+            resolve(robot, command, state, change, work, time, parting)
+        else:
+            forces(robot, command, state, change, work, time)
         slipped = False
         if settings[DRIVE] == FORCES:
             for i in range(m):
