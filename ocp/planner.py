@@ -21,6 +21,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import number
 from ..models import Robot
@@ -99,10 +100,10 @@ def plan(
     Returns
     -------
     Plan
-        With status `feasible`; or `infeasible`, proven by the certificate, if the task fixes the motion or leaves
-        only its duration free; or `not-found`, with the certificate at the worst time of the closest motion known,
-        or with the limits that this exceeds. `Plan.stages` record the steps, `Plan.infeasible_spans` when tensions do
-        not exist, `Plan.relaxations` what would do: a duration, or looser limits.
+        With status `feasible`; or `infeasible` if no motion that the task allows is possible, proven by the certificate
+        or by a limit that all exceed; or `not-found`, with the certificate at the worst time of the closest motion
+        known, or with the limits that this exceeds. `Plan.stages` record the steps, `Plan.infeasible_spans` when
+        tensions do not exist, `Plan.relaxations` what would do: a duration, or looser limits.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def plan(
         return Planner(robot, read).plan(progress, start)
 
 
-class Planner:
+class Planner(Displayed):
     """Plan one task, any number of times: programs, solvers and the last solution, to start from, are kept.
 
     Parameters

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..display import Displayed, Fact, tensions_over_time
 from ..inputs import check_ending, file_path
 from ..netcdf import save_netcdf
 from ..solvers import Certificate
@@ -23,6 +24,11 @@ from .status import MotionStatus
 from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
+from .warnings.inside_bodies import into_places
+from .warnings.instants import Instants
+from .warnings.leaves_its_points import leaves_its_points
+from .warnings.warnings import warnings
+from .waypoint_distance import WaypointDistance, waypoint_distance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,10 +40,11 @@ if TYPE_CHECKING:
 __all__ = ["Plan", "Relaxed"]
 
 DRAWN_AT = 200  # times at which drawn robots are checked
+MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twice as many
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(Displayed):
     """A planned motion and its audit.
 
     Attributes
@@ -88,6 +95,20 @@ class Plan:
         """Return what a pickle holds: the relaxations, which are computed now, rather than what computes them."""
         return {**self.__dict__, "offers": partial(tuple, self.relaxations)}
 
+    def _headline(self) -> str:
+        from .reports.report import headline
+
+        return headline(self)
+
+    def _facts(self) -> Iterable[Fact]:
+        from .reports.report import facts_at_once
+
+        return facts_at_once(self)
+
+    def _picture(self) -> str:
+        robot, audit = self.scenario.robot, self.audit
+        return tensions_over_time(audit.times, audit.tensions, robot.t_min, robot.t_max)
+
     @property
     def feasible(self) -> bool:
         """Return whether the audit confirms every tension limit, and every other limit of task and robot."""
@@ -115,6 +136,28 @@ class Plan:
         """Return the largest distance of the platform from its path [m]."""
         return float(self.audit.tracking_error.max())
 
+    @cached_property
+    def waypoint_distance(self) -> WaypointDistance | None:
+        """Return the largest distance at which the motion passes a waypoint, and which; None for a path without.
+
+        Straight legs round their points by up to `blend`, and in a tube the motion may leave them farther. It is
+        measured on the motion.
+        """
+        scenario, audit = self.scenario, self.audit
+
+        def pose_at(times: np.ndarray) -> np.ndarray:
+            return scenario.pose_on_path(*scenario.motion(times, self.deviation))
+
+        stations = scenario.path.stations(scenario.duration)
+        if not stations.names:  # of a spline with the fastest time law, when it passes them is not known
+            stations = scenario.task.path.stations(scenario.duration)
+            stations = stations._replace(times=np.full(len(stations.names), np.nan))
+        if scenario.task.phases is not None:  # whose paths are the parts of a sequence
+            names = tuple(name.replace("parts", "phases", 1) for name in stations.names)
+            stations = stations._replace(names=names)
+        poses = scenario.pose_on_path(audit.motion, audit.carriers)
+        return waypoint_distance(stations, audit.times, poses, pose_at)
+
     @property
     def certificate(self) -> Certificate | None:
         """Return the proof with the largest shortfall, with its time and wind; None for a feasible plan.
@@ -137,6 +180,18 @@ class Plan:
     def relaxed(self) -> Relaxed | None:
         """Return the first of the relaxations; None if there is none."""
         return next(iter(self.relaxations), None)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what a person should know of the motion before a robot follows it, a sentence each.
+
+        A motion with warnings can be feasible: no limit of the task or the robot forbids what they are about.
+        """
+        audit, scenario = self.audit, self.scenario
+        some = slice(None, None, max(len(audit.times) // MOST_WARNED, 1))
+        seen = Instants(scenario.dynamics, audit.times[some], audit.motion.pose[some], audit.carriers.pose[some])
+        inside = into_places(seen, scenario.limits.all, [values[some] for values in audit.limited])
+        return (*leaves_its_points(scenario.task.path), *inside, *warnings(seen))
 
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:
@@ -184,6 +239,8 @@ class Plan:
             "tension_max": self.tension_max,
             "margin": self.margin,
             "tracking_error_max": self.tracking_error_max,
+            "warnings": list(self.warnings),
+            "waypoint_distance": None if self.waypoint_distance is None else self.waypoint_distance.to_dict(),
             "build_s": self.build_s,
             "solve_s": self.solve_s,
             "iterations": self.iterations,
@@ -301,7 +358,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Relaxed:
+class Relaxed(Displayed):
     """A feasible task near the one that was requested, and its plan.
 
     Attributes

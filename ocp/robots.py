@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..display import Displayed
 from ..models import Robot
 from ..robust import Spread, motion_factor
 from ..text import quantity
@@ -35,7 +36,7 @@ MOST_OF_CURVE = 2000  # instants for the lengths of the curves
 
 
 @dataclass(frozen=True)
-class RobustMargin:
+class RobustMargin(Displayed):
     """The differences of tensions between the robots of the uncertainty, along a plan, to first order.
 
     Attributes

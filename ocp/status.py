@@ -13,7 +13,7 @@ class MotionStatus(StrEnum):
 
     INFEASIBLE = "infeasible"
     """No motion that the task allows is possible, and that is proven: by the certificate of an instant at which no
-    tensions give the required wrench, or by the limits that a fixed motion exceeds (`Audit.excess`). If the task leaves
+    tensions give the required wrench, or by a limit that all these motions exceed (`Audit.excess`). If the task leaves
     the duration open, no duration and no time law that it allows are possible; the certificate is then that of the
     slowest motion, and `Plan.stages` state what excludes the others."""
 

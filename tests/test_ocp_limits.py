@@ -9,7 +9,8 @@ from hypothesis.extra.numpy import arrays
 
 from towline.errors import InputError
 from towline.models import load
-from towline.ocp import plan
+from towline.models.parsing import parse_yaml, to_yaml
+from towline.ocp import plan, read_task
 from towline.ocp.limits.clearance import between_cables, cable_outside, point_outside
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
@@ -184,3 +185,9 @@ def test_wrong_limits_are_one_line(limit, message):
         lay_out(load("ipanema-1"), Task.model_validate({"path": {"kind": "rest", "pose": [0, 0, 1]}, "limits": limit}))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_saved_task_keeps_distances_that_are_null():
+    place = {"kind": "sphere", "centre": [1, 1, 1], "radius": 0.1, "cables": None, "platform": None}
+    task = read_task({"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 1, "limits": {"keep_out": [place]}})
+    assert parse_yaml(to_yaml(task), Task, "task") == task

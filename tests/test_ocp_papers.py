@@ -112,3 +112,34 @@ def test_drift_is_that_of_a_falling_mass():
     assert towed.attitude == 0
     still = Motion(*(part.copy() for part in seen.motion))
     assert drift(found.scenario, seen.times, still, seen.carriers, seen.tensions).position < 1e-9
+
+
+def test_drift_that_leaves_all_numbers_is_infinite_and_no_error():
+    """A beam with little inertia about its length, spun by tensions far too large, on 4 cables of two quadrotors."""
+    from towline.models import Robot
+    from towline.ocp.audits.drift import drift
+    from towline.ocp.tasks.lay_out import lay_out
+    from towline.ocp.tasks.task import read_task
+
+    quadrotor = {"kind": "quadrotor", "mass": 1.2, "inertia": [0.01, 0.01, 0.02, 0, 0, 0], "thrust_max": 40}
+    quadrotor |= {"torque_max": [1, 1, 0.3]}
+    sides = [("left", -1), ("right", 1)]
+    cable = {"anchor": [0, 0, 0], "t_min": 0.5, "t_max": 60}
+    beam = Robot.model_validate(
+        {
+            "name": "beam",
+            "source": "a test",
+            "platform": {"mass": 1, "inertia": [0.34, 0.004, 0.34, 0, 0, 0]},
+            "carriers": [{**quadrotor, "name": name, "home": [0, side, 2.5, 0, 0, 0]} for name, side in sides],
+            "cables": [
+                {**cable, "carrier": name, "attachment": [0, side * y, 0.05]}
+                for name, side in sides
+                for y in (0.35, 0.95)
+            ],
+        }
+    )
+    line = {"kind": "line", "start": [0, 0, 1, 0, 0, 0], "end": [0.5, 0, 1, 0, 0, 0]}
+    scenario = lay_out(beam, read_task({"path": line, "duration": 1.0, "base": {"kind": "free"}}))
+    times = np.linspace(0, 1.0, 1001)
+    spun = drift(scenario, times, *scenario.motion(times, None), np.full((1001, 4), 1e4))
+    assert np.isinf([spun.window_position, spun.window_attitude]).all()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from towline.benchmarks import random_families
 from towline.benchmarks.random_families import FAMILIES, ROBOTS, random_task
 from towline.benchmarks.random_tasks import attempt, wrong
 from towline.models import load
@@ -34,3 +35,17 @@ def test_the_check_can_see():
         assert wrong(replace(found, audit=replace(audit, tensions=np.clip(tensions, -1e3, 1e9)))).startswith(
             "wrong: feasible"
         )
+
+
+def test_a_load_is_made_lighter_only_where_the_platform_can_rest_without_one(monkeypatch):
+    """The robot of seed 880032 cannot rest where it would lift: no load is light enough."""
+    tried, can_rest = [], random_families._can_rest
+
+    def counted(*arguments):
+        tried.append(arguments)
+        assert len(tried) < 1000
+        return can_rest(*arguments)
+
+    monkeypatch.setattr(random_families, "_can_rest", counted)
+    _, task = random_task("phases", 880032)
+    assert len(task.phases) == 5

@@ -6,28 +6,29 @@ program does not use. `tensions` has the tensions and the violation, `checks` al
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...display import Displayed
 from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
-from .by_phase import distribution, taken_up
-from .checks import START_TENSIONS, AuditedMotion, excesses
+from .checks import START_TENSIONS, excesses
+from .clearances import came_too_near
 from .drift import Drift, drift
 from .excess import Excess
-from .jumps import jumped_over
-from .tensions import INDEPENDENT, TOLERANCE, in_all_winds, scaled
+from .instants import instants
+from .peaks import with_peaks
+from .tensions import INDEPENDENT, TOLERANCE, scaled
 
 __all__ = ["Audit", "audit", "other_tensions_exist", "other_tensions_may_pass"]
 
 
 @dataclass(frozen=True)
-class Audit:
+class Audit(Displayed):
     """The dense evaluation of a motion.
 
     Attributes
@@ -39,8 +40,8 @@ class Audit:
     tensions_unlimited
         The tensions of least norm without limits, (n, m) [N]. Negative: the cable would have to push.
     violation
-        Distance of the required wrench from those that the cables can give at each time [N]; rounding errors where
-        the tensions exist.
+        Distance of the required wrench from those that the cables can give [N], the largest from each time to the
+        next; rounding errors where the tensions exist.
     tolerance
         The largest violation that passes [N].
     tracking_error
@@ -121,46 +122,34 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     """
     intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
     times = np.linspace(0.0, scenario.duration, intervals + 1)
-    robot = scenario.robot
-    motion, carriers = scenario.motion(times, deviation)
-    _check_lengths(scenario, times, motion, carriers)
-    A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
-    w = scenario.required_wrench(times, motion, carriers, scenario.wind)
-    distribute = distribution(scenario, times, A)
-    few, tolerance = distribute.few, distribute.tolerance
-    planned = _planned_tensions(deviation, times, robot.m)
-    result = distribute(w, taken_up(scenario, times) if planned is None else planned)
-    tensions, supports, certificate = result.tensions, result.supports, result.certificate
-    if (box := scenario.wind_box) is not None:
-        result, certificate = in_all_winds(distribute, box, motion, w, result)
-    if certificate is not None and result.row is not None:
-        certificate = replace(certificate, time=float(times[result.row]))
-    off_path = scenario.off_path(times, motion, carriers)
-    audited = AuditedMotion(scenario, deviation, times, motion, carriers, tensions, off_path)
-    limited = audited.limited()
-    exceeded = excesses(audited, limited) + jumped_over(audited, limited)
-    if result.beyond > TOLERANCE and result.row is not None:
+    regular = instants(scenario, deviation, times)
+    seen = regular if to_show else with_peaks(scenario, regular)
+    exceeded = excesses(seen, seen.values) + came_too_near(seen, seen.values)
+    beyond, at = seen.beyond
+    if beyond > TOLERANCE:
         why = "wrench error of tensions inside their limits less the margin"
-        at = float(times[result.row])
-        exceeded.append(Excess("tensions", "platform", at, result.beyond, 0.0, "N", "exactly", why))
+        exceeded.append(Excess("tensions", "platform", at, beyond, 0.0, "N", "exactly", why))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
     hangs = not (scenario.phases.carry or scenario.phases.rest)
-    followed = not to_show and few and hangs and np.isfinite(tensions).all()
+    motion, carriers, tensions = regular.motion, regular.carriers, regular.tensions
+    followed = not to_show and regular.few and hangs and np.isfinite(tensions).all()
+    violation = np.zeros(len(times))
+    np.maximum.at(violation, np.searchsorted(times, seen.times, side="right") - 1, seen.violation)
     return Audit(
         rate=(len(times) - 1) / scenario.duration,
         times=times,
         motion=motion,
         carriers=carriers,
         tensions=tensions,
-        tensions_unlimited=distribute.unlimited(w),
-        violation=result.violation,
-        tolerance=tolerance,
-        supports=supports,
-        tracking_error=np.linalg.norm(off_path[:, :3], axis=1),
+        tensions_unlimited=regular.tensions_unlimited,
+        violation=violation,
+        tolerance=regular.tolerance,
+        supports=regular.supports,
+        tracking_error=np.linalg.norm(regular.off_path[:, :3], axis=1),
         excess=[excess for excess in exceeded if excess.limit not in soft],
         soft_excess=[excess for excess in exceeded if excess.limit in soft],
-        limited=limited,
-        certificate=certificate,
+        limited=regular.values,
+        certificate=seen.certificate,
         drift=drift(scenario, times, motion, carriers, tensions) if followed else None,
     )
 
@@ -186,22 +175,3 @@ def _audits_per_output(scenario: Scenario) -> int:
     """Return how many audited instants each sample of the output stands for: the saved instants are audited ones."""
     intervals = max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS)
     return max(int(np.ceil(intervals / scenario.output_samples - 1e-9)), 1)
-
-
-def _check_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion) -> None:
-    """Raise InputError if somewhere a cable has no length."""
-    lengths = scenario.dynamics.cable_lengths(motion.pose, carriers.pose)
-    if (lengths > 1e-9).all():
-        return
-    row, cable = np.argwhere(~(lengths > 1e-9))[0]
-    raise InputError(
-        f"task {scenario.task.name!r}: path must be one on which every cable has a length, got one on which anchor and "
-        f"attachment of cable {cable + 1} coincide at t = {times[row]:.3f} s"
-    )
-
-
-def _planned_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> np.ndarray | None:
-    """Return the plan's tensions between its nodes, so that a redundant robot keeps the planned distribution."""
-    if deviation is None:
-        return None
-    return np.stack([np.interp(times, deviation.nodes, deviation.tensions[:, i]) for i in range(m)], axis=1)

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...display import Displayed
 from ...models.part import COORDINATES
+from ..limits.distance import Distance
 from ..tasks.deviation import Deviation
 from ..tasks.ends import at_rest_without_acceleration, carrier_ends, platform_ends
 from ..tasks.paths import Motion, WaypointPath
@@ -39,7 +41,7 @@ _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 
 @dataclass(frozen=True)
-class AuditedMotion:
+class AuditedMotion(Displayed):
     """A motion on a dense grid with its tensions, and the scenario and deviation that it was made from."""
 
     scenario: Scenario
@@ -49,12 +51,6 @@ class AuditedMotion:
     carriers: Motion  # (n, c, 6) each
     tensions: np.ndarray  # (n, m) [N], nan where there are none
     off_path: np.ndarray  # (n, 6) [m, rad], along the path's axes
-
-    def limited(self) -> list[np.ndarray]:
-        """Return what each limit bounds over time, (n, k), in its unit."""
-        limits = self.scenario.limits
-        values = limits.along(self.motion, self.carriers, self.tensions, self.off_path)
-        return [limit.over(self.times, its) for limit, its in zip(limits, values, strict=True)]
 
 
 def excesses(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
@@ -70,6 +66,8 @@ def _limits(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
     # A limit of tensions is not checked where there are none; any other value that is nan exceeds its limit.
     there = np.where(np.isfinite(audited.tensions).all(axis=1, keepdims=True), 0.0, np.nan)
     for limit, values in zip(limits, limited, strict=True):
+        if isinstance(limit, Distance):
+            continue  # `clearances` bounds them over all time
         beyond = np.maximum(limit.low - values, values - limit.high)
         unchecked = np.isnan(limit.over(audited.times, there)) if limit.name in limits.of_tensions else False
         beyond = np.where(np.isnan(beyond), np.where(unchecked, -np.inf, np.inf), beyond)

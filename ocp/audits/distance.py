@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...tolerances import NEGLIGIBLE
+from ...tolerances import ORTHOGONAL
 
 __all__ = ["Distances", "distances"]
 
@@ -121,7 +121,8 @@ def _times(A: np.ndarray, t: np.ndarray) -> np.ndarray:
 def _support(A: np.ndarray, direction: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return the most that tensions inside the limits give along each direction, (n,) [N]."""
     pull = np.einsum("nij,ni->nj", A, direction)
-    small = np.abs(pull) <= NEGLIGIBLE * np.linalg.norm(A, axis=1).max(axis=1, keepdims=True)
-    pull = np.where(small, 0.0, pull)
-    at = np.where(small, 0.0, np.where(pull > 0, high, low))
-    return (pull * at).sum(axis=1)
+    limit = np.where(pull > 0, high, low)
+    # A cable without a limit gives any amount, unless its pull is the rounding of its own wrench.
+    endless = ~np.isfinite(limit)
+    gives = np.abs(pull) > ORTHOGONAL * np.linalg.norm(A, axis=1)
+    return np.where(endless, np.where(gives, np.inf, 0.0), pull * np.where(endless, 0.0, limit)).sum(axis=1)

@@ -70,10 +70,15 @@ def _run(
     stride: int,
     step: float,
 ) -> np.ndarray:
-    """Return poses (count, k, 6) after each of `count` steps of 2 `stride` samples, from the plan at `rows` (k,)."""
+    """Return poses (count, k, 6) after each of `count` steps of 2 `stride` samples, from the plan at `rows` (k,).
+
+    Where a run diverges beyond all numbers it ends: from there on the poses are nan.
+    """
     h = 2 * stride * step
 
     def slope(state: np.ndarray, at: np.ndarray) -> np.ndarray:
+        if not np.isfinite(state).all():
+            return np.full_like(state, np.nan)
         pose, velocity = state[:, :6], state[:, 6:]
         carrier_pose, tensions = (values[at] for values in inputs)
         return np.hstack(
@@ -81,8 +86,10 @@ def _run(
         )
 
     state = np.hstack([motion.pose[rows], motion.velocity[rows]])
-    poses = np.empty((count, len(rows), 6))
+    poses = np.full((count, len(rows), 6), np.nan)
     for k in range(count):
+        if not np.isfinite(state).all():
+            break
         first = slope(state, rows)
         middle = slope(state + h / 2 * first, rows + stride)
         again = slope(state + h / 2 * middle, rows + stride)

@@ -7,13 +7,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...display import Displayed
 from ...text import quantity
 
 __all__ = ["Excess"]
 
 
 @dataclass(frozen=True)
-class Excess:
+class Excess(Displayed):
     """One limit at the instant where it is exceeded by most. Its text is the sentence in a report.
 
     Attributes

@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...display import Displayed
 from ...text import quantity
 from ..nlp.guess import guess_through
 from ..tasks.deviation import Deviation
@@ -38,7 +39,7 @@ PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a 
 
 
 @dataclass(frozen=True)
-class GlobalPath:
+class GlobalPath(Displayed):
     """Configurations from start to end of a motion, each to be reached straight from the one before."""
 
     space: Space

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.random import Generator
 
+from ...display import Displayed
 from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths.rest_to_rest import rest_to_rest
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
@@ -39,7 +40,7 @@ AROUND = 1.0  # of the distance of the ends, about them: where a platform withou
 
 
 @dataclass(frozen=True)
-class Space:
+class Space(Displayed):
     """The coordinates of a scenario's motions: (platform's free coordinates, shape of the formation)."""
 
     scenario: Scenario

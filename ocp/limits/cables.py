@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from ...models import Robot
 from .clearance import between_cables
+from .distance import Distance, Pair
 from .limit import Limit
 from .state import State
 
@@ -51,10 +52,10 @@ class CableLength(Limit):
         return state.run.lengths
 
 
-class CableClearance(Limit):
+class CableClearance(Distance):
     """Keep cables apart that share neither anchor nor attachment."""
 
-    name, unit, per_metre = "cable_clearance", "m", 2.0
+    name, per_metre = "cable_clearance", 2.0
 
     def __init__(self, robot: Robot, least: float):
         self.low, self.scale = least, least
@@ -62,10 +63,13 @@ class CableClearance(Limit):
         self.labels = tuple(f"cables {i + 1} and {j + 1}" for i, j in self._pairs)
 
     @override
-    def values(self, state: State) -> ca.SX:
-        ends, anchors = state.attachments, state.anchors
-        pairs = self._pairs
-        return ca.vertcat(*(between_cables(ends[:, i], anchors[:, i], ends[:, j], anchors[:, j]) for i, j in pairs))
+    def pairs(self, state: State) -> list[Pair]:
+        cables = [ca.horzcat(state.attachments[:, i], state.anchors[:, i]) for i in range(state.robot.m)]
+        return [Pair(cables[i], cables[j]) for i, j in self._pairs]
+
+    @override
+    def apart(self, pair: Pair) -> ca.SX:
+        return between_cables(*ca.horzsplit(pair.points), *ca.horzsplit(pair.others))
 
 
 def _share_an_end(robot: Robot, i: int, j: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import casadi as ca
@@ -9,6 +10,7 @@ from typing_extensions import override
 
 from ...models import Robot
 from .clearance import between_points
+from .distance import Distance, Pair
 from .limit import Angle, Hull, Limit, Magnitude
 from .state import State
 
@@ -99,17 +101,21 @@ class CarrierReach(Limit):
         return state.carriers[self._index].pose[self._axis]
 
 
-class CarrierSeparation(Limit):
-    """Keep the origins of all carriers apart."""
+class CarrierSeparation(Distance):
+    """Keep the origins of pairs of carriers apart; default: of all."""
 
-    name, unit = "carrier_separation", "m"
+    name = "carrier_separation"
 
-    def __init__(self, robot: Robot, least: float):
+    def __init__(self, robot: Robot, least: float, pairs: Sequence[tuple[int, int]] | None = None):
         self.low, self.scale = least, least
-        self._pairs = list(combinations(range(len(robot.carriers)), 2))
+        self._pairs = list(combinations(range(len(robot.carriers)), 2)) if pairs is None else pairs
         self.labels = tuple(f"{robot.carriers[i].name} and {robot.carriers[j].name}" for i, j in self._pairs)
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def pairs(self, state: State) -> list[Pair]:
         at = [carrier.position for carrier in state.carriers]
-        return ca.vertcat(*(between_points(at[i], at[j]) for i, j in self._pairs))
+        return [Pair(at[i], at[j]) for i, j in self._pairs]
+
+    @override
+    def apart(self, pair: Pair) -> ca.SX:
+        return between_points(pair.points, pair.others)

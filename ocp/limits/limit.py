@@ -86,8 +86,8 @@ class Limit(ABC):
         How much a value can change while each point of the platform moves by at most one metre and all else stays;
         infinite if that is not known. Of a distance it is one. With it the planner proves that a place is in the way.
     thickness
-        Of a distance from a place, how thin this is [m]: between two instants a motion may jump over what is thinner
-        than the motion, so the audit looks more closely there. Infinite: it is not checked.
+        Of a distance from a place, how thin this is [m]: between two nodes a motion may jump over what is thinner than
+        a step, so the program keeps the distance on the way between them. Infinite: it is no place.
     """
 
     name: str = "limit"
@@ -122,6 +122,7 @@ class Limit(ABC):
             (k, 1).
         shrink
             Part of `scale` by which the bounds move inwards; none of an equation, and none of a convex limit of poses.
+            The values are the same ones, whatever it is.
         """
         reserve = 0.0 if self.is_equation or (self.is_convex and self.order == 0) else shrink * self.scale
         return Rows(values / self.scale, (self.low + reserve) / self.scale, (self.high - reserve) / self.scale)
@@ -184,8 +185,8 @@ class Limit(ABC):
 class Magnitude(Limit):
     """A limit of the length of a vector: `values` are its components, `high` bounds their root sum square.
 
-    At the nodes of a program the root is rounded at zero, where a motion rests and a norm has a corner; at the bound it
-    is then 5e-7 too large. On Bernstein points the square is limited, which has no corner.
+    At the nodes of a program the root is rounded at zero, where a motion rests and a norm has a corner, and the bound
+    by the same. On Bernstein points the square is limited, which has no corner.
     """
 
     def __init__(self, most: float):
@@ -194,10 +195,11 @@ class Magnitude(Limit):
     @override
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
         if self.is_convex:
-            most = self.high if self.order == 0 else self.high * (1.0 - shrink)
-            return Rows(ca.sumsqr(values) / most**2, -np.inf, 1.0)
-        size = ca.sqrt(ca.sumsqr(values) + (ROUNDING * self.high) ** 2)
-        return Rows(size / self.scale, 0.0, (self.high - shrink * self.scale) / self.scale)
+            most = 1.0 if self.order == 0 else 1.0 - shrink
+            return Rows(ca.sumsqr(values) / self.high**2, -np.inf, most**2)
+        rounding = ROUNDING * self.high
+        size = ca.sqrt(ca.sumsqr(values) + rounding**2)
+        return Rows(size / self.scale, 0.0, float(np.hypot(self.high - shrink * self.scale, rounding)) / self.scale)
 
     @override
     def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:

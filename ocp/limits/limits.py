@@ -6,25 +6,71 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ...errors import InputError
 from ...models import Robot
+from .distance import Distance, Pair
 from .limit import Limit
 from .state import Body, State
 
-__all__ = ["Limits"]
+__all__ = ["BLOCK", "Limits", "Separating", "in_blocks", "motions"]
 
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
 
 BLOCK = 64  # instants: to make a map of all costs more than to evaluate it
 
 
+class Separating(NamedTuple):
+    """The distances of a limit, and planes between its bodies, for `BLOCK` instants.
+
+    Attributes
+    ----------
+    moving
+        How many points the first body of each pair has.
+    pairs
+        How many pairs it has.
+    points
+        Motions of platform and carriers, (18,) each -> points of all pairs, one after the other.
+    plane
+        The points of a pair -> its distance, and the derivative by a shift of the first body: the direction of a plane
+        between the bodies, (4,).
+    """
+
+    moving: int
+    pairs: int
+    points: ca.Function
+    plane: ca.Function
+
+
+def motions(platform: Motion, carriers: Motion) -> list[np.ndarray]:
+    """Return the motions (n, 18) of platform and each carrier: pose, velocity, acceleration side by side."""
+    bodies = [platform, *zip(*(np.moveaxis(part, 1, 0) for part in carriers), strict=True)]
+    return [np.hstack(body) for body in bodies]
+
+
+def in_blocks(block: ca.Function, arguments: list[np.ndarray]) -> np.ndarray:
+    """Return the values (n, k) of a function of one instant, mapped to `BLOCK` of them, for arguments (n, .) each."""
+    n = len(arguments[0])
+    whole = [np.concatenate([each, np.repeat(each[-1:], -n % BLOCK, axis=0)]) for each in arguments]
+    values = np.empty((len(whole[0]), block.size1_out(0)))
+    buffer: Any  # in place: as DM the arguments would take longer than all that is computed
+    buffer, evaluate = block.buffer()
+    for start in range(0, len(values), BLOCK):
+        rows = slice(start, start + BLOCK)
+        for i, each in enumerate(whole):
+            buffer.set_arg(i, each[rows].data)
+        buffer.set_res(0, values[rows].data)
+        evaluate()
+    return values[:n]
+
+
 @dataclass(frozen=True, eq=False)
-class Limits:
+class Limits(Displayed):
     """Limits in the order of their values; iterating gives them one by one."""
 
     robot: Robot
@@ -120,6 +166,35 @@ class Limits:
         values = limit.on_the_way(first, second)
         return None if values is None else ca.Function("on_the_way", whole, [values])
 
+    def separating(self, limit: Distance) -> Separating:
+        """Return the functions that bound the distances of a limit over time."""
+        if limit not in self._separating:
+            pairs = limit.pairs(self._state)
+            first, second = (ca.SX.sym("p", 3, part.shape[1]) for part in pairs[0])
+            shift = ca.SX.sym("shift", 3)
+            apart = limit.apart(Pair(first + ca.repmat(shift, 1, first.shape[1]), second))
+            plane = ca.substitute(ca.horzcat(apart, ca.jacobian(apart, shift)), shift, ca.SX.zeros(3))
+            points = ca.vec(ca.horzcat(first, second))
+            self._separating[limit] = Separating(
+                moving=first.shape[1],
+                pairs=len(pairs),
+                points=self._of_bodies(ca.vertcat(*(ca.vec(ca.horzcat(*pair)) for pair in pairs))).map(BLOCK),
+                plane=ca.Function("plane", [points], [ca.densify(ca.vec(plane))], {"cse": True}).map(BLOCK),
+            )
+        return self._separating[limit]
+
+    @cached_property
+    def _separating(self) -> dict[Limit, Separating]:
+        return {}
+
+    def _of_bodies(self, values: ca.SX) -> ca.Function:
+        """Return the function of values from the motions of platform and carriers, (18,) each."""
+        bodies = [self._state.platform, *self._state.carriers]
+        inner = ca.Function("of_parts", [part for body in bodies for part in body], [ca.densify(values)])
+        whole = [ca.SX.sym(f"body{i}", 18) for i in range(len(bodies))]
+        given = [part for body in whole for part in ca.vertsplit(body, 6)]
+        return ca.Function("of_bodies", whole, [inner(*given)])
+
     def along(
         self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None
     ) -> list[np.ndarray]:
@@ -137,21 +212,11 @@ class Limits:
         if not self.all:
             return []
         n = len(platform[0])
-        bodies = [platform, *zip(*(np.moveaxis(part, 1, 0) for part in carriers), strict=True)]
-        arguments = [np.hstack(body) for body in bodies]
+        arguments = motions(platform, carriers)
         arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
-        whole = [np.concatenate([each, np.repeat(each[-1:], -n % BLOCK, axis=0)]) for each in arguments]
-        values = np.empty((len(whole[0]), self.places[-1].stop))
-        buffer: Any  # in place: as DM the arguments would take longer than all that is computed
-        buffer, evaluate = self._of_block.buffer()
-        for start in range(0, len(values), BLOCK):
-            block = slice(start, start + BLOCK)
-            for i, each in enumerate(whole):
-                buffer.set_arg(i, each[block].data)
-            buffer.set_res(0, values[block].data)
-            evaluate()
-        return [values[:n, place] for place in self.places]
+        values = in_blocks(self._of_block, arguments)
+        return [values[:, place] for place in self.places]
 
     @cached_property
     def _of_block(self) -> ca.Function:

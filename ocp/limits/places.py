@@ -14,7 +14,7 @@ from typing_extensions import override
 from ...models import Robot
 from .cables import names
 from .clearance import Place, cable_outside, point_outside
-from .limit import Limit
+from .distance import Distance, Pair
 from .state import State
 
 __all__ = ["CablesOutside", "CarriersOutside", "PlatformOutside"]
@@ -22,7 +22,7 @@ __all__ = ["CablesOutside", "CarriersOutside", "PlatformOutside"]
 CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it between nodes does not cut a corner
 
 
-class _Outside(Limit):
+class _Outside(Distance):
     """Keep out of a place.
 
     Parameters
@@ -37,22 +37,22 @@ class _Outside(Limit):
         Distance to keep [m].
     """
 
-    unit, per_metre = "m", 1.0
+    per_metre = 1.0
 
     def __init__(self, place: Place, called: str, riding: bool, least: float):
-        self._place, self._called, self._riding, self.low = place, called, riding, least
+        self._place, self.called, self._riding, self.low = place, called, riding, least
         self.thickness = place.thickness
         if riding:  # what is far from the platform moves farther in its frame than its points in {G}
             self.per_metre = np.inf
 
     @override
     def about(self, index: int) -> str:
-        return f"{self.labels[index]} outside {self._called}"
+        return f"{self.labels[index]} outside {self.called}"
 
     @property
     @override
     def title(self) -> str:
-        return f"{self.name}, {self._called}"
+        return f"{self.name}, {self.called}"
 
     @override
     def share_beyond(self, value: float) -> float:
@@ -63,9 +63,10 @@ class _Outside(Limit):
         """Return points (3, k) of {G} in the frame of the place."""
         return state.on_platform(points) if self._riding else points
 
-    def _outside(self, points: ca.SX) -> ca.SX:
-        """Return the distances of points (3, k) of the place's frame, (k, 1) [m]."""
-        return ca.vertcat(*(point_outside(self._place, point) for point in ca.horzsplit(points)))
+    @override
+    def apart(self, pair: Pair) -> ca.SX:
+        outside = point_outside if pair.points.shape[1] == 1 else cable_outside
+        return outside(self._place, *ca.horzsplit(pair.points))
 
     def _way_outside(self, points: ca.SX, later: ca.SX) -> ca.SX:
         """Return the distances of the lines from points (3, k) to others (3, k) of the place's frame, (k, 1) [m]."""
@@ -83,8 +84,8 @@ class PlatformOutside(_Outside):
         self.labels = ("platform",) * (1 + robot.m)
 
     @override
-    def values(self, state: State) -> ca.SX:
-        return self._outside(self._points_of(state))
+    def pairs(self, state: State) -> list[Pair]:
+        return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(self._points_of(state))]
 
     @override
     def on_the_way(self, first: State, second: State) -> ca.SX:
@@ -101,18 +102,18 @@ class CarriersOutside(_Outside):
         super().__init__(place, called, riding, least)
         self.name = "carrier_platform_clearance" if riding else "keep_out"
         self.labels = tuple(robot.carriers[index].name for index in which)
-        self._which = which
+        self.which = which
 
     @override
-    def values(self, state: State) -> ca.SX:
-        return self._outside(self._points_of(state))
+    def pairs(self, state: State) -> list[Pair]:
+        return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(self._points_of(state))]
 
     @override
     def on_the_way(self, first: State, second: State) -> ca.SX:
         return self._way_outside(self._points_of(first), self._points_of(second))
 
     def _points_of(self, state: State) -> ca.SX:
-        return self._points(state, ca.horzcat(*(state.carriers[index].position for index in self._which)))
+        return self._points(state, ca.horzcat(*(state.carriers[index].position for index in self.which)))
 
 
 class CablesOutside(_Outside):
@@ -124,8 +125,7 @@ class CablesOutside(_Outside):
         self.labels = names(robot)
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def pairs(self, state: State) -> list[Pair]:
         anchors = self._points(state, state.anchors)
         ends = ca.SX(ca.DM(state.robot.attachments.T)) if self._riding else state.attachments
-        outside = (cable_outside(self._place, ends[:, i], anchors[:, i]) for i in range(state.robot.m))
-        return ca.vertcat(*outside)
+        return [Pair(ca.horzcat(ends[:, i], anchors[:, i]), ca.SX(3, 0)) for i in range(state.robot.m)]

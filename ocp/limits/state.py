@@ -9,6 +9,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ...models import Robot, kinematics
 from ...models.cables.pulley import Exit
 from ...models.carriers import Effort
@@ -37,7 +38,7 @@ class Body(NamedTuple):
 
 
 @dataclass(frozen=True)
-class State:
+class State(Displayed):
     """Everything that there is at one instant, in {G}.
 
     Attributes

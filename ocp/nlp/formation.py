@@ -15,6 +15,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
@@ -35,7 +36,7 @@ AHEAD = 0.1  # of the path: where it begins to change
 
 
 @dataclass(frozen=True)
-class Formation:
+class Formation(Displayed):
     """The deviation of a formation from that at home, along the path.
 
     Attributes

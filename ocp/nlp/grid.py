@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...display import Displayed
 from ..tasks.scenario import Scenario
 
 __all__ = ["Grid"]
@@ -14,7 +15,7 @@ LEAST = 4  # steps of a phase, where there are enough
 
 
 @dataclass(frozen=True)
-class Grid:
+class Grid(Displayed):
     """The points of a program.
 
     Attributes

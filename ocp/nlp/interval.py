@@ -11,6 +11,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ..limits import Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values
@@ -46,7 +47,7 @@ class Points(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Interval:
+class Interval(Displayed):
     """One interval as functions of its columns: all but the end's, one below the other, and the end's.
 
     Attributes
@@ -102,7 +103,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
 
     _chain_rows(layout, h, given, columns, own, values, rows)
     values.append(x_end[layout.shared] - x[layout.shared])
-    rows += [("shared", 0.0, 0.0)] * len(layout.carried)
+    rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
     flow = ca.Function("flow", [x, x_end, numbers], [_end(layout, h, given, columns, own)])
     gaps = len(rows)
 
@@ -169,11 +170,11 @@ def _chain_rows(
     """Add rows: the end is the result of the integration."""
     x_end, n = columns[-1], layout.n
     values += [x_end[layout.q] - own.position[-1], (x_end[layout.v] - own.speed[-1]) * h]
-    rows += [("position", 0.0, 0.0)] * n + [("velocity", 0.0, 0.0)] * n
+    rows += [Row("position", 0.0, 0.0)] * n + [Row("velocity", 0.0, 0.0)] * n
     if layout.derivatives > 3:
         a, jerk = _smooth_end(layout, h, given, columns)
         values += [x_end[layout.a] - a, x_end[layout.jerk] - jerk]
-        rows += [("acceleration", 0.0, 0.0)] * n + [("jerk", 0.0, 0.0)] * n
+        rows += [Row("acceleration", 0.0, 0.0)] * n + [Row("jerk", 0.0, 0.0)] * n
 
 
 def _end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points) -> ca.SX:
@@ -203,11 +204,11 @@ def _inner_rows(
         values += [column[layout.q] - bernstein.value(own.position, share)]
         values += [(column[layout.v] - bernstein.value(own.speed, share)) * h]
         values.append(column[layout.shared] - columns[0][layout.shared])
-        rows += [("position", 0.0, 0.0)] * n + [("velocity", 0.0, 0.0)] * n
-        rows += [("shared", 0.0, 0.0)] * len(layout.carried)
+        rows += [Row("position", 0.0, 0.0)] * n + [Row("velocity", 0.0, 0.0)] * n
+        rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
     if not scenario.scheme.continuous:
         values.append(columns[0][layout.a] - own.acceleration[0])
-        rows += [("acceleration", 0.0, 0.0)] * n
+        rows += [Row("acceleration", 0.0, 0.0)] * n
 
 
 def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points, a_end: ca.SX) -> ca.SX:
@@ -276,7 +277,7 @@ def _rate_rows(
         if isinstance(limit, Rate):
             for share, first, second in _pieces(scenario, at_points):
                 rate = (second[place] - first[place]) / (h * share)
-                more, named = bounded(limit, rate, mesh, layout.slack(columns[0], limit))
+                more, named = bounded(limit, rate, mesh, layout.slack(columns[0], limit), {})
                 values += more
                 rows += named
 
@@ -285,14 +286,14 @@ def _way_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], moving: list[list[list[ca.SX]]]
 ) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
     """Yield index, values and rows of the distances from thin places on the straight way from point to point."""
-    at_points = []
+    at_points, held = [], mesh.held(scenario)
     for platform, *carriers in moving:
         at_points.append([ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)])
     for limit, on_the_way in swept(scenario, mesh).items():
         values: list[ca.SX] = []
         rows: list[Row] = []
         for first, second in pairwise(at_points):
-            more, named = bounded(limit, on_the_way(*first, *second), mesh, layout.slack(columns[0], limit))
+            more, named = bounded(limit, on_the_way(*first, *second), mesh, layout.slack(columns[0], limit), held)
             values += more
             rows += named
         yield scenario.limits.all.index(limit), values, rows
@@ -311,6 +312,7 @@ def _hull_rows(
     rows: list[Row],
 ) -> None:
     """Add the hard convex limits at the Bernstein points: so they hold between the nodes too."""
+    held = mesh.held(scenario)
     for limit in scenario.limits:
         hull = limit.hull
         if hull is None or not limit.is_convex or not scenario.moves(hull):
@@ -323,7 +325,7 @@ def _hull_rows(
             points = points[1:-1]
         evaluate = scenario.limits.hull(limit)
         for point in points:
-            more, named = bounded(limit, evaluate(point), mesh, None)
+            more, named = bounded(limit, evaluate(point), mesh, None, held)
             values += more
             rows += named
 

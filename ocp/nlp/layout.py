@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from ...display import Displayed
 from ..limits import Limit
 from ..tasks.scenario import Scenario
 
@@ -15,7 +16,7 @@ DURATION, MARGIN = "duration", "margin"
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(Displayed):
     """The column of a point.
 
     It has q, v, a (n each), tensions (m), those in each decisive wind of a box (m each), forces of the ground, missing

@@ -11,6 +11,7 @@ from typing import Self
 
 import numpy as np
 
+from ...display import Displayed
 from ..limits import Limit
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
@@ -19,7 +20,7 @@ __all__ = ["Near", "has_places", "is_local"]
 
 
 @dataclass(frozen=True)
-class Near:
+class Near(Displayed):
     """The points at which a program keeps each limit, (limits, points): of limits that are not local all."""
 
     chosen: np.ndarray

@@ -86,16 +86,16 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
 
     values: list[ca.SX] = balances
     axes = ("fx", "fy", "fz", "mx", "my", "mz")
-    rows: list[Row] = [(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving]
+    rows: list[Row] = [Row(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving]
     if robot.fixed_lengths is not None and not scenario.relative:
         lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
         values.append((lengths / robot.fixed_lengths) ** 2)  # squared: no square root in the derivatives
-        rows += [(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
+        rows += [Row(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
     if (place := layout.at(MARGIN)) is not None:
         low, high = (np.tile(bound / robot.force_scale, 1 + layout.winds) for bound in scenario.bounds())
         all_tensions = ca.vertcat(x[layout.tensions], x[layout.wind_tensions])
         values += [all_tensions - x[place] - low, high - x[place] - all_tensions]
-        rows += [("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
+        rows += [Row("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
     cost += _slack_cost(scenario, mesh, layout, x)
     off_path = spread(scenario, None) @ x[layout.q]
     local = []
@@ -153,7 +153,7 @@ def _limit_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX]
 ) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
     """Yield index, values and rows of each limit that holds at a node; `interval` has those between two points."""
-    limits = scenario.limits
+    limits, held = scenario.limits, mesh.held(scenario)
     if not limits.all:
         return
     evaluated, on_the_way = limits.function(*state), swept(scenario, mesh)
@@ -162,7 +162,7 @@ def _limit_rows(
         elsewhere = isinstance(limit, Rate) or limit in on_the_way
         if elsewhere or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
-        yield index, *bounded(limit, evaluated[place], mesh, layout.slack(x, limit))
+        yield index, *bounded(limit, evaluated[place], mesh, layout.slack(x, limit), held)
 
 
 def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:

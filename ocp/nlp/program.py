@@ -25,6 +25,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values
@@ -35,6 +36,7 @@ from ..tasks.scheme import Scheme
 from .columns import Columns
 from .derivatives import Block, Mapped, derivatives
 from .grid import Grid
+from .held import eased, held_wrench
 from .interval import Interval, Points, interval_of, points
 from .layout import DURATION, MARGIN, Layout
 from .near import Near
@@ -46,7 +48,7 @@ __all__ = ["Program", "build"]
 
 
 @dataclass(frozen=True)
-class Program:
+class Program(Displayed):
     """A nonlinear program in CasADi's form, its bounds, and how to read its solution.
 
     Attributes
@@ -206,7 +208,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         Block(between.values[first:, :], interval.rows[first:], np.arange(steps), between),
         *_single_rows(scenario, layout, X, X_end, grid.steps),
     ]
-    g, rows, stages = put_in_order(unknowns, blocks)
+    g, bounds, stages = put_in_order(unknowns, blocks, grid)
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
     return Program(
         scenario=scenario,
@@ -216,8 +218,8 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         problem={"x": unknowns.x, "f": objective, "g": g} | ({} if p is None else {"p": p}),
         lower=np.where(unknowns.copies, -np.inf, lower[unknowns.order]),
         upper=np.where(unknowns.copies, np.inf, upper[unknowns.order]),
-        lower_g=np.array([row[1] for row in rows]),
-        upper_g=np.array([row[2] for row in rows]),
+        lower_g=bounds[:, 0],
+        upper_g=bounds[:, 1],
         order=unknowns.order,
         stages=stages,
         near=near,
@@ -299,16 +301,16 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, len
     if carrier_ends(scenario.task) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
         picked = [block * layout.n + i for block in range(layout.derivatives) for i in carriers]
-        rows: list[Row] = [("periodic", 0.0, 0.0)] * len(picked)
+        rows: list[Row] = [Row("periodic", 0.0, 0.0)] * len(picked)
         blocks.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
     if not scenario.scheme.continuous and layout.n:
         k = steps - 1
         left = _polynomials(scenario, layout, X, X_end, lengths, k).acceleration[-1]
-        rows = [("acceleration", 0.0, 0.0)] * layout.n
+        rows = [Row("acceleration", 0.0, 0.0)] * layout.n
         blocks.append(Block(X_end[layout.a, k] - left, rows, np.array([k])))
     if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
         # Values at the nodes leave a cubic spline one freedom at each end, which would be used where nobody looks.
-        rows = [("snap", 0.0, 0.0)] * len(ending)
+        rows = [Row("snap", 0.0, 0.0)] * len(ending)
         for k in (0, steps - 1):
             change = (X_end[layout.snap, k] - X[layout.snap, k])[ending]
             blocks.append(Block(change, rows, np.array([k])))
@@ -335,7 +337,7 @@ def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, l
     for share, off in zip(shares[1:-1], missed[1:-1], strict=True):
         k = min(int(share * steps), steps - 1)
         position = _polynomials(scenario, layout, X, X_end, lengths, k).position
-        rows: list[Row] = [("waypoint", float(value), float(value)) for value in off]
+        rows = [Row("waypoint", float(value), float(value)) for value in off]
         blocks.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
     return blocks
 
@@ -346,6 +348,9 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
     lower, upper = (np.full((len(nodes), layout.width), bound) for bound in (-np.inf, np.inf))
     low, high = scenario.bounds_at(nodes)
     reserve = np.minimum(mesh.reserve, (high - low) / 4)
+    if mesh.reserve:
+        shares = nodes / nodes[-1]
+        reserve = reserve * eased(held_wrench(scenario, mesh.reserve), shares, shares)[:, None]
     for end, state in ((0, scenario.task.initial), (-1, scenario.task.final)):
         if state is not None:
             reserve[end] = 0.0  # what is given there may be next to a limit

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ..limits import Limit
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
+from .held import Spans, held_spans
 from .layout import DURATION, Layout
 
 __all__ = [
@@ -29,11 +32,20 @@ __all__ = [
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 MANY = 12  # free coordinates: robots with more are teams
-Row: TypeAlias = tuple[str, float, float]  # name, lower and upper bound
+
+
+class Row(NamedTuple):
+    """A row of a program: its bounds, by how much these move inwards, and when the task fixes what it bounds."""
+
+    name: str
+    low: float
+    high: float
+    tighter: tuple[float, float] = (0.0, 0.0)  # lower and upper bound
+    held: Spans = ()
 
 
 @dataclass(frozen=True)
-class Mesh:
+class Mesh(Displayed):
     """The number of intervals of a program, and its distance from the limits.
 
     Attributes
@@ -61,14 +73,26 @@ class Mesh:
         of_it = [share for name, about, share in self.further if limit.name == name and limit.is_about(about)]
         return self.shrink + max(of_it, default=0.0)
 
+    def held(self, scenario: Scenario) -> dict[Limit, Spans]:
+        """Return when the task fixes what each limit bounds, as far as limits are reduced."""
+        return held_spans(scenario, self.shrink_of) if self.shrink or self.further else {}
 
-def bounded(limit: Limit, values: ca.SX, mesh: Mesh, slack: ca.SX | None) -> tuple[list[ca.SX], list[Row]]:
-    """Return values and rows of a limit; if it is soft with its slack, in units of its scale."""
-    value, low, high = limit.rows(values, mesh.shrink_of(limit))
+
+def bounded(
+    limit: Limit, values: ca.SX, mesh: Mesh, slack: ca.SX | None, held: Mapping[Limit, Spans]
+) -> tuple[list[ca.SX], list[Row]]:
+    """Return values and rows of a limit; if it is soft with its slack, in units of its scale.
+
+    `held` is when the task fixes what each limit bounds.
+    """
+    value, low, high = limit.rows(values)
     if slack is None:
-        return [value], [(limit.name, low, high)] * value.numel()
+        _, lowest, highest = limit.rows(values, mesh.shrink_of(limit))
+        tighter = lowest - low if np.isfinite(low) else 0.0, high - highest if np.isfinite(high) else 0.0
+        return [value], [Row(limit.name, low, high, tighter, held.get(limit, ()))] * value.numel()
+    _, low, high = limit.rows(values, mesh.shrink_of(limit))
     sides = [(sign, bound) for sign, bound in ((1.0, low), (-1.0, -high)) if np.isfinite(bound)]
-    rows: list[Row] = [(limit.name, bound, np.inf) for _, bound in sides for _ in range(value.numel())]
+    rows = [Row(limit.name, bound, np.inf) for _, bound in sides for _ in range(value.numel())]
     return [sign * value + slack for sign, _ in sides], rows
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ...display import Displayed
 from ...errors import InputError, SolverError
 from ...inputs import shown
 from ..tasks.deviation import Deviation
@@ -35,7 +36,7 @@ Progress = Callable[[int, float, float], None]  # iteration, objective, infeasib
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Displayed):
     """The result of a run of the solver."""
 
     deviation: Deviation

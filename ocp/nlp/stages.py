@@ -17,8 +17,8 @@ from ..limits import Rate
 from ..tasks.scenario import Scenario
 from .derivatives import Block
 from .grid import Grid
+from .held import eased
 from .layout import Layout
-from .rows import Row
 
 __all__ = ["Stages", "Unknowns", "all_at_once", "put_in_order", "stage_by_stage"]
 
@@ -140,19 +140,33 @@ def _parts(scenario: Scenario, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([at[layout.motion], at[layout.shared], tensions]), np.concatenate([at[top], tensions])
 
 
-def put_in_order(unknowns: Unknowns, blocks: list[Block]) -> tuple[ca.MX, list[Row], Stages | None]:
-    """Return all rows as one column with their bounds; in a program with stages stage by stage, gaps first."""
-    rows = [row for block in blocks for row in block.rows * len(block.stages)]
+def put_in_order(unknowns: Unknowns, blocks: list[Block], grid: Grid) -> tuple[ca.MX, np.ndarray, Stages | None]:
+    """Return all rows as one column with their bounds, (k, 2); in a program with stages stage by stage, gaps first."""
+    nodes = np.concatenate([[0.0], np.cumsum(grid.steps)]) / grid.steps.sum()
+    bounds = np.concatenate([_bounds(block, nodes) for block in blocks])
     values = ca.vertcat(*(ca.vec(block.values) for block in blocks))
     if unknowns.gaps is None:
-        return values, rows, None
+        return values, bounds, None
     states, steps = unknowns.gaps.shape
-    gaps: list[Row] = [("gap", 0.0, 0.0)]
-    rows = gaps * (states * steps) + rows
+    bounds = np.concatenate([np.zeros((states * steps, 2)), bounds])
     values = ca.vertcat(ca.vec(unknowns.gaps), values)
     own = np.concatenate([np.repeat(block.stages, len(block.rows)) for block in blocks])
     stage = np.concatenate([np.repeat(np.arange(steps), states), own])
     order = np.argsort(stage, kind="stable")
     counts = np.bincount(own, minlength=steps + 1)
     sizes = Stages([states] * (steps + 1), unknowns.controls, counts.tolist())
-    return values[order.tolist()], [rows[i] for i in order], sizes
+    return values[order.tolist()], bounds[order], sizes
+
+
+def _bounds(block: Block, nodes: np.ndarray) -> np.ndarray:
+    """Return the bounds of a block's rows, one stage after the other, (k, 2): tightened where the task permits it.
+
+    `nodes` are where the stages begin, as shares of the duration. A row of a stage may be about all of it.
+    """
+    first, last = nodes[block.stages], nodes[np.minimum(block.stages + 1, len(nodes) - 1)]
+    parts = {held: eased(held, first, last) for held in {row.held for row in block.rows}}
+    bounds = np.empty((len(block.stages), len(block.rows), 2))
+    for i, row in enumerate(block.rows):
+        bounds[:, i, 0] = row.low + parts[row.held] * row.tighter[0]
+        bounds[:, i, 1] = row.high - parts[row.held] * row.tighter[1]
+    return bounds.reshape(-1, 2)

@@ -6,19 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models.part import Vector3
 from ...solvers import Certificate
 from ...text import quantity, quantity_row
 from ..result import Plan, Relaxed
-from ..tasks.paths import WaypointPath
 from ..tasks.phases import SAME_TIME
-from ..tasks.task import Task
-from ..tasks.wind_set import WindBox
+from .motion_facts import Fact, millimetres, motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
-WORTH_A_WARNING = 1e-6  # [m], of a path outside the box of its points
-
-Fact = tuple[str, str]  # its name, and the fact with its unit
 
 
 class Section(NamedTuple):
@@ -53,15 +47,24 @@ def sections(plan: Plan) -> list[Section]:
     titles = {"infeasible": "Why it is infeasible", "not-found": "What the closest motion violates"}
     every = [
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
+        Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Robots of the uncertainty", _robots(plan)),
-        Section("Motion", _motion(plan)),
+        Section("Motion", motion_facts(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
         Section("Computation", _computation(plan)),
     ]
     return [section for section in every if section.facts]
+
+
+def facts_at_once(plan: Plan) -> list[Fact]:
+    """Return the facts that need no further plans or motions, the most important first."""
+    certificate = plan.certificate
+    why = [] if certificate is None else certificate.text(_up(plan))._asdict().items()
+    facts = [*why, *_tensions(plan), *motion_facts(plan), *_audit(plan), *_computation(plan)]
+    return [(name.replace("_", " "), fact) for name, fact in facts]
 
 
 def spans_table(plan: Plan) -> Table | None:
@@ -154,7 +157,7 @@ def _of_the_motion(plan: Plan) -> str:
     short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
     short += _in_phase(plan, certificate.time)
     if certificate.wind is not None:
-        short += f" in wind {_wind(certificate.wind)}"
+        short += f" in wind {wind(certificate.wind)}"
     return f"{short}{_more(len(excess))}"
 
 
@@ -177,7 +180,7 @@ def _reasons(plan: Plan) -> list[Fact]:
         text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
         facts += [
             ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}{phase}"),
-            *([("wind", _wind(certificate.wind))] if certificate.wind is not None else []),
+            *([("wind", wind(certificate.wind))] if certificate.wind is not None else []),
             ("direction", text.along),
             ("needed", text.needed),
             ("available", text.available),
@@ -278,57 +281,6 @@ def _jumps(plan: Plan) -> list[Fact]:
     return facts
 
 
-def _motion(plan: Plan) -> list[Fact]:
-    task, audit = plan.scenario.task, plan.audit
-    worst = int(audit.tracking_error.argmax())
-    error = _millimetres(plan.tracking_error_max)
-    if not error.startswith("0 "):
-        error += f" at most, at t = {audit.times[worst]:.3f} s"
-    speed, acceleration = (
-        np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
-    )
-    kind = f"{len(plan.phases)} phases" if plan.phases else task.path.kind
-    law = "" if plan.scenario.path is task.path else ", with the fastest time law"
-    return [
-        ("duration", quantity(plan.scenario.duration, "s", digits=6)),
-        ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
-        *_outside(task),
-        ("tracking error", error),
-        ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
-        *([("wind", _task_wind(task))] if task.wind is not None else []),
-    ]
-
-
-def _outside(task: Task) -> list[Fact]:
-    """Return a warning if the path leaves the box of its points."""
-    path = task.path
-    if not isinstance(path, WaypointPath):
-        return []
-    far = path.outside()
-    worst = int(far.argmax())
-    if far[worst] < WORTH_A_WARNING:
-        return []
-    text = f"the path leaves the box of its points by up to {quantity(far[worst], 'm')} along {'xyz'[worst]}"
-    return [("warning", f"{text}; the shape legs stays inside")]
-
-
-def _millimetres(metres: float) -> str:
-    """Return a length in millimetres; less than a nanometre is rounding."""
-    return quantity(0.0 if metres < 1e-9 else metres * 1e3, "mm")
-
-
-def _wind(wind: Vector3) -> str:
-    return f"({quantity_row(wind)}) m/s"
-
-
-def _task_wind(task: Task) -> str:
-    """Return the task's wind, or its box and the wind of the planned tensions."""
-    if isinstance(task.wind, WindBox):
-        box = task.wind
-        return f"any from {_wind(box.min)} to {_wind(box.max)}; the tensions shown are those in {_wind(box.middle)}"
-    return "" if task.wind is None else _wind(task.wind)
-
-
 def _carriers(plan: Plan) -> list[Fact]:
     """Return the largest speed, acceleration and tilt of each carrier that could move, against its limits."""
     facts = []
@@ -381,7 +333,7 @@ def _error(position: float, attitude: float) -> str:
     """Return the largest error of a simulated platform, from [m] and [rad]."""
     if not np.isfinite([position, attitude]).all():
         return "the simulation diverges"
-    return f"at most {_millimetres(position)} and {quantity(attitude * 1e3, 'mrad')}"
+    return f"at most {millimetres(position)} and {quantity(attitude * 1e3, 'mrad')}"
 
 
 def _computation(plan: Plan) -> list[Fact]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...figures.animation import Scene
 from ...figures.robot import box_edges
+from ...models.rotor_discs import rotor_discs
 from ..result import Plan
 from ..tasks.task_limits import AnyKeepOut, Block, ConvexMesh, Sphere
 
@@ -36,6 +37,7 @@ def scene(plan: Plan, times: np.ndarray) -> Scene:
         tensions=audit.tensions[rows],
         t_min=robot.t_min,
         t_max=robot.t_max,
+        rotors=rotor_discs(robot, carriers),
     )
 
 

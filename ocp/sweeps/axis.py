@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...display import Displayed
 from ...errors import InputError
 from ...inputs import shown
 from ...models.parsing import parse_yaml
@@ -29,7 +30,7 @@ _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):({_NUMBER})")
 
 
 @dataclass(frozen=True)
-class Axis:
+class Axis(Displayed):
     """A field and its values, as a task file has them."""
 
     field: Field

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ...display import Displayed
 from ...errors import InputError
 from ...inputs import shown
 
@@ -19,7 +20,7 @@ _UNIT = re.compile(r"\[([^\]]+)\]")  # in the description of a field
 
 
 @dataclass(frozen=True)
-class Field:
+class Field(Displayed):
     """A field of a task, such as `tube.position`, or of the robot, such as `robot.platform.mass`.
 
     Items of lists have numbers from 0 on, as in `limits.keep_out[0].radius`; without a number all items are meant, as

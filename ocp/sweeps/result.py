@@ -8,6 +8,7 @@ import json
 import math
 import os
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,8 +17,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import __version__
+from ...display import Displayed, Fact
 from ...errors import InputError
-from ...inputs import file_path, whole_number
+from ...inputs import file_path, printable, whole_number
 from ...models.parsing import to_yaml
 from ...netcdf import Contents, Variable, save_netcdf
 from ...text import column, quantity
@@ -60,7 +62,7 @@ _NUMBERS = ("cost", "duration", "margin", "tension_max")  # what a report shows 
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Displayed):
     """The plans of one task for all combinations of some values of its fields.
 
     Attributes
@@ -73,6 +75,16 @@ class Sweep:
 
     cases: Cases
     rows: tuple[Row, ...]
+
+    def _headline(self) -> str:
+        robot, task, total = self.cases.robot.name, self.cases.task.name, len(self.rows)
+        others = [f"{quantity(count)} {status}" for status, count in self.counts.items() if status != "feasible"]
+        first = f"{robot}, {task}: {quantity(self.feasible)} of {quantity(total)} plans feasible"
+        return ", ".join([first, *others])
+
+    def _facts(self) -> Iterable[Fact]:
+        varied = [(axis.field.key, ", ".join(axis.texts)) for axis in self.cases.axes]
+        return [(name, printable(text)) for name, text in varied + self._best()]
 
     @property
     def feasible(self) -> int:
@@ -209,13 +221,8 @@ class Sweep:
 
     def report(self) -> str:
         """Return the counts, the best plans and, unless it is long, the table, as text."""
-        robot, task, total = self.cases.robot.name, self.cases.task.name, len(self.rows)
-        lines = [f"{robot}, {task}: {quantity(self.feasible)} of {quantity(total)} plans feasible"]
-        others = [f"{quantity(count)} {status}" for status, count in self.counts.items() if status != "feasible"]
-        if others:
-            lines[0] += f", {', '.join(others)}"
-        lines += [f"  {name:<15}  {text}" for name, text in self._best()]
-        if total > MOST_LINES:
+        lines = [self._headline(), *(f"  {name:<15}  {text}" for name, text in self._best())]
+        if len(self.rows) > MOST_LINES:
             return "\n".join(lines)
         return "\n".join([*lines, *(f"  {line}" for line in self._table())])
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...display import Displayed
 from .scheme import LINEAR, Scheme
 
 __all__ = ["Deviation"]
 
 
 @dataclass(frozen=True)
-class Deviation:
+class Deviation(Displayed):
     """Values of the free coordinates at the points of a transcription, and by its scheme at all times between.
 
     The inner points of a scheme are among the nodes.

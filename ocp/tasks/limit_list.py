@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 
@@ -77,7 +78,9 @@ def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
     given, free = task.limits, task.base if isinstance(task.base, FreeBase) else None
     speed = _tighter(given.carrier_speed, free and free.speed_max)
     acceleration = _tighter(given.carrier_acceleration, free and free.acceleration_max)
-    if given.carrier_separation is not None and len(robot.carriers) > 1:
+    if given.carrier_separation == "radius":
+        yield from _apart(robot)
+    elif given.carrier_separation is not None and len(robot.carriers) > 1:
         yield CarrierSeparation(robot, given.carrier_separation)
     for index, carrier in enumerate(robot.carriers):
         if not carrier.moves:
@@ -96,6 +99,17 @@ def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
                 yield CarrierReach(robot, index, axis, low, high)
 
 
+def _apart(robot: Robot) -> Iterator[Limit]:
+    """Return the limits that keep the bodies of carriers out of each other."""
+    radii = robot.carrier_radius.tolist()
+    pairs = list(combinations([index for index, radius in enumerate(radii) if radius > 0], 2))
+    least = [radii[i] + radii[j] for i, j in pairs]
+    for distance in dict.fromkeys(least):
+        yield CarrierSeparation(
+            robot, distance, [pair for pair, its in zip(pairs, least, strict=True) if its == distance]
+        )
+
+
 def _tighter(*bounds: float | None) -> float | None:
     return min((bound for bound in bounds if bound is not None), default=None)
 
@@ -104,9 +118,13 @@ def _of_place(robot: Robot, place: AnyKeepOut) -> Iterator[Limit]:
     riding = place.frame == "platform"
     if place.platform is not None and not riding:
         yield PlatformOutside(robot, place, place.name, place.platform)
-    moving = [index for index, carrier in enumerate(robot.carriers) if carrier.moves]
-    if place.carriers is not None and moving:
-        yield CarriersOutside(robot, moving, place, place.name, riding, place.carriers)
+    if place.carriers is not None:
+        moving = [index for index, carrier in enumerate(robot.carriers) if carrier.moves]
+        radii = robot.carrier_radius.tolist()
+        least = {index: radii[index] if place.carriers == "radius" else place.carriers for index in moving}
+        for distance in dict.fromkeys(least.values()):
+            which = [index for index in moving if least[index] == distance]
+            yield CarriersOutside(robot, which, place, place.name, riding, distance)
     if place.cables is not None:
         yield CablesOutside(robot, place, place.name, riding, place.cables)
 

@@ -15,13 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...display import Displayed
+
 __all__ = ["SAME_TIME", "LaidPhase", "PhaseRows", "Phases"]
 
 SAME_TIME = 1e-9  # of the duration: an instant so near to the start of a phase belongs to it
 
 
 @dataclass(frozen=True, eq=False)
-class LaidPhase:
+class LaidPhase(Displayed):
     """A phase of a task.
 
     Attributes
@@ -66,7 +68,7 @@ class PhaseRows(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Phases:
+class Phases(Displayed):
     """All phases of a task in order; none for a task that is not given in phases."""
 
     all: tuple[LaidPhase, ...] = ()

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...models import Dynamics, Robot
+from ...display import Displayed
+from ...models import Dynamics, Robot, points
 from ...models.part import Vector3
 from ...models.ranges import PositiveRange
 from ..limits.limit import Hull
@@ -32,7 +33,7 @@ MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 
 @dataclass(frozen=True)
-class Scenario:
+class Scenario(Displayed):
     """A robot and its task, with what follows from both.
 
     Attributes
@@ -209,11 +210,13 @@ class Scenario:
         stacked = Motion(*(np.stack(parts, axis=1) for parts in zip(*carriers, strict=True)))
         return platform, stacked
 
+    def pose_on_path(self, motion: Motion, carriers: Motion) -> np.ndarray:
+        """Return the poses of the platform at `motion` in {G} in the frame of its path, (n, 6) [m, rad]."""
+        return _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
+
     def off_path(self, times: np.ndarray, motion: Motion, carriers: Motion) -> np.ndarray:
         """Return the offset of the platform at `motion` in {G} from its path, (n, 6) [m, rad], in the path's axes."""
-        on_path = self.path.at(times, self.duration).pose
-        pose = _pose_in(carriers.pose[:, 0], motion.pose) if self.relative else motion.pose
-        off = pose - on_path
+        off = self.pose_on_path(motion, carriers) - self.path.at(times, self.duration).pose
         off[:, 3:] -= 2 * np.pi * np.round(off[:, 3:] / (2 * np.pi))
         return off
 
@@ -235,10 +238,7 @@ class Scenario:
 
 
 def _pose_in(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """Return poses (n, 6) given in {G} relative to frames at poses (n, 6), by scipy's rotations."""
-    from scipy.spatial.transform import Rotation
-
-    turned = Rotation.from_euler("ZYX", frame[:, 5:2:-1])
-    position = turned.inv().apply(pose[:, :3] - frame[:, :3])
-    angles = (turned.inv() * Rotation.from_euler("ZYX", pose[:, 5:2:-1])).as_euler("ZYX")
-    return np.hstack([position, angles[:, ::-1]])
+    """Return poses (n, 6) given in {G} relative to frames at poses (n, 6)."""
+    R = points.rotations(frame[:, 3:])
+    turned = points.angles(R.swapaxes(1, 2) @ points.rotations(pose[:, 3:]))
+    return np.hstack([points.in_frame(frame, pose[:, :3]), turned])

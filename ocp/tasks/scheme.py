@@ -23,6 +23,7 @@ from typing import Literal
 
 import numpy as np
 
+from ...display import Displayed
 from . import bernstein
 from .bernstein import Values
 
@@ -34,7 +35,7 @@ SchemeName = Literal["constant", "linear", "hermite", "gauss", "spline"]
 
 
 @dataclass(frozen=True)
-class Scheme:
+class Scheme(Displayed):
     """A transcription scheme.
 
     An interval has a point at its start, one at each share in `inner`, and one at its end, which is the next

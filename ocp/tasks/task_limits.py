@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
@@ -38,10 +38,11 @@ THINNEST = 1e-5  # [m] of a place: distances are rounded by a tenth of it where 
 class KeepOut(Part):
     """The base of all places to keep out of: by how much platform, carriers and cables stay outside.
 
-    The platform counts as its CoM and its attachments, a carrier that can move as its origin, a cable as the line
-    between its ends. A place in the frame of the platform moves with it: this keeps the platform's own body clear
-    of cables and carriers, by limits named cable_platform_clearance and carrier_platform_clearance. Cables end at their
-    attachments, so such a body must leave these outside.
+    The platform counts as its CoM and its attachments, a cable as the line between its ends. The distance of a carrier
+    that can move is that of its origin: by default it keeps the radius of its body away, so that the rotors of a
+    quadrotor do not touch the place; a number replaces the radius. A place in the frame of the platform moves with it:
+    this keeps the platform's own body clear of cables and carriers, by limits named cable_platform_clearance and
+    carrier_platform_clearance. Cables end at their attachments, so such a body must leave these outside.
     """
 
     name: str = Field(default="obstacle", min_length=1, max_length=60)
@@ -50,8 +51,18 @@ class KeepOut(Part):
         description="world: fixed in {G}; platform: it moves with the platform, and cables and carriers keep out of it",
     )
     platform: Distance = 0.0
-    carriers: Distance = 0.0
+    carriers: NonNegative | Literal["radius"] | None = Field(
+        default="radius",
+        description="least distance of the origins of carriers that can move [m]; radius: that of each one's body, "
+        "such as a quadrotor with its rotors; null: no limit",
+    )
     cables: Distance = 0.0
+
+    @model_serializer(mode="wrap")
+    def _with_nulls(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Keep distances that are null: files leave out what is null elsewhere, and here that would be a limit."""
+        nulls = {name: None for name in ("platform", "carriers", "cables") if getattr(self, name) is None}
+        return {**handler(self), **nulls}
 
     @model_validator(mode="after")
     def _thick_enough(self) -> Self:
@@ -116,8 +127,10 @@ class TaskLimits(Part):
     cable_clearance: Positive | None = Field(
         default=None, description="least distance of cables that share neither anchor nor attachment [m]"
     )
-    carrier_separation: Positive | None = Field(
-        default=None, description="least distance of the origins of carriers [m]"
+    carrier_separation: Positive | Literal["radius"] | None = Field(
+        default=None,
+        description="least distance of the origins of carriers [m]; radius: of those with bodies, such as quadrotors, "
+        "the radii of both together",
     )
     keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="places to keep out of")
     soft: dict[str, Positive] = Field(

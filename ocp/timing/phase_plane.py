@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...display import Displayed
 from ...distribution import wrench_problem
 from ...errors import InputError, SolverError
 from ...solvers import Certificate, TensionProblem, certify
@@ -21,7 +22,7 @@ FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables li
 
 
 @dataclass(frozen=True)
-class PhasePlane:
+class PhasePlane(Displayed):
     """The limits of a motion along a path, at N places of it.
 
     Wrenches are those of the coordinates that can move, moments over `Robot.length`, all in newtons.
@@ -67,7 +68,7 @@ class PhasePlane:
 
 
 @dataclass(frozen=True)
-class Proof:
+class Proof(Displayed):
     """A proof that at one place of the path no allowed speed and acceleration has tensions inside their limits.
 
     Attributes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...display import BLUE, Displayed, Fact, picture
 from ...errors import InputError
 from ...inputs import file_path, real_array, required, shown
 from ...models.parsing import to_yaml
@@ -25,12 +27,18 @@ from ..tasks.paths import (
     TimedPath,
 )
 from ..tasks.task import GivenBase, HoldBase, Task
+from ..warnings.instants import Instants
+from ..warnings.leaves_its_points import leaves_its_points
+from ..warnings.warnings import warnings
+from ..waypoint_distance import WaypointDistance, waypoint_distance
 from .bottlenecks import Bottleneck, bottlenecks
 from .parametrised_path import ParametrisedPath, PathLimits
 
+LOOKS = 2001  # at the motion, for warnings and the distance from waypoints
+
 
 @dataclass(frozen=True, eq=False)
-class Timing:
+class Timing(Displayed):
     """The fastest time law along a path, or where along the path there is none.
 
     Attributes
@@ -67,18 +75,35 @@ class Timing:
     """
 
     status: MotionStatus
-    parametrised: ParametrisedPath = field(repr=False)
-    limits: PathLimits = field(repr=False)
+    parametrised: ParametrisedPath
+    limits: PathLimits
     margin: float
-    s: np.ndarray = field(repr=False)
-    sd: np.ndarray = field(repr=False)
-    sdd: np.ndarray = field(repr=False)
+    s: np.ndarray
+    sd: np.ndarray
+    sdd: np.ndarray
     violation: float = float("nan")
     at: float | None = None
-    certificate: Certificate | None = field(default=None, repr=False)
-    problem: TensionProblem | None = field(default=None, repr=False)
-    blocked: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    certificate: Certificate | None = None
+    problem: TensionProblem | None = None
+    blocked: np.ndarray = field(default_factory=lambda: np.zeros(0))
     name: str = "task"
+
+    def _headline(self) -> str:
+        head = f"{self.parametrised.robot.name}, {self.name}: {self.status.value.upper()}"
+        if self.feasible:
+            return f"{head}, shortest duration {quantity(self.duration, 's', 6)}"
+        place = f"s = {self.at:.4g}"
+        if self.certificate is None:
+            return f"{head}, the search ended at {place}"
+        return f"{head}, short by {quantity(self.certificate.shortfall, 'N')} at {place}"
+
+    def _facts(self) -> Iterable[Fact]:
+        why = [] if self.certificate is None else self.certificate._facts()
+        audit = [("worst violation", quantity(self.violation, "N", 3))] if self.feasible else []
+        return [*why, ("margin", quantity(self.margin, "N")), *audit, ("grid", f"{len(self.s)} points")]
+
+    def _picture(self) -> str:
+        return picture([(self.s, self.sd, BLUE)], "s [-]", "ds/dt [1/s]")
 
     @property
     def feasible(self) -> bool:
@@ -136,6 +161,29 @@ class Timing:
         return platform.timed(sd, sdd), carriers.timed(sd, sdd)
 
     @cached_property
+    def waypoint_distance(self) -> WaypointDistance | None:
+        """Return the largest distance at which the motion passes a waypoint, as `Plan` does; None without a law too."""
+        if not self.feasible:
+            return None
+        path, seconds = self.path, self.path.natural_duration or 0.0
+        times = np.unique(np.concatenate([path.times, np.linspace(0.0, seconds, LOOKS)]))
+
+        def pose_at(instants: np.ndarray) -> np.ndarray:
+            return path.at(instants, seconds).pose
+
+        return waypoint_distance(path.stations(seconds), times, pose_at(times), pose_at)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what a person should know of the motion, as `Plan` does; nothing without a law."""
+        if not self.feasible:
+            return ()
+        times = self.path.time_at(np.linspace(0.0, 1.0, LOOKS))
+        platform, carriers = self.motion(times)
+        seen = Instants(self.parametrised.dynamics, times, platform.pose, carriers.pose)
+        return (*leaves_its_points(self.parametrised.path), *warnings(seen))
+
+    @cached_property
     def bottlenecks(self) -> list[Bottleneck]:
         """Return the stretches of the path on each of which one limit keeps the motion from being faster, in order.
 
@@ -151,6 +199,8 @@ class Timing:
             "duration": self.duration,
             "margin": self.margin,
             "violation": self.violation,
+            "warnings": list(self.warnings),
+            "waypoint_distance": None if self.waypoint_distance is None else self.waypoint_distance.to_dict(),
             "bottlenecks": [each.to_dict() for each in self.bottlenecks],
             "at": self.at,
             "blocked": self.blocked.tolist(),
@@ -172,18 +222,18 @@ class Timing:
 
     def report(self) -> str:
         """Return status, duration and bottlenecks, or the certificate, as text."""
-        head = f"{self.parametrised.robot.name}, {self.name}: {self.status.value.upper()}"
-        ends = "0 at its start, 1 at its end"
+        head, ends = self._headline(), "0 at its start, 1 at its end"
         if self.feasible:
-            lines = [f"{head}, shortest duration {quantity(self.duration, 's', 6)}"]
+            lines = [head, *(f"  warning: {sentence}" for sentence in self.warnings)]
             lines += [f"  audit: worst violation {quantity(self.violation, 'N', 3)}"]
+            if self.waypoint_distance is not None:
+                lines += [f"  waypoints: {self.waypoint_distance.describe()}"]
             lines += [f"  What is at its limit along the path (s = {ends})"]
             return "\n".join(lines + [f"    {each.describe()}" for each in self.bottlenecks])
         place = f"s = {self.at:.4g}"
         if self.certificate is None:
-            return f"{head}, the search ended at {place}\n  s is the fraction of the path, {ends}"
-        lines = [f"{head}, short by {quantity(self.certificate.shortfall, 'N')} at {place}"]
-        lines += [f"  {place} is the worst place of the path (s = {ends}); no time law is feasible there:"]
+            return f"{head}\n  s is the fraction of the path, {ends}"
+        lines = [head, f"  {place} is the worst place of the path (s = {ends}); no time law is feasible there:"]
         return "\n".join(lines + [f"    {line}" for line in self.certificate.describe().splitlines()])
 
     def timed(self, path: Curve) -> TimedPath:

@@ -13,6 +13,7 @@ from .rest import RestPath
 from .returning import ReturnPath
 from .samples import SamplePath
 from .sequence import SequencePath, SinglePath
+from .stations import Stations
 from .timed import TimedPath
 from .waypoints import WaypointPath
 
@@ -29,6 +30,7 @@ __all__ = [
     "SamplePath",
     "SequencePath",
     "SinglePath",
+    "Stations",
     "TimedPath",
     "WaypointPath",
 ]

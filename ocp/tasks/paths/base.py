@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from ....models.part import Part, Pose
 from .motion import Motion
+from .stations import Stations
 
 __all__ = ["PathBase", "PoseOrPosition", "check_times"]
 
@@ -51,6 +52,10 @@ class PathBase(Part):
     def bends(self) -> np.ndarray:
         """Return s where sharp bends begin and end, (n, 2): a grid needs many places there."""
         return np.zeros((0, 2))
+
+    def stations(self, duration: float) -> Stations:
+        """Return the poses that it was given to pass in a task that lasts `duration` [s]; none by default."""
+        return Stations()
 
     def at(self, times: np.ndarray, duration: float) -> Motion:
         """Return pose, velocity and acceleration at `times` [s] of a task that lasts `duration` [s]."""

@@ -23,6 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ....display import Displayed
 from .attitudes import Attitudes, nearest_turn
 from .leg_law import leg_law
 from .motion import Motion
@@ -34,7 +35,7 @@ LOOKS = 48  # at the angles of each leg
 
 
 @dataclass(frozen=True)
-class Progress:
+class Progress(Displayed):
     """The progress of a motion along legs: those before `leg` are done, `leg` and the one after it move.
 
     `first` and `second` are the shares of these two that are done, with two derivatives, (n,) each.
@@ -46,7 +47,7 @@ class Progress:
 
 
 @dataclass(frozen=True, eq=False)
-class Legs:
+class Legs(Displayed):
     """Straight legs through points.
 
     Attributes

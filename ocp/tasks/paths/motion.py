@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....display import record
+
 __all__ = ["Motion"]
 
 
@@ -19,6 +21,8 @@ class Motion(NamedTuple):
     pose: np.ndarray  # (n, 6) [m, rad]
     velocity: np.ndarray  # (n, 6) [m/s, rad/s]
     acceleration: np.ndarray  # (n, 6) [m/s^2, rad/s^2]
+
+    __repr__ = record
 
     def plus(self, deviation: Iterable[np.ndarray]) -> Motion:
         """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""

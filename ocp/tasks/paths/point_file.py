@@ -10,7 +10,7 @@ from typing import Any
 
 from ....errors import InputError
 from ....inputs import printable, shown
-from ....models.parsing import read_bytes
+from ....reading import read_bytes
 from .gcode import read_gcode
 
 __all__ = ["read_csv", "read_points"]
@@ -44,7 +44,10 @@ def read_points(name: str, folder: Path) -> dict[str, Any]:
         text = read_bytes(path, "a list of points").decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{where} must be text in UTF-8, got another one (byte {error.start})") from None
-    return read_csv(text, where) if ending == ".csv" else read_gcode(text, where)
+    try:
+        return read_csv(text, where) if ending == ".csv" else read_gcode(text, where)
+    except csv.Error as error:  # a field of more than 131 072 characters
+        raise InputError(f"{where} must be CSV that can be read, got {error}") from None
 
 
 def read_csv(text: str, where: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from ....models.part import NonNegative, Pose, Positive
 from .base import PathBase
 from .motion import Motion
 from .sequence import SequencePath, SinglePath
+from .stations import Stations
 
 __all__ = ["ReturnPath", "decay"]
 
@@ -48,6 +49,10 @@ class ReturnPath(PathBase):
     @override
     def natural_duration(self) -> float | None:
         return self.duration - self.start
+
+    @override
+    def stations(self, duration: float) -> Stations:
+        return self.path.stations(self.duration).since(self.start)
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:

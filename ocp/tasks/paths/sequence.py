@@ -18,6 +18,7 @@ from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
 from .samples import SamplePath
+from .stations import Stations
 from .timed import TimedPath
 from .waypoints import WaypointPath
 
@@ -73,6 +74,14 @@ class SequencePath(PathBase):
     @override
     def natural_duration(self) -> float | None:
         return float(self.boundaries[-1])
+
+    @override
+    def stations(self, duration: float) -> Stations:
+        parts = zip(self.parts, self.boundaries, strict=False)
+        return Stations.joined(
+            (f"parts[{index}].path", float(start), part.path.stations(part.seconds))
+            for index, (part, start) in enumerate(parts)
+        )
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:

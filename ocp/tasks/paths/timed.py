@@ -14,6 +14,8 @@ from ....models.part import Finite, NonNegative, Positive
 from .base import PathBase
 from .curve import Curve
 from .motion import Motion
+from .stations import Stations
+from .waypoints import WaypointPath
 
 __all__ = ["TimedPath"]
 
@@ -86,6 +88,21 @@ class TimedPath(PathBase):
         # Where the path turns at once, the acceleration before the place must not be taken along what comes after it.
         end = np.where(times < knots[k + 1], np.nextafter(s[k + 1], 0.0), s[k + 1])
         return np.minimum(at, end), np.where(still, 0.0, speeds[k] + since * rate), np.where(still, 0.0, rate)
+
+    def time_at(self, s: np.ndarray) -> np.ndarray:
+        """Return the time at which it arrives at s, (n,) [s]."""
+        knots, speeds = np.array(self.s), np.array(self.speeds)
+        k = np.clip(np.searchsorted(knots, s, side="left") - 1, 0, len(knots) - 2)
+        rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (knots[k + 1] - knots[k])
+        mean = (speeds[k] + np.sqrt(np.maximum(speeds[k] ** 2 + rate * (s - knots[k]), 0.0))) / 2
+        since = np.divide(s - knots[k], mean, out=np.zeros_like(mean), where=mean > 0)
+        return self.times[k] + self._dwell[k] * (since > 0) + since
+
+    @override
+    def stations(self, duration: float) -> Stations:
+        if not isinstance(self.along, WaypointPath):
+            return Stations()
+        return self.along.stations(1.0)._replace(times=self.time_at(self.along.places))
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:

@@ -16,6 +16,7 @@ from ....models.part import Finite, NonNegative
 from .base import PathBase, PoseOrPosition, check_times
 from .legs import Legs
 from .motion import Motion
+from .stations import Stations
 from .waypoint_spline import WaypointSpline
 
 __all__ = ["WaypointPath"]
@@ -162,6 +163,19 @@ class WaypointPath(PathBase):
     def knots(self, duration: float) -> np.ndarray:
         """Return the times at which the path passes its points [s]; where it dwells, at which it arrives."""
         return self._spline.knots(duration) if self.shape == "spline" else self._legs.knots(duration)
+
+    @property
+    def places(self) -> np.ndarray:
+        """Return s of its points, (n,)."""
+        if self.shape == "legs":
+            return self._legs.places
+        whole = self.natural_duration or 1.0
+        return self._spline.knots(whole) / whole
+
+    @override
+    def stations(self, duration: float) -> Stations:
+        names = tuple(f"points[{index}]" for index in range(len(self.points)))
+        return Stations(names, self.knots(duration), np.array(self.points))
 
     def missed(self, duration: float) -> np.ndarray:
         """Return how far the points are from the path at its knots, (n, 6) [m, rad]."""

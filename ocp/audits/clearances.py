@@ -1,0 +1,170 @@
+"""Bound distances between the instants of an audit, however fast the motion is: `came_too_near`.
+
+A plane between two bodies, known at one instant, proves a distance at each other one: that of the points of both from
+it. It is exact where they moved straight on, and lower where they turned about each other. Both planes of two instants
+bound the distance in between, less what the points leave the straight line by. Where that does not decide, the instant
+in the middle is looked at, and so on: a distance that is too small by more than the limit's tolerance is found.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from ...models.points import placed
+from ..limits.distance import Distance
+from ..limits.limits import Separating, in_blocks, motions
+from .checks import AuditedMotion
+from .curvature import is_jump, leaves
+from .excess import Excess
+
+__all__ = ["came_too_near"]
+
+UNDECIDED = 0.05  # of a limit's tolerance: less than that beside it is not looked for
+DEEPEST = 0.99  # of the largest excess is found
+MOST_HALVES = 50
+
+_Least: TypeAlias = tuple[float, int, float]
+"""Time, index and value of a distance."""
+
+
+def came_too_near(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
+    """Return the limits of distances that are not kept, at the instants of the audit or between them.
+
+    `limited` has the values of all limits at these instants.
+    """
+    limits, exceeded = audited.scenario.limits, list[Excess]()
+    chosen = [(limit, limited[k]) for k, limit in enumerate(limits) if isinstance(limit, Distance)]
+    moved = _moved(audited) if chosen else np.zeros(0)
+    for limit, values in chosen:
+        slack = np.where(np.isnan(values), -np.inf, values - limit.low + limit.tolerance)
+        row, which = np.unravel_index(slack.argmin(), slack.shape)
+        least: _Least = (float(audited.times[row]), int(which), float(values[row, which]))
+        far = np.isfinite(limit.per_metre) and (slack[:-1] + slack[1:] >= limit.per_metre * moved[:, None]).all()
+        if not far and np.isfinite(slack).all():
+            least = _least(audited, limit, values, least)
+        time, which, value = least
+        if not value >= limit.low - limit.tolerance:
+            facts = (time, value, limit.low, limit.unit, "at least")
+            exceeded.append(Excess(limit.name, limit.about(which), *facts))
+    return exceeded
+
+
+def _moved(audited: AuditedMotion) -> np.ndarray:
+    """Return how far any point of platform and carriers moves at most from one instant to the next, (n - 1,) [m]."""
+    platform, carriers = audited.motion.pose, audited.carriers.pose
+    com = placed(platform, np.array([audited.scenario.robot.platform.com]))
+    points = [*audited.scenario.dynamics.points(platform, carriers), com, carriers[..., :3]]
+    return _ways(audited.times, np.concatenate(points, axis=1)).max(axis=1)
+
+
+def _ways(times: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return how far points (n, ..., 3) are at most from both their places at two instants, together, (n - 1, ...)."""
+    return np.linalg.norm(np.diff(points, axis=0), axis=-1) + 2 * _bends(times, points)
+
+
+def _bends(times: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return how far points (n, ..., 3) leave the straight way from instant to instant at most, (n - 1, ...) [m]."""
+    return np.linalg.norm(leaves(times, points, is_jump(times)), axis=-1)
+
+
+class _Ends(NamedTuple):
+    """Pairs of bodies at one instant each: time, points, distances, and directions of the planes between them."""
+
+    time: np.ndarray  # (k,)
+    points: np.ndarray  # (k, s, 3)
+    distance: np.ndarray  # (k,)
+    normal: np.ndarray  # (k, 3)
+
+    def of(self, rows: np.ndarray) -> _Ends:
+        return _Ends(*(part[rows] for part in self))
+
+
+def _least(audited: AuditedMotion, limit: Distance, values: np.ndarray, found: _Least) -> _Least:
+    """Return the smallest distance over all time if it is too small, else one that is not; `found` is that of `values`.
+
+    Wherever the distance may be too small, and less than the smallest so far, the instant in the middle is looked at.
+    """
+    separating, times = audited.scenario.limits.separating(limit), audited.times
+    points = _points(separating, audited)
+    ways, bends = _both(separating, _ways(times, points)), _both(separating, _bends(times, points))
+    wanted = _wanted(limit, found)
+    row, which = np.nonzero((values[:-1] + values[1:] - ways < 2 * wanted) & ~is_jump(times)[:, None])
+    first, last = (_ends(separating, times[at], points[at, which]) for at in (row, row + 1))
+    bend, way = bends[row, which], ways[row, which]
+    for _ in range(MOST_HALVES):
+        lowest = np.fmax(_bound(separating, first, last) - bend, (first.distance + last.distance - way) / 2)
+        undecided = np.flatnonzero(~(lowest >= wanted))
+        if not undecided.size:
+            break
+        first, last, which, bend = first.of(undecided), last.of(undecided), which[undecided], bend[undecided] / 4
+        middle = _at(audited, separating, (first.time + last.time) / 2, which)
+        nearest = int(middle.distance.argmin())
+        if middle.distance[nearest] < found[2]:
+            found = float(middle.time[nearest]), int(which[nearest]), float(middle.distance[nearest])
+            wanted = _wanted(limit, found)
+        first, last = _together(first, middle), _together(middle, last)
+        which, bend = np.tile(which, 2), np.tile(bend, 2)
+        way = _both(separating, np.linalg.norm(last.points - first.points, axis=-1)) + 2 * bend
+    return found
+
+
+def _wanted(limit: Distance, found: _Least) -> float:
+    """Return the distance below which one is looked for: too small, and clearly less than the smallest so far."""
+    too_small = limit.low - (1 + UNDECIDED) * limit.tolerance
+    return min(too_small, limit.low - (limit.low - found[2]) / DEEPEST)
+
+
+def _together(some: _Ends, others: _Ends) -> _Ends:
+    return _Ends(*(np.concatenate(pair) for pair in zip(some, others, strict=True)))
+
+
+def _both(separating: Separating, values: np.ndarray) -> np.ndarray:
+    """Return the sum of the largest values (..., s) of the points of both bodies, (...,)."""
+    moving = separating.moving
+    return values[..., :moving].max(axis=-1) + values[..., moving:].max(axis=-1, initial=0.0)
+
+
+def _bound(separating: Separating, first: _Ends, last: _Ends) -> np.ndarray:
+    """Return the least distance that the planes at both ends leave if the points move straight in between, (k,).
+
+    A plane's distance from both bodies is concave then: it is nowhere below the line between its values at both ends.
+    """
+    falls = [here.distance - _from_plane(separating, here, there) for here, there in ((first, last), (last, first))]
+    fall, rise = (np.maximum(each, 0.0) for each in falls)
+    total = fall + rise
+    apart = first.distance - (last.distance - rise)  # of both lines, at the start
+    share = np.clip(np.divide(apart, total, out=np.zeros_like(total), where=total > 0), 0.0, 1.0)
+    return np.where(fall == 0, first.distance, np.where(rise == 0, last.distance, first.distance - share * fall))
+
+
+def _from_plane(separating: Separating, here: _Ends, there: _Ends) -> np.ndarray:
+    """Return the distance that the plane between two bodies proves when their points are elsewhere, (k,)."""
+    moving, value = separating.moving, here.distance.copy()
+    for sign, at in ((1, there), (-1, here)):
+        along = np.einsum("ksi,ki->ks", at.points, here.normal)
+        value += sign * along[:, :moving].min(axis=1)
+        if along.shape[1] > moving:
+            value -= sign * along[:, moving:].max(axis=1)
+    return value
+
+
+def _ends(separating: Separating, times: np.ndarray, points: np.ndarray) -> _Ends:
+    """Return distances and planes of pairs of bodies by their points (k, s, 3)."""
+    planes = in_blocks(separating.plane, [points.reshape(len(points), -1)]) if len(points) else np.zeros((0, 4))
+    return _Ends(times, points, planes[:, 0], planes[:, 1:])
+
+
+def _points(separating: Separating, audited: AuditedMotion) -> np.ndarray:
+    """Return the points of all pairs at the instants of the audit, (n, pairs, s, 3)."""
+    values = in_blocks(separating.points, motions(audited.motion, audited.carriers))
+    return values.reshape(len(values), separating.pairs, -1, 3)
+
+
+def _at(audited: AuditedMotion, separating: Separating, times: np.ndarray, which: np.ndarray) -> _Ends:
+    """Return the pairs `which` (k,) at other `times` (k,)."""
+    instants, rows = np.unique(times, return_inverse=True)
+    platform, carriers = audited.scenario.motion(instants, audited.deviation)
+    values = in_blocks(separating.points, motions(platform, carriers)).reshape(len(instants), separating.pairs, -1, 3)
+    return _ends(separating, times, values[rows, which])

@@ -1,0 +1,166 @@
+"""`Instants`: all that an audit finds at some instants: the motion, its tensions, and what limits bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...solvers import Certificate
+from ..limits import Rate
+from ..tasks.deviation import Deviation
+from ..tasks.paths import Motion
+from ..tasks.scenario import Scenario
+from .by_phase import distribution, taken_up
+from .checks import AuditedMotion
+from .tensions import in_all_winds, scaled
+
+__all__ = ["Instants", "instants", "joined"]
+
+OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation")
+MOTIONS = ("motion", "carriers")
+
+
+@dataclass(frozen=True)
+class Instants(AuditedMotion):
+    """A motion and its tensions at some instants, with all that an audit computes from them.
+
+    Attributes
+    ----------
+    few, tolerance
+        Whether the cables are too few for some wrenches, and the largest violation that passes [N].
+    A, w
+        Wrench matrices and required wrenches, with moments over `Robot.length`, (n, 6, m) and (n, 6) [N].
+    tensions_unlimited
+        The tensions of least norm without limits, (n, m) [N].
+    violation
+        Distance of the required wrench from the available ones, (n,) [N].
+    supports
+        The forces of the ground, (n, s) [N]; None for a task without ground.
+    values
+        What each limit bounds, (n, k) each.
+    certificate
+        That with the largest shortfall, with its time.
+    beyond
+        Beyond the limits within the range of few cables [N], and when [s].
+    """
+
+    few: bool
+    tolerance: float
+    A: np.ndarray
+    w: np.ndarray
+    tensions_unlimited: np.ndarray
+    violation: np.ndarray
+    supports: np.ndarray | None
+    values: list[np.ndarray]
+    certificate: Certificate | None
+    beyond: tuple[float, float]
+
+    def of(self, rows: np.ndarray) -> Instants:
+        """Return some of them."""
+        parts = {name: getattr(self, name)[rows] for name in OF_INSTANTS}
+        motions = {name: Motion(*(part[rows] for part in getattr(self, name))) for name in MOTIONS}
+        supports = None if self.supports is None else self.supports[rows]
+        return replace(self, **parts, **motions, supports=supports, values=[each[rows] for each in self.values])
+
+
+def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray) -> Instants:
+    """Evaluate a motion at `times` (n,).
+
+    Raises
+    ------
+    InputError
+        If somewhere a cable has no length.
+    """
+    motion, carriers = scenario.motion(times, deviation)
+    _check_lengths(scenario, times, motion, carriers)
+    A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
+    w = scenario.required_wrench(times, motion, carriers, scenario.wind)
+    distribute = distribution(scenario, times, A)
+    planned = _planned_tensions(deviation, times, scenario.robot.m)
+    result = distribute(w, taken_up(scenario, times) if planned is None else planned)
+    tensions, supports, certificate = result.tensions, result.supports, result.certificate
+    if (box := scenario.wind_box) is not None:
+        result, certificate = in_all_winds(distribute, box, motion, w, result)
+    if certificate is not None and result.row is not None:
+        certificate = replace(certificate, time=float(times[result.row]))
+    off_path = scenario.off_path(times, motion, carriers)
+    return Instants(
+        scenario=scenario,
+        deviation=deviation,
+        times=times,
+        motion=motion,
+        carriers=carriers,
+        tensions=tensions,
+        off_path=off_path,
+        few=distribute.few,
+        tolerance=distribute.tolerance,
+        A=scaled(scenario, A),
+        w=scaled(scenario, w),
+        tensions_unlimited=distribute.unlimited(w),
+        violation=result.violation,
+        supports=supports,
+        values=_limited(scenario, times, motion, carriers, tensions, off_path),
+        certificate=certificate,
+        beyond=(result.beyond, float(times[result.row or 0])),
+    )
+
+
+def joined(some: Instants, others: Instants) -> Instants:
+    """Return all instants of both in order; rates are those between the instants of `some`."""
+    times = np.concatenate([some.times, others.times])
+    order = np.argsort(times, kind="stable")
+    before = np.searchsorted(some.times, times[order], side="right") - 1
+
+    def both(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        return np.concatenate([first, second])[order]
+
+    changed = {}
+    for name in OF_INSTANTS:
+        changed[name] = both(getattr(some, name), getattr(others, name))
+    for name in MOTIONS:
+        pairs = zip(getattr(some, name), getattr(others, name), strict=True)
+        changed[name] = Motion(*(both(*pair) for pair in pairs))
+    if some.supports is not None and others.supports is not None:
+        changed["supports"] = both(some.supports, others.supports)
+    changed["values"] = [
+        mine[before] if isinstance(limit, Rate) else both(mine, its)
+        for limit, mine, its in zip(some.scenario.limits, some.values, others.values, strict=True)
+    ]
+    worst = max((some, others), key=lambda each: 0.0 if each.certificate is None else each.certificate.shortfall)
+    changed |= {"certificate": worst.certificate, "beyond": max(some.beyond, others.beyond)}
+    return replace(some, **changed)
+
+
+def _limited(
+    scenario: Scenario,
+    times: np.ndarray,
+    motion: Motion,
+    carriers: Motion,
+    tensions: np.ndarray,
+    off_path: np.ndarray,
+) -> list[np.ndarray]:
+    """Return what each limit bounds over time, (n, k), in its unit."""
+    limits = scenario.limits
+    values = limits.along(motion, carriers, tensions, off_path)
+    return [limit.over(times, its) for limit, its in zip(limits, values, strict=True)]
+
+
+def _check_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion) -> None:
+    """Raise InputError if somewhere a cable has no length."""
+    lengths = scenario.dynamics.cable_lengths(motion.pose, carriers.pose)
+    if (lengths > 1e-9).all():
+        return
+    row, cable = np.argwhere(~(lengths > 1e-9))[0]
+    raise InputError(
+        f"task {scenario.task.name!r}: path must be one on which every cable has a length, got one on which anchor and "
+        f"attachment of cable {cable + 1} coincide at t = {times[row]:.3f} s"
+    )
+
+
+def _planned_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> np.ndarray | None:
+    """Return the plan's tensions between its nodes, so that a redundant robot keeps the planned distribution."""
+    if deviation is None:
+        return None
+    return np.stack([np.interp(times, deviation.nodes, deviation.tensions[:, i]) for i in range(m)], axis=1)

@@ -1,0 +1,172 @@
+"""Choose further instants of an audit, where something may be exceeded between those that it has: `with_peaks`.
+
+What limits bound, tensions and missing wrenches are known at instants. From one to the next each leaves the line by no
+more than its curvature permits (`curvature`): where that is enough to exceed a limit, the instant in the middle is
+looked at too, until it is decided. Where the motion's derivatives have corners or jumps, at the nodes of the program
+and where phases meet, instants are on both sides.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+
+import numpy as np
+
+from ...solvers import solve_batch
+from ..limits import Rate
+from ..limits.distance import Distance
+from ..tasks.scenario import MOST_SAMPLES, Scenario
+from .checks import LENGTH_TOLERANCE
+from .curvature import between, is_jump, leaves
+from .instants import Instants, instants, joined
+from .tensions import TOLERANCE
+
+__all__ = ["with_peaks"]
+
+BESIDE = 2e-9  # of the duration: how far before a jump
+APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
+MOST_HALVES = 20  # of the time between two instants
+WIDE = 3  # instants to each side of a span, which its curvature needs
+SINGULAR = 1e-12  # of the squares of all that the cables can change: what is so little counts as nothing
+MOST_ROOM = 1e3  # of the weight: limits may be infinite
+UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
+
+
+def _corners(scenario: Scenario, seen: Instants) -> np.ndarray:
+    """Return the instants at corners of the motion, and just before those at which it or its load may jump, (k,)."""
+    nodes = np.zeros(0) if seen.deviation is None else seen.deviation.nodes
+    boundaries, duration = scenario.phases.boundaries, float(seen.times[-1])
+    jumps = boundaries if scenario.scheme.continuous else np.concatenate([boundaries, nodes[:: scenario.scheme.size]])
+    corners = np.unique(np.concatenate([nodes, boundaries]))
+    step = seen.times[1] - seen.times[0]
+    corners = corners[np.abs(corners - np.round(corners / step) * step) > APART * step]
+    corners = np.concatenate([corners, np.unique(jumps) - BESIDE * duration])
+    return np.unique(corners[(corners > 0.0) & (corners < duration)])
+
+
+def with_peaks(scenario: Scenario, seen: Instants) -> Instants:
+    """Return instants with all others that it takes to decide whether something is exceeded between them."""
+    corners = _corners(scenario, seen)
+    if corners.size:
+        seen = joined(seen, instants(scenario, seen.deviation, corners))
+    jumps = is_jump(seen.times)
+    spans = np.flatnonzero(_open(scenario, seen, jumps))
+    near, further = seen, list[Instants]()
+    for _ in range(MOST_HALVES):
+        if not spans.size or sum(len(each.times) for each in further) > MOST_SAMPLES:
+            break
+        near, jumps, halved = _about(near, jumps, spans)
+        middles = (near.times[halved] + near.times[halved + 1]) / 2
+        further.append(instants(scenario, seen.deviation, middles))
+        near = joined(near, further[-1])
+        jumps = np.insert(jumps, halved, False)
+        spans = halved + np.arange(len(halved))  # the first half of each, its second half is the next span
+        spans = np.sort(np.concatenate([spans, spans + 1]))
+        undecided = _open(scenario, near, jumps)
+        spans = spans[undecided[spans]]
+    return joined(seen, reduce(joined, further)) if further else seen
+
+
+def _about(seen: Instants, jumps: np.ndarray, spans: np.ndarray) -> tuple[Instants, np.ndarray, np.ndarray]:
+    """Return the instants about some spans, between which of them nothing is smooth, and where the spans then are."""
+    chosen = np.zeros(len(seen.times), bool)
+    for shift in range(-WIDE, WIDE + 2):
+        chosen[np.clip(spans + shift, 0, len(chosen) - 1)] = True
+    rows = np.flatnonzero(chosen)
+    apart = (np.diff(rows) > 1) | jumps[rows[:-1]]
+    return seen.of(rows), apart, np.searchsorted(rows, spans)
+
+
+def _open(scenario: Scenario, seen: Instants, jumps: np.ndarray) -> np.ndarray:
+    """Return between which instants something may be exceeded, (n - 1,), that is not exceeded at one of them."""
+    times = seen.times
+    spans = np.zeros(len(times) - 1, bool)
+    for limit, values in zip(scenario.limits, seen.values, strict=True):
+        if not isinstance(limit, Rate | Distance):
+            spans |= _may_exceed(times, values, jumps, limit.low, limit.high, limit.tolerance)
+    if scenario.robot.fixed_lengths is not None:
+        lengths = scenario.dynamics.cable_lengths(seen.motion.pose, seen.carriers.pose) - scenario.robot.fixed_lengths
+        spans |= _may_exceed(times, lengths, jumps, 0.0, 0.0, LENGTH_TOLERANCE)
+    if seen.few:
+        low, high = scenario.bounds_at(times)
+        for beyond in (low - seen.tensions, seen.tensions - high):
+            spans |= _may_exceed(times, beyond, jumps, -np.inf, 0.0, TOLERANCE)
+        spans |= _may_exceed(times, seen.violation[:, None], jumps, -np.inf, 0.0, seen.tolerance)
+    elif (seen.violation <= seen.tolerance).all():
+        spans |= _may_be_short(scenario, seen, jumps)
+    return spans & ~jumps
+
+
+def _may_exceed(
+    times: np.ndarray, values: np.ndarray, jumps: np.ndarray, low: float, high: float, tolerance: float
+) -> np.ndarray:
+    """Return between which instants values (n, k) may exceed their bounds, (n - 1,); none if they do so at one."""
+    most, least = high + tolerance, low - tolerance
+    if not ((values <= most) & (values >= least)).all():
+        return np.zeros(len(times) - 1, bool)
+    more = leaves(times, values, jumps)
+    above = np.maximum(values[:-1], values[1:]) + more > most + UNDECIDED * tolerance
+    below = np.minimum(values[:-1], values[1:]) - more < least - UNDECIDED * tolerance
+    return np.any(above | below, axis=1)
+
+
+def _may_be_short(scenario: Scenario, seen: Instants, jumps: np.ndarray) -> np.ndarray:
+    """Return between which instants there may be no tensions inside their limits, (n - 1,).
+
+    Tensions between those of two instants are inside their limits, since these are convex. What their wrench misses is
+    bounded by its curvature, and is nothing if it is small, or if all cables together can make up for it from what they
+    have left to their limits. Where they have not, other tensions of the same instants, far from their limits, may.
+    """
+    times, open_spans = seen.times, np.zeros(len(seen.times) - 1, bool)
+    low, high = scenario.bounds_at(times)
+    resting = scenario.phases.resting(times)
+    rows = np.arange(1, len(times) - 1)
+    missing, reached = _missing_and_reached(scenario, seen, jumps, low, high, seen.tensions, rows)
+    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & ~(resting[1:] & resting[:-1]) & ~jumps)
+    if spans.size:
+        rows = np.unique(np.concatenate([spans, spans + 1]))
+        middle = low[rows] + np.minimum((high - low)[rows] / 2, scenario.robot.force_scale)
+        solved = solve_batch(seen.A[rows], seen.w[rows], low[rows], high[rows], middle)
+        tensions = seen.tensions.copy()
+        tensions[rows[solved.feasible]] = solved.tensions[solved.feasible]
+        rows = rows[(rows > 0) & (rows < len(times) - 1)]
+        missing, reached = _missing_and_reached(scenario, seen, jumps, low, high, tensions, rows)
+        open_spans[spans] = (missing > np.maximum(seen.tolerance, reached))[spans]
+    return open_spans
+
+
+def _missing_and_reached(
+    scenario: Scenario,
+    seen: Instants,
+    jumps: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    t: np.ndarray,
+    rows: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what tensions between t (n, m) of two instants miss at most, and what cables make up for, (n - 1,) [N].
+
+    The second derivatives are those at `rows`. The second value is known where the first is more than is tolerated.
+    """
+    times, A, w = seen.times, seen.A, seen.w
+    h = np.diff(times)
+    after = ((A[rows + 1] - A[rows]) @ t[rows, :, None])[..., 0] - (w[rows + 1] - w[rows])
+    before = ((A[rows] - A[rows - 1]) @ t[rows, :, None])[..., 0] - (w[rows] - w[rows - 1])
+    bent = np.zeros(len(times))
+    slopes = after / h[rows, None] - before / h[rows - 1, None]
+    bent[rows] = 2 * np.linalg.norm(slopes, axis=1) / (h[rows] + h[rows - 1])
+    bent[1:-1][jumps[1:] | jumps[:-1]] = 0.0
+    missing = between(times, bent)
+    missing += np.linalg.norm((np.diff(A, axis=0) @ np.diff(t, axis=0)[..., None])[..., 0], axis=1) / 4
+    reached = np.zeros(len(missing))
+    spans = np.flatnonzero((missing > seen.tolerance) & ~jumps)
+    room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * scenario.robot.force_scale)
+    room = np.minimum(room[spans], room[spans + 1])
+    moving = np.flatnonzero(scenario.robot.dof_mask)
+    weighted = (A[spans] + A[spans + 1])[:, moving] / 2 * room[:, None, :]
+    square = weighted @ weighted.swapaxes(1, 2)
+    size = np.einsum("nii->n", square)
+    square += (SINGULAR * size + (size == 0))[:, None, None] * np.eye(len(moving))
+    parts = np.linalg.norm(weighted.swapaxes(1, 2) @ np.linalg.inv(square), axis=2).max(axis=1)  # of a cable's room
+    reached[spans] = np.divide(1.0, parts, out=np.zeros_like(parts), where=parts > 0)
+    return missing, reached

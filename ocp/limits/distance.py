@@ -1,0 +1,44 @@
+"""`Distance`: a limit of distances between bodies that move, each the hull of one or two points, and other bodies."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import casadi as ca
+from typing_extensions import override
+
+from .limit import Limit
+from .state import State
+
+__all__ = ["Distance", "Pair"]
+
+
+class Pair(NamedTuple):
+    """Two bodies: the hull of some points, and that of others or, without others, a convex place that stays."""
+
+    points: ca.SX  # (3, k) [m]
+    others: ca.SX  # (3, j) [m], j = 0: a place
+
+
+class Distance(Limit):
+    """A limit of the distance of each of some pairs of bodies.
+
+    A plane between two convex bodies proves their distance, and from its direction the distance at any other time
+    follows from the points alone: so the audit bounds it between two instants. All pairs of a limit have the same
+    numbers of points.
+    """
+
+    unit = "m"
+
+    @abstractmethod
+    def pairs(self, state: State) -> list[Pair]:
+        """Return the pairs at one instant, (k,), in a frame in which the places stay."""
+
+    @abstractmethod
+    def apart(self, pair: Pair) -> ca.SX:
+        """Return the distance of two bodies [m]; outside of each other it is the least of their points."""
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return ca.vertcat(*(self.apart(pair) for pair in self.pairs(state)))

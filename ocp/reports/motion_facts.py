@@ -1,0 +1,61 @@
+"""`motion_facts`: duration, path, tracking error, waypoints, speeds and wind of a plan, as its report names them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...models.part import Vector3
+from ...text import quantity, quantity_row
+from ..result import Plan
+from ..tasks.task import Task
+from ..tasks.wind_set import WindBox
+
+__all__ = ["Fact", "millimetres", "motion_facts", "wind"]
+
+Fact = tuple[str, str]  # its name, and the fact with its unit
+
+
+def motion_facts(plan: Plan) -> list[Fact]:
+    """Return the facts of the platform's motion."""
+    task, audit = plan.scenario.task, plan.audit
+    speed, acceleration = (
+        np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
+    )
+    kind = f"{len(plan.phases)} phases" if plan.phases else task.path.kind
+    law = "" if plan.scenario.path is task.path else ", with the fastest time law"
+    return [
+        ("duration", quantity(plan.scenario.duration, "s", digits=6)),
+        ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
+        *_accuracy(plan),
+        ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
+        *([("wind", _task_wind(task))] if task.wind is not None else []),
+    ]
+
+
+def _accuracy(plan: Plan) -> list[Fact]:
+    """Return the distance from the path, and that from its waypoints, which the path itself may round."""
+    audit, from_waypoints = plan.audit, plan.waypoint_distance
+    error = millimetres(plan.tracking_error_max)
+    if not error.startswith("0 "):
+        error += f" at most, at t = {audit.times[int(audit.tracking_error.argmax())]:.3f} s"
+    if from_waypoints is None:
+        return [("tracking error", error)]
+    return [("tracking error", f"{error}, from the path"), ("waypoints", from_waypoints.describe())]
+
+
+def millimetres(metres: float) -> str:
+    """Return a length in millimetres; less than a nanometre is rounding."""
+    return quantity(0.0 if metres < 1e-9 else metres * 1e3, "mm")
+
+
+def wind(velocity: Vector3) -> str:
+    """Return a velocity of the wind [m/s]."""
+    return f"({quantity_row(velocity)}) m/s"
+
+
+def _task_wind(task: Task) -> str:
+    """Return the task's wind, or its box and the wind of the planned tensions."""
+    if isinstance(task.wind, WindBox):
+        box = task.wind
+        return f"any from {wind(box.min)} to {wind(box.max)}; the tensions shown are those in {wind(box.middle)}"
+    return "" if task.wind is None else wind(task.wind)

@@ -1,0 +1,15 @@
+"""`warnings`: all warnings of a motion."""
+
+from __future__ import annotations
+
+from .inside_bodies import into_each_other
+from .instants import Instants
+from .outside_frame import outside_frame
+from .short_cables import short_cables
+
+__all__ = ["warnings"]
+
+
+def warnings(seen: Instants) -> tuple[str, ...]:
+    """Return what a person should know of a motion before a robot follows it, a sentence each."""
+    return (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))

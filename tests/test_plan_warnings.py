@@ -1,0 +1,124 @@
+"""Plans warn of what no limit forbids, in true sentences, and of nothing else."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline import Robot, available, load, plan, time_along
+
+from .warm import towline as run
+
+COGIRO = load("cogiro")
+
+
+def line(start, end, **more):
+    return {"path": {"kind": "line", "start": start, "end": end}, "duration": 8, **more}
+
+
+DIVE = line([-1, 0, 1.5], [1, 0, -0.3])
+
+
+def hanging(anchors, mass_at=(0, 0, 1), dof=("x", "y", "z"), **more):
+    """A point mass under ground anchors."""
+    end = {"carrier": "frame", "attachment": [0, 0, 0], "t_min": 0, "t_max": 500}
+    home = {} if mass_at is None else {"home": [*mass_at, 0, 0, 0]}
+    return Robot.model_validate(
+        {
+            "name": "mass",
+            "source": "test",
+            "platform": {"mass": 2, "dof": list(dof), **home},
+            "carriers": [{"name": "frame", "kind": "ground"}],
+            "cables": [{**end, "anchor": anchor} for anchor in anchors],
+            **more,
+        }
+    )
+
+
+def square(z, half=2.0):
+    return [[x, y, z] for x in (-half, half) for y in (-half, half)]
+
+
+def lowest(found):
+    """The lowest attachment or CoM of a saved motion [m], and when [s]."""
+    robot, pose = found.scenario.robot, found.trajectory.pose.values
+    turned = Rotation.from_euler("ZYX", pose[:, 5:2:-1]).as_matrix()
+    points = np.vstack([robot.platform.com, robot.attachments])
+    z = pose[:, None, 2] + np.einsum("nj,kj->nk", turned[:, 2], points)
+    return z.min(), found.trajectory.time.values[z.min(axis=1).argmin()]
+
+
+def test_a_dive_below_the_floor_is_warned_of_with_depth_place_and_time(tmp_path):
+    found = plan(COGIRO, DIVE)
+    assert found.feasible
+    (sentence,) = found.warnings
+    depth, time = lowest(found)
+    said = re.search(r"is ([\d.]+) m below the floor .* at t = ([\d.]+) s, at \((.+), (.+), (.+)\) m", sentence)
+    assert float(said[1]) == pytest.approx(-depth, abs=1e-3)
+    assert float(said[2]) == pytest.approx(time, abs=0.02)
+    assert float(said[5]) == pytest.approx(depth, abs=1e-3)
+    assert sentence in found.report()
+    assert "below the floor (z = 0 of {G})" in found.save_report(tmp_path / "report.html").read_text()
+    assert found.to_dict()["warnings"] == [sentence]
+    timing = time_along(COGIRO, DIVE)
+    assert "below the floor" in timing.report()
+    assert len(timing.to_dict()["warnings"]) == 1
+
+
+def test_the_command_line_prints_warnings(tmp_path):
+    (tmp_path / "dive.yaml").write_text(json.dumps(DIVE))
+    done = run("plan", "cogiro", "dive.yaml", "--json", cwd=tmp_path)
+    assert "below the floor" in json.loads(done.stdout)["warnings"][0], done.stderr
+    done = run("plan", "cogiro", "dive.yaml", cwd=tmp_path)
+    assert re.search(r"Warnings\n +warning +the platform leaves the frame", done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "words"),
+    [
+        (COGIRO, line([0, 0, 2], [0, 0, 4.9]), ["above the highest anchor (z = 5.42 m)"]),  # its upper attachments
+        (COGIRO, line([0, 0, 2], [9, 0, 2]), ["beyond the anchor with the largest x (x = 7.521 m)"]),
+        (COGIRO, line([0, 0, 2], [2000, 0, 1500]), ["largest x", "above the highest"]),  # millimetres
+        (hanging(square(3)), line([0, 0, 1], [0, -2.5, 1]), ["beyond the anchor with the smallest y (y = -2 m)"]),
+        (hanging(square(3), None), line([0, 0, 1], [0, 0, -0.5]), ["below the floor"]),
+        (hanging(square(3) + square(-2)), line([0, 0, 1], [0, 0, -3]), ["below the lowest anchor (z = -2 m)"]),
+        (load("planar-4"), line([0, 0, 0.75], [0.5, 0, 0]), ["below the floor"]),
+        (load("planar-4"), line([0, 0, 0.75], [0.95, 0, 0.75]), ["largest x"]),
+        (load("wang-ctmrts"), line([1.26, 0.96, 0.4], [1.26, 0.96, -0.2]), ["below the floor"]),
+    ],
+)
+def test_each_side_of_a_frame_is_known(robot, task, words):
+    found = plan(robot, {**task, "time_limit": 1})
+    said = [sentence for sentence in found.warnings if "leaves the frame" in sentence]
+    assert len(said) == len(words), said
+    for sentence, word in zip(said, words, strict=True):
+        assert word in sentence
+
+
+@pytest.mark.parametrize(
+    ("robot", "task"),
+    [
+        (hanging(square(0), (0, 0, -2)), line([0, 0, -2], [0.5, 0, -5])),  # {G} lies in the ceiling
+        (hanging(square(0), None), line([0, 0, -2], [0.5, 0, -5])),
+        (hanging(square(3), (0, 0, -0.5)), line([0, 0, 0], [0.5, 0, -1])),  # {G} lies at the workspace's middle
+        (hanging(square(3) + square(-2)), line([0, 0, 1], [0.5, 0, -1.5])),  # in a pit
+        (hanging(square(0), (0, 0, 2), gravity=[0, 0, 9.81]), line([0, 0, 2], [0, 0, 4])),  # a balloon
+        (hanging([[0, 0, 3]]), line([0, 0, 1], [0.2, 0.1, 1.2])),  # a pendulum
+        (hanging([[-1, 0, 3], [1, 0, 3]]), line([0, 0, 1], [0.1, 0.3, 1])),  # it swings across its plane
+        (hanging(square(3) + square(-1), (0, 0, 1), gravity=[0, 0, 0]), line([0, 0, 1], [0.1, 0.3, -0.5])),
+        (load("planar-4"), line([0, 0, 0.75], [0.3, 0, 0.5])),
+        (load("multi-quadrotor-3"), line([0, 0, 0], [0, 0, -1])),  # it flies
+        (load("wang-flying"), line([0, 0, -1], [0, 0, -1.2])),
+        (load("wang-ctmrts"), line([1.26, 0.96, 0.4], [1.2, 0.96, 0.6])),
+    ],
+)
+def test_no_frame_is_left_where_there_is_none(robot, task):
+    assert not plan(robot, {**task, "time_limit": 1}).warnings
+
+
+@pytest.mark.parametrize("name", available())
+def test_a_robot_at_home_is_inside_its_frame(name):
+    robot = load(name)
+    assert plan(robot, {"path": {"kind": "rest", "pose": robot.home.tolist()}, "duration": 1}).warnings == ()
