@@ -26,8 +26,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .display import record
 from .errors import InputError
 from .inputs import real_array, required, shown, whole_number
+from .models.part import LARGEST
 from .models.robot import Robot
 
 if TYPE_CHECKING:
@@ -48,17 +50,23 @@ def check_share(robot: Robot, share: object) -> float:
     InputError
         If it is no number above 0 and below 1, or the robot has no uncertainty.
     """
-    if isinstance(share, bool) or not isinstance(share, float | np.floating) or not 0.0 < share < 1.0:
-        raise InputError(f"robust must be a share of robots above 0 and below 1, such as 0.95, got {shown(share)}")
+    value = _share("robust", share)
     uncertainty_of(robot)
-    return float(share)
+    return value
+
+
+def _share(name: str, value: object) -> float:
+    if not isinstance(value, float | np.floating) or not 0.0 < value < 1.0:
+        raise InputError(f"{name} must be a share of robots above 0 and below 1, such as 0.95, got {shown(value)}")
+    return float(value)
 
 
 def uncertainty_of(robot: Robot) -> Uncertainty:
     """Return the uncertainty of a robot, or raise InputError if it has none."""
-    if robot.uncertainty is None:
+    uncertainty = required("robot", robot, Robot).uncertainty
+    if uncertainty is None:
         raise InputError(f"robust must be left out if the robot's file has no uncertainty, got robot {robot.name!r}")
-    return robot.uncertainty
+    return uncertainty
 
 
 class Spread:
@@ -76,14 +84,15 @@ class Spread:
     Raises
     ------
     InputError
-        If the robot has no uncertainty, or fewer cables than rows.
+        If an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables than rows.
     """
 
-    def __init__(self, robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, rows: np.ndarray | None = None):
+    def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):
         from .models.sensitivity import derivatives, wrench_matrices
 
         uncertainty = uncertainty_of(robot)
-        rows = np.flatnonzero(robot.dof_mask) if rows is None else rows
+        pose, carrier_pose = _places(robot, pose, carrier_pose)
+        rows = np.flatnonzero(robot.dof_mask) if rows is None else _indices("rows", rows, 6)
         scale = robot.wrench_scale[rows]
         A = wrench_matrices(robot, pose, carrier_pose)[:, rows] * scale[:, None]
         D, self._cables = derivatives(robot, pose, carrier_pose, uncertainty.parameters)
@@ -91,17 +100,21 @@ class Spread:
         self._inverse = _inverse(A)  # (n, m, rows)
         self._factor = uncertainty.factor  # (p, r)
 
-    def changes(self, tensions: np.ndarray) -> np.ndarray:
+    def changes(self, tensions: ArrayLike) -> np.ndarray:
         """Return the change of tensions (n, m) along each direction of `Uncertainty.factor`, (n, m, r) [N]."""
-        change = (self._D * tensions[:, None, self._cables]) @ self._factor  # of A t, (n, rows, r)
+        values = real_array("tensions", tensions)
+        if values.shape != self._inverse.shape[:2]:
+            raise InputError(f"tensions must be an array of shape {self._inverse.shape[:2]}, got {shown(values)}")
+        change = (self._D * values[:, None, self._cables]) @ self._factor  # of A t, (n, rows, r)
         return -self._inverse @ change
 
-    def sigmas(self, tensions: np.ndarray) -> np.ndarray:
+    def sigmas(self, tensions: ArrayLike) -> np.ndarray:
         """Return the standard deviations of tensions (n, m) over the robots of the uncertainty, (n, m) [N]."""
         return np.linalg.norm(self.changes(tensions), axis=2)
 
-    def only(self, rows: np.ndarray) -> Spread:
+    def only(self, rows: ArrayLike) -> Spread:
         """Return the same of some places, by their indices."""
+        rows = _indices("rows", rows, len(self._inverse))
         part = object.__new__(Spread)
         part._cables, part._factor = self._cables, self._factor
         part._D, part._inverse = self._D[rows], self._inverse[rows]
@@ -146,11 +159,26 @@ def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: Arr
 
 
 def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
-    """Return the factor k of standard deviations that a share of the robots keeps to at any poses, all at once."""
-    return _chi(uncertainty.factor.shape[1], share)
+    """Return the factor k of standard deviations that a share of the robots keeps to at any poses, all at once.
+
+    Parameters
+    ----------
+    uncertainty
+        Of a robot.
+    share
+        Of the robots, above 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong.
+    """
+    from .models.uncertainty import Uncertainty
+
+    return _chi(required("uncertainty", uncertainty, Uncertainty).factor.shape[1], _share("share", share))
 
 
-def motion_factor(changes: np.ndarray, share: float) -> float:
+def motion_factor(changes: ArrayLike, share: float) -> float:
     """Return the factor k that a share of the robots keeps to along a motion, at all its times and cables.
 
     Parameters
@@ -159,9 +187,18 @@ def motion_factor(changes: np.ndarray, share: float) -> float:
         Of the tensions along each direction of the uncertainty, at dense times in order, (n, m, r) [N].
     share
         Of the robots, above 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value.
     """
     from scipy.special import erfc
 
+    share, changes = _share("share", share), real_array("changes", changes).astype(float)
+    if changes.ndim != 3 or 0 in changes.shape[:2] or not (np.abs(changes) <= LARGEST).all():
+        accepted = f"an array of shape (n, m, r) of numbers up to {LARGEST:g}"
+        raise InputError(f"changes must be {accepted}, got {shown(changes)}")
     sigmas = np.linalg.norm(changes, axis=2, keepdims=True)  # (n, m, 1)
     varied = sigmas > ROUNDING * max(float(sigmas.max()), np.finfo(float).tiny)
     units = np.divide(changes, sigmas, out=np.zeros_like(changes), where=varied)
@@ -203,6 +240,8 @@ class RobotShare(NamedTuple):
     """
 
     holds: np.ndarray
+
+    __repr__ = record
 
     @property
     def share(self) -> float:
@@ -271,4 +310,11 @@ def _rows(name: str, value: ArrayLike, n: int, shape: tuple[int, ...]) -> np.nda
     array = real_array(name, value).astype(float)
     if array.shape != (n, *shape) or not np.isfinite(array).all():
         raise InputError(f"{name} must be an array of shape {(n, *shape)} of finite numbers, got {shown(array)}")
+    return array
+
+
+def _indices(name: str, value: ArrayLike, n: int) -> np.ndarray:
+    array = real_array(name, value)
+    if array.ndim != 1 or array.dtype.kind not in "iu" or not ((array >= 0) & (array < n)).all():
+        raise InputError(f"{name} must be an array of indices below {n}, got {shown(array)}")
     return array

@@ -13,11 +13,13 @@ from math import comb
 
 import numpy as np
 
+from ..display import Displayed
+
 RANK = 1e-9  # relative: directions that the cables hardly reach are none; twelve-digit geometry makes such
 
 
 @dataclass(frozen=True)
-class Facets:
+class Facets(Displayed):
     """Half-spaces of N available wrench sets.
 
     w is available if and only if low <= normals @ w <= high and outside @ (w - offset) = 0.

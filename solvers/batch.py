@@ -1,6 +1,7 @@
 """Many problems in one call: `solve_batch`."""
 
 import time
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import processors
+from ..display import Displayed, Fact
 from ..errors import InputError
 from ..inputs import number, real_array, shown, whole_number
+from ..text import quantity
 from . import compiled
 from .core import CABLES, ROWS, solve_rows
 from .kernels.codes import INACCURATE, INVALID, OPTIMAL, UNSURE
@@ -30,7 +33,7 @@ MOST_ROWS_OF_CORE = 8000
 
 
 @dataclass(frozen=True, eq=False)
-class BatchSolution:
+class BatchSolution(Displayed):
     """The answers to a batch of problems, `...` being its leading dimensions.
 
     Attributes
@@ -71,6 +74,18 @@ class BatchSolution:
     backend: str = ""
 
     statuses = STATUSES
+
+    def _headline(self) -> str:
+        return f"{quantity(self.code.size)} problems: " + ", ".join(
+            f"{quantity(n)} {s}" for s, n in self.count().items()
+        )
+
+    def _facts(self) -> Iterable[Fact]:
+        return [
+            ("shape", " x ".join(map(str, self.tensions.shape))),
+            ("time", quantity(1e3 * self.time, "ms", digits=3)),
+            ("backend", self.backend),
+        ]
 
     @property
     def feasible(self) -> NDArray[np.bool_]:

@@ -15,10 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..display import Displayed, Fact
 from ..inputs import finite_array, required
 from ..text import quantity
-from ..tolerances import NEGLIGIBLE, RANK
+from ..tolerances import NEGLIGIBLE, ORTHOGONAL, RANK
 from .box_least_squares import Projection, project
+from .exact_arithmetic import exact_optimum
 from .problem import Array, TensionProblem, accepted_error
 
 __all__ = ["Certificate", "CertificateText", "certificate_along", "certify", "sharpest"]
@@ -26,6 +28,8 @@ __all__ = ["Certificate", "CertificateText", "certificate_along", "certify", "sh
 Indices = NDArray[np.intp]
 
 
+_EPSILON = float(np.finfo(np.float64).eps)
+_NONE = np.zeros(0, dtype=np.intp)
 _LEAST_PART = 0.05  # of a direction of length one: a smaller force or moment is left out of its description
 _VERTICAL = 0.99  # cosine from which on a force is called vertical
 
@@ -41,7 +45,7 @@ class CertificateText(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Displayed):
     """A wrench direction along which the required wrench lies beyond everything that the cables can give.
 
     Attributes
@@ -83,6 +87,15 @@ class Certificate:
     span: tuple[float, float] | None = None
     wind: tuple[float, float, float] | None = None
 
+    def _headline(self) -> str:
+        when = "" if self.time is None else f" at t = {self.time:.3f} s"
+        return f"no tensions{when}: short by {quantity(self.shortfall, 'N')}"
+
+    def _facts(self) -> list[Fact]:
+        text = self.text()
+        names = ("along", "needed", "available", "limits")
+        return [(name, getattr(text, name)) for name in names]
+
     @property
     def binding(self) -> Indices:
         """Return the indices of the cables whose limits determine the support value, ascending."""
@@ -105,11 +118,11 @@ class Certificate:
         unit = self.direction / problem.row_scale
         if not abs(float(unit @ unit) - 1.0) < 1e-9:
             return False
-        support, at_max, at_min = _support(problem, self.direction)
+        support, rounding, at_max, at_min = _support(problem, self.direction)
         demand = float(self.direction @ problem.w)
         tolerance = problem.tolerance(self.closest)
         return bool(
-            demand - support > tolerance
+            demand - support > tolerance + rounding
             and abs(demand - support - self.shortfall) <= tolerance
             and np.array_equal(at_max, self.at_max)
             and np.array_equal(at_min, self.at_min)
@@ -222,7 +235,11 @@ def certify(problem: TensionProblem) -> Certificate | None:
     :
         A verified certificate. None means that w is available within the tolerance.
     """
-    return sharpest(problem, project(required("problem", problem, TensionProblem)))
+    projection = project(required("problem", problem, TensionProblem))
+    certificate = sharpest(problem, projection)
+    if certificate is not None or np.linalg.norm(projection.residual) <= accepted_error(problem, projection.closest):
+        return certificate
+    return sharpest(problem, Projection(*exact_optimum(problem, projection.closest)))
 
 
 def sharpest(problem: TensionProblem, projection: Projection) -> Certificate | None:
@@ -249,7 +266,8 @@ def certificate_along(
 
 def _outside_range(problem: TensionProblem) -> Array | None:
     """Return the part of S w outside the range of S A, or None if A has full row rank."""
-    U, sigma, _ = np.linalg.svd(problem.scaled_A)
+    norms = problem.column_norms
+    U, sigma, _ = np.linalg.svd(problem.scaled_A / np.where(norms > 0.0, norms, 1.0))  # of the same range
     null = U[:, int(np.count_nonzero(sigma > RANK * sigma[0])) :]
     return null @ (null.T @ problem.scaled_w) if null.shape[1] else None
 
@@ -261,17 +279,25 @@ def _along(problem: TensionProblem, vector: Array, closest: Array, any_length: b
     if not (0.0 if any_length else tolerance) < size < np.inf:
         return None
     direction = problem.row_scale * (vector / size)
-    support, at_max, at_min = _support(problem, direction)
+    support, rounding, at_max, at_min = _support(problem, direction)
     demand = float(direction @ problem.w)
-    if not demand - support > tolerance:
+    if not demand - support > tolerance + rounding:
         return None
     return Certificate(direction, support, demand, demand - support, at_max, at_min, closest, problem.length)
 
 
-def _support(problem: TensionProblem, direction: Array) -> tuple[float, Indices, Indices]:
-    """Return the support value [N] of the available wrench set along `direction`, and the cables at each limit."""
-    pull = direction @ problem.A
-    small = NEGLIGIBLE * problem.column_norms.max()
-    at_max, at_min = np.flatnonzero(pull > small), np.flatnonzero(pull < -small)
-    support = pull[at_max] @ problem.t_max[at_max] + pull[at_min] @ problem.t_min[at_min]
-    return float(support), at_max, at_min
+def _support(problem: TensionProblem, direction: Array) -> tuple[float, float, Indices, Indices]:
+    """Return support value along `direction` and a bound of its rounding [N], and the cables at t_max and at t_min.
+
+    What a cable with a limit gives counts at any size, and so does the rounding of its pull. A cable without a limit
+    gives any amount, unless it pulls by less than the rounding of its own wrench: the support value is infinite.
+    """
+    pull, terms = direction @ problem.A, np.abs(direction) @ np.abs(problem.A)
+    limit = np.where(pull > 0.0, problem.t_max, problem.t_min)
+    known = np.isfinite(limit)
+    if (np.abs(pull[~known]) > ORTHOGONAL * problem.column_norms[~known]).any():
+        return np.inf, np.inf, _NONE, _NONE
+    support = float(pull[known] @ limit[known])
+    rounding = (problem.n + problem.m + 2) * _EPSILON * float(terms[known] @ np.abs(limit[known]))
+    small = NEGLIGIBLE * problem.column_norms
+    return support, rounding, np.flatnonzero(pull > small), np.flatnonzero(pull < -small)

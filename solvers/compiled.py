@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from .. import simd, tolerances
+from ..display import Displayed
 from ..writing import whole_file
 from .kernels import rows
 
@@ -41,7 +42,7 @@ _patience = _SECONDS_TO_LOAD  # seconds of NumPy until the disk is looked at for
 
 
 @dataclass(frozen=True, eq=False)
-class Kernels:
+class Kernels(Displayed):
     """The kernel in one of its forms.
 
     Attributes

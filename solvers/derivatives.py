@@ -60,8 +60,8 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     problem :
         The problem.
     solution :
-        Its solution by a method that solves the quadratic program ("active-set", "min-norm", "qp", "2-norm",
-        "dykstra").
+        Its solution by a method that solves the quadratic program ("active-set", "min-norm" without `lambda_`, "qp",
+        "2-norm", "dykstra").
 
     Returns
     -------

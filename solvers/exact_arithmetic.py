@@ -13,8 +13,10 @@ so large that the wrench error left is rounding, unless the price of the wrench 
 the cost by a part in a million, w is known no better than that.
 """
 
+from collections.abc import Sequence
 from fractions import Fraction
 from math import lcm
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,32 +28,67 @@ from .problem import Array, TensionProblem, accepted_error
 _ERROR = 2.0**-73
 
 
-def exact_optimum(problem: TensionProblem, nearest: Array) -> Array:
-    """Return the tensions of least cost inside their limits [N], shape (m,), whose wrench is w or the nearest to it.
+class ExactOptimum(NamedTuple):
+    """Tensions of least cost inside their limits whose wrench is w or the nearest to it, rounded once.
 
-    Begins at the tensions `nearest`, (m,) [N], of the projection of w. Exact but for the rounding of the result.
+    Attributes
+    ----------
+    tensions :
+        The tensions [N], shape (m,).
+    missing :
+        What they miss of the wrench before they are rounded, S (w - A t) [N], shape (n,).
+    """
+
+    tensions: Array
+    missing: Array
+
+
+def exact_optimum(problem: TensionProblem, nearest: Array) -> ExactOptimum:
+    """Find the optimum, from the tensions `nearest`, (m,) [N], of the projection of w.
+
+    Where the projection is not the nearest, rho is raised until the wrench error falls no more.
     """
     size = problem.weights @ (nearest - problem.t_ref) ** 2
     wrench = accepted_error(problem, nearest) / FEASIBILITY
     _, exponent = np.frexp(size / wrench / wrench / _ERROR if size > 0.0 and wrench > 0.0 else 1.0)
     rho = Fraction(2) ** int(exponent)
 
-    M = [[Fraction(x) for x in row] for row in problem.scaled_A.tolist()]
-    w = [Fraction(x) for x in problem.scaled_w.tolist()]
+    entries, unit = _integers(problem.scaled_A.ravel().tolist())
+    given, wrench_unit = _integers(problem.scaled_w.tolist())
+    rows = [entries[i * problem.m : (i + 1) * problem.m] for i in range(problem.n)]
+    columns = [entries[c :: problem.m] for c in range(problem.m)]
+    squares = [[Fraction(_dot(left, right), unit * unit) for right in columns] for left in columns]
+    along = [Fraction(_dot(column, given), unit * wrench_unit) for column in columns]
     weights = [Fraction(x) for x in problem.weights.tolist()]
     t_ref = [Fraction(x) for x in problem.t_ref.tolist()]
-    columns = list(zip(*M, strict=True))
-    H = [[rho * sum(a * b for a, b in zip(left, right, strict=True)) for right in columns] for left in columns]
-    for i, weight in enumerate(weights):
-        H[i][i] += weight
-    slope = [
-        rho * sum(a * b for a, b in zip(column, w, strict=True)) + weight * wish
-        for column, weight, wish in zip(columns, weights, t_ref, strict=True)
-    ]
     limits = list(zip(problem.t_min.tolist(), problem.t_max.tolist(), strict=True))
-    optimum = minimum_in_box(H, slope, limits, [Fraction(x) for x in nearest.tolist()])
-    t = np.array([float(x) for x in optimum])
-    return np.minimum(np.maximum(t, problem.t_min), problem.t_max)
+    x, before = [Fraction(value) for value in nearest.tolist()], np.inf
+    while True:
+        H = [[rho * value for value in row] for row in squares]
+        for i, weight in enumerate(weights):
+            H[i][i] += weight
+        slope = [rho * a + weight * wish for a, weight, wish in zip(along, weights, t_ref, strict=True)]
+        x = minimum_in_box(H, slope, limits, x)
+        t = np.minimum(np.maximum([float(value) for value in x], problem.t_min), problem.t_max)
+        together = lcm(*(value.denominator for value in x))
+        parts = [value.numerator * (together // value.denominator) * wrench_unit for value in x]
+        left = [b * unit * together - _dot(row, parts) for row, b in zip(rows, given, strict=True)]
+        missing = np.array([value / (unit * wrench_unit * together) for value in left])
+        error = float(np.linalg.norm(missing))
+        if error <= accepted_error(problem, t) or error > 0.5 * before:
+            return ExactOptimum(t, missing)
+        rho, before = rho / Fraction(_ERROR) ** 4, error
+
+
+def _integers(values: list[float]) -> tuple[list[int], int]:
+    """Return numbers as integers over one power of two."""
+    ratios = [value.as_integer_ratio() for value in values]
+    unit = max(denominator for _, denominator in ratios)
+    return [numerator * (unit // denominator) for numerator, denominator in ratios], unit
+
+
+def _dot(x: Sequence[int], y: Sequence[int]) -> int:
+    return sum(a * b for a, b in zip(x, y, strict=True))
 
 
 def minimum_in_box(

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..display import Displayed, record
 from ..errors import InputError
 from ..inputs import number, shown, whole_number
 from .stage_problem import Array, StageProblem
@@ -37,6 +38,8 @@ class Multipliers(NamedTuple):
     upper: Array  # (N, m)
     rows: Array  # (N, p)
 
+    __repr__ = record
+
 
 class Residuals(NamedTuple):
     """Errors of the conditions of optimality, relative to the largest of its terms (`docs/horizon.md`).
@@ -58,9 +61,11 @@ class Residuals(NamedTuple):
     complementarity: float
     soft: float
 
+    __repr__ = record
+
 
 @dataclass(slots=True, eq=False)
-class HorizonSolution:
+class HorizonSolution(Displayed):
     """Controls and states of all stages, and how near they are to the optimum.
 
     Attributes
@@ -155,7 +160,7 @@ def solve_horizon(
 _FIELDS = ("A", "B", "start", "Q", "R", "c", "S", "q", "r", "u_min", "u_max", "C", "D", "d", "penalty", "square")
 
 
-class Horizon:
+class Horizon(Displayed):
     """Problems of one size, to be written into its arrays, solved, and written again.
 
     A predictive controller solves such a problem at each step. All arrays are parts of one, in the layout of the

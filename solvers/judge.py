@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..tolerances import AT_LIMIT, RANK
-from .box_least_squares import project
+from .box_least_squares import Projection, project
 from .certificate import Certificate, sharpest
 from .exact_arithmetic import exact_optimum
 from .methods.method import Method, Proposal
@@ -72,15 +72,16 @@ def judge(
         return Judgement(Status.INACCURATE, exact, f"{_NEAREST}: {proposal.detail}".removesuffix(": "))
     projection = project(problem)
     certificate = None if useful else sharpest(problem, projection)
+    if certificate is None and method.exact and not proposal.final:
+        optimum = exact_optimum(problem, projection.closest)
+        if _gives_wrench(problem, optimum.tensions):
+            left = None if method.least_squares else _face(problem, form, optimum.tensions)
+            return Judgement(Status.OPTIMAL, optimum.tensions, _EXACT, left=left)
+        certificate = None if useful else sharpest(problem, Projection(*optimum))
     if certificate is not None:
         if method.always_answers and tensions is not None:
             return Judgement(Status.INACCURATE, tensions, proposal.detail, certificate)
         return Judgement(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
-    if method.exact and not proposal.final:
-        exact = exact_optimum(problem, projection.closest)
-        if _gives_wrench(problem, exact):
-            left = None if method.least_squares else _face(problem, form, exact)
-            return Judgement(Status.OPTIMAL, exact, _EXACT, left=left)
     if useful:
         return Judgement(Status.INACCURATE, tensions, _UNPROVEN)
     return Judgement(Status.FAILED if tensions is None else Status.INACCURATE, tensions, proposal.detail)

@@ -14,9 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..display import record
 from ..inputs import required
-from ..tolerances import NEGLIGIBLE, RANK
-from .box_least_squares import project
+from ..tolerances import NEGLIGIBLE, OPTIMALITY, RANK
+from .box_least_squares import Projection, project
+from .certificate import certificate_along
+from .exact_arithmetic import exact_optimum
 from .problem import TensionProblem
 
 __all__ = ["Margin", "capacity_margin"]
@@ -43,6 +46,8 @@ class Margin(NamedTuple):
     gradient: Array  # (n,)
     direction: Array  # (n,)
 
+    __repr__ = record
+
 
 def capacity_margin(problem: TensionProblem) -> Margin:
     """Return the capacity margin of a wrench, its gradient and the direction of least reserve.
@@ -68,6 +73,9 @@ def capacity_margin(problem: TensionProblem) -> Margin:
     """
     closest, residual = project(required("problem", problem, TensionProblem))
     distance = float(np.sqrt(residual @ residual))
+    if distance > problem.tolerance(closest) and not _is_distance(problem, Projection(closest, residual), distance):
+        closest, residual = exact_optimum(problem, closest)
+        distance = float(np.sqrt(residual @ residual))
     if distance > problem.tolerance(closest):
         return _margin(problem, -distance, residual / distance)
     moving = problem.t_min < problem.t_max
@@ -79,16 +87,22 @@ def capacity_margin(problem: TensionProblem) -> Margin:
     basis = U[:, :rank]  # (n, rank)
     normals = _normals(basis.T @ columns) @ basis.T  # (candidates, n)
     pull = normals @ problem.scaled_A  # (candidates, m)
-    pull[np.abs(pull) <= NEGLIGIBLE * problem.column_norms.max()] = 0.0
-    # Support value less demand, from where a point of the set is known: no tension is far from it.
+    # Support value less demand, from where a point of the set is known: no tension is far from it. A cable without a
+    # limit has any amount of reserve, unless its pull is rounding; with one, the reserve is known at any size.
+    space = np.where(pull > 0.0, problem.t_max - closest, problem.t_min - closest)
+    pull[~np.isfinite(space) & (np.abs(pull) <= NEGLIGIBLE * problem.column_norms)] = 0.0
     with np.errstate(invalid="ignore"):
-        up = np.where(pull > 0.0, pull * (problem.t_max - closest), 0.0)
-        down = np.where(pull < 0.0, pull * (problem.t_min - closest), 0.0)
-    reserve = (up + down).sum(axis=1)
+        reserve = np.where(pull != 0.0, pull * space, 0.0).sum(axis=1)
     nearest = int(np.argmin(reserve))
     if not np.isfinite(reserve[nearest]):
         return _margin(problem, np.inf, np.zeros(problem.n))
     return _margin(problem, float(reserve[nearest]), normals[nearest])
+
+
+def _is_distance(problem: TensionProblem, projection: Projection, distance: float) -> bool:
+    """Return whether a certificate confirms the distance of w to its projection: no wrench of the set is nearer."""
+    certificate = certificate_along(problem, problem.row_scale * projection.residual, projection)
+    return certificate is not None and certificate.shortfall > (1.0 - OPTIMALITY) * distance
 
 
 def _margin(problem: TensionProblem, value: float, direction: Array) -> Margin:

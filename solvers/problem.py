@@ -6,9 +6,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import real_array
-from ..tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ..tolerances import CANCELLED, DOUBTFUL, FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 __all__ = ["Array", "TensionProblem", "accepted_error"]
 
@@ -18,9 +19,11 @@ Array = NDArray[np.float64]
 _LARGEST, _SMALLEST = 1e50, 1e-50
 _HEAVIEST, _LIGHTEST = 1e20, 1e-20
 
+_NO_ENTRY = 1e-6  # Entries of a null-space vector below this have no sign of their own.
+
 
 @dataclass(frozen=True, eq=False)
-class TensionProblem:
+class TensionProblem(Displayed):
     r"""Tensions nearest to reference tensions that give a wrench inside the tension limits.
 
     $$
@@ -155,6 +158,19 @@ class TensionProblem:
         """Return the norm of each column of S A, shape (m,): the wrench that 1 N in a cable makes [N per N]."""
         return np.sqrt(np.einsum("ij,ij->j", self.scaled_A, self.scaled_A))
 
+    @cached_property
+    def null_space(self) -> Array:
+        """Return N, shape (m, m - rank): orthonormal columns that span the null space of A.
+
+        All tensions that give w, limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the lambda of some.
+        The first entry of each column is positive, or the first that is not zero. Singular values of S A below 1e-10
+        of the largest count as zero.
+        """
+        _, sigma, rows = np.linalg.svd(self.scaled_A)
+        null = rows[int(np.count_nonzero(sigma > DOUBTFUL * sigma[0])) :].T
+        first = np.argmax(np.abs(null) > _NO_ENTRY, axis=0)
+        return null * np.sign(null[first, np.arange(null.shape[1])])
+
     def tolerance(self, tensions: Array) -> float:
         r"""Return the largest wrench error [N] at which `tensions` are accepted as giving w.
 
@@ -165,6 +181,8 @@ class TensionProblem:
 
         with $\hat t_i$ the tension inside the limits that is nearest to 0: the first part is relative to what the
         problem requires, never to a limit that happens to be huge; the second is the rounding of A t itself.
+        There the terms of t count up to those of t_ref and 1e10 times what is required: where more digits than that
+        cancel, rounding could pass for any wrench.
 
         Parameters
         ----------
@@ -182,7 +200,11 @@ def accepted_error(problem: TensionProblem, tensions: Array) -> float:
     nearest_to_zero = np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max)
     norms = problem.column_norms
     required = np.sqrt(problem.scaled_w @ problem.scaled_w) + norms @ np.abs(nearest_to_zero)
-    return float(FEASIBILITY * required + ROUNDING * (norms @ (np.abs(tensions) + np.abs(problem.t_ref))))
+    reference = norms @ np.abs(problem.t_ref)
+    terms = norms @ np.abs(tensions)
+    if required > 0.0:  # otherwise no tensions give the wrench too, and what others leave is rounding
+        terms = min(terms, CANCELLED * required + reference)
+    return float(FEASIBILITY * required + ROUNDING * (terms + reference))
 
 
 def _real_array(name: str, value: ArrayLike) -> Array:

@@ -1,12 +1,14 @@
 """The answer to one problem: `TensionSolution`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..display import BLUE, GREY, ORANGE, Curve, Displayed, Fact, picture
 from ..errors import SolverError
+from ..text import quantity, quantity_range, quantity_row
 from .certificate import Certificate
 from .problem import Array, TensionProblem
 from .status import Status
@@ -14,8 +16,8 @@ from .status import Status
 __all__ = ["TensionSolution"]
 
 
-@dataclass(slots=True, eq=False, repr=False)
-class TensionSolution:
+@dataclass(slots=True, eq=False)
+class TensionSolution(Displayed):
     """Tensions, or the proof that there are none.
 
     Attributes
@@ -51,8 +53,33 @@ class TensionSolution:
     detail: str = ""
     proof: Certificate | Callable[[TensionProblem], Certificate | None] | None = None
 
-    def __repr__(self) -> str:
-        return f"TensionSolution(status={self.status.value!r}, tensions={self.tensions!r}, method={self.method!r})"
+    def _headline(self) -> str:
+        short = self.certificate and f", short by {quantity(self.certificate.shortfall, 'N')}"
+        return f"{self.problem.m} cables: {self.status.value.upper()}{short or (self.detail and f', {self.detail}')}"
+
+    def _facts(self) -> Iterable[Fact]:
+        problem, facts = self.problem, []
+        if self.tensions is not None:
+            facts += [("tensions", quantity_row(self.tensions, "N")), ("residual", quantity(self.residual, "N"))]
+        facts += [(name, quantity_range(getattr(problem, name), "N")) for name in ("t_min", "t_max")]
+        if (certificate := self.certificate) is not None:
+            facts += certificate._facts()
+        return [*facts, ("method", f"{self.method}{(self.backend and f' ({self.backend})') or ''}")]
+
+    def _picture(self) -> str:
+        """Return each cable's tension as a mark between its limits; the closest ones where there are none."""
+        problem, proof = self.problem, self.certificate
+        tensions = proof.closest if self.tensions is None and proof is not None else self.tensions
+        if tensions is None:
+            return ""
+        bounds = np.stack([problem.t_min, problem.t_max])
+        known = np.concatenate([tensions, bounds[np.isfinite(bounds)]])
+        colour = ORANGE if self.tensions is None else BLUE
+        curves: list[Curve] = []
+        for index, ends in enumerate(np.clip(bounds, known.min(), known.max()).T):
+            cable, tension = index + 1, tensions[index]
+            curves += [([cable, cable], ends, GREY), ([cable - 0.3, cable + 0.3], [tension, tension], colour)]
+        return picture(curves, "cable", "tension [N]")
 
     @property
     def certificate(self) -> Certificate | None:
@@ -104,6 +131,15 @@ class TensionSolution:
         if self.tensions is None:
             return float("nan")
         return float(self.problem.weights @ (self.tensions - self.problem.t_ref) ** 2)
+
+    @property
+    def lambda_(self) -> Array | None:
+        """Return lambda [N], shape (m - rank,), with tensions = A^+ w + N lambda; None without tensions.
+
+        N is `problem.null_space`, whose columns are orthonormal and orthogonal to A^+ w: lambda = N^T t, for the
+        tensions of any method.
+        """
+        return None if self.tensions is None else self.problem.null_space.T @ self.tensions
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists, numbers and strings, ready for JSON; what does not exist is None."""

@@ -1,5 +1,6 @@
 """Solve one problem by any method: look it up, bring the problem to standard form, propose, judge."""
 
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -64,8 +65,9 @@ def solve(
             return TensionSolution(problem, tensions, STATUSES[OPTIMAL], "active-set", "c", perf_counter() - start)
         if code <= SINGULAR:
             spent = perf_counter() - start
-            return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _prove)
+            return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
     chosen, backend = _look_up(method, backend, options)
+    chosen = chosen.for_options(problem, options)
     used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core is not there, or was not sure
 
     left, exact, forms = problem, None, list[StandardForm]()
@@ -90,13 +92,21 @@ def solve(
     )
 
 
-def _prove(problem: TensionProblem) -> Certificate | None:
+def _prove(problem: TensionProblem, singular: bool) -> Certificate | None:
     """Return the sharpest certificate of what was proven, or else the one along the direction that proved it."""
     projection = project(problem)
     certificate = sharpest(problem, projection)
-    if certificate is None and (direction := _direction_of_core(problem)) is not None:
-        certificate = certificate_along(problem, direction, projection)
+    if certificate is None or certificate.singular is not singular:
+        # Where the projection cancels huge tensions, its own rounding hides a shortfall that others do not.
+        others = projection._replace(closest=np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max))
+        direction = _direction_of_core(problem)
+        if direction is not None:
+            along = (certificate_along(problem, direction, nearest) for nearest in (projection, others))
+            return next(filter(None, along), certificate)
     return certificate
+
+
+_PROOFS = {code: partial(_prove, singular=code == SINGULAR) for code in (INFEASIBLE, SINGULAR)}
 
 
 def _direction_of_core(problem: TensionProblem) -> Array | None:
@@ -120,6 +130,11 @@ def _look_up(name: str | Method, backend: str | None, options: dict[str, Any]) -
     elif not isinstance(backend, str) or backend not in available:
         accepted = f"one of {', '.join(available)}" if available else f"None, as method {method.name} has no back ends"
         raise InputError(f"backend must be {accepted}, got {shown(backend)}")
+    if "solver" in options and "solver" not in (method.options or ()):
+        raise InputError(
+            "solver must be left out, as a QP solver is chosen by method='qp' with backend=..., "
+            f"got solver={shown(options['solver'])}"
+        )
     if method.options is not None:
         unknown = [key for key in options if key not in method.options]
         if unknown:

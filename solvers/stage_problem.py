@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import finite_array, real_array
 
@@ -20,7 +21,7 @@ _CONVEX = 1e-9  # relative to the largest eigenvalue: how negative one may be by
 
 
 @dataclass(frozen=True, eq=False)
-class StageProblem:
+class StageProblem(Displayed):
     r"""Controls of N stages with bounds, and the states that they lead to, at the least quadratic cost.
 
     $$

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..display import record
 from ..tolerances import AT_LIMIT, DOUBTFUL, OPTIMALITY, RANK
 from .box_least_squares import box_least_squares
 from .kernels.codes import DECISIVE, SLACK
@@ -52,6 +53,8 @@ class StandardForm(NamedTuple):
     unit: Array
     moving: NDArray[np.intp]
     sigma: Array
+
+    __repr__ = record
 
     def tensions(self, problem: TensionProblem, s: Array) -> Array:
         """Return the tensions [N] of s, shape (m,), moved inside the limits if rounding put them outside."""

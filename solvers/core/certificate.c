@@ -111,21 +111,6 @@ static towline_status prove_excluded(form *f, const towline_problem *problem, co
     return proven == TOWLINE_INFEASIBLE ? proven : TOWLINE_INACCURATE;
 }
 
-/* Return whether the limits exclude the wrench in the range of B that is nearest to w, orthogonal to `direction`. */
-static int is_nearest_excluded(form *f, const real *direction) {
-    real along = 0, square = 0, missing;
-    int worst;
-    for (int i = 0; i < f->n; i++) {
-        along += direction[i] * f->b[i];
-        square += direction[i] * direction[i];
-    }
-    for (int i = 0; i < f->n; i++) {
-        f->b[i] -= along / square * direction[i];
-    }
-    towline_least_norm(f, &worst, &missing);
-    return towline_enter_limits(f) == EXCLUDED;
-}
-
 towline_status towline_certify(form *f, const towline_problem *problem, const measure *known, outcome met, int worst,
                                real missing, towline_answer *answer) {
     if (!(magnitude(missing) > OUTSIDE * known->required)) {
@@ -140,7 +125,5 @@ towline_status towline_certify(form *f, const towline_problem *problem, const me
         return TOWLINE_INFEASIBLE;
     }
     write_direction(f, worst, side, answer->direction);
-    const int limited = met == EXCLUDED || is_nearest_excluded(f, answer->direction);
-    const towline_status proven = towline_proves_infeasible(f, problem, known, answer);
-    return proven == TOWLINE_SINGULAR && limited ? TOWLINE_INFEASIBLE : proven;
+    return towline_proves_infeasible(f, problem, known, answer);
 }

@@ -109,7 +109,7 @@ static outcome enter(form *f, active_set *set, int p, real side) {
                 leaving = j;
             }
         }
-        const int independent = beyond > PARALLEL * PARALLEL;
+        const int independent = beyond > f->parallel * f->parallel;
         if (!independent && leaving < 0) {
             f->push[p] = -side;
             for (int j = 0; j < set->count; j++) {

@@ -48,6 +48,7 @@ typedef struct {
     real basis[(CABLES > 1 ? CABLES : 2) *
                FILLED(COLUMNS)]; /* of the null space, by rows; its columns are normals of slabs */
     real slack;                  /* how far s may pass a limit */
+    real parallel;               /* length of a normal, or of its part outside the span of others, that is rounding */
     real margin;                 /* how far the limits were moved inwards; 0 in double */
     int steps;
     int inner;
@@ -57,7 +58,6 @@ typedef struct {
 typedef struct {
     real required; /* |S w| and the wrench of the tensions nearest to zero [N] */
     real rounding; /* sum of the terms that are rounded [N] */
-    real largest;  /* largest norm of a column of S A */
 } measure;
 
 typedef enum { REACHED, EXCLUDED, DOUBTFUL } outcome;

@@ -75,7 +75,8 @@ int towline_proves_optimum(const form *f, const int *active, const real *side, c
 }
 
 measure towline_measure(const form *f, const towline_problem *problem, const real *t) {
-    measure known = {0, problem->w_terms, 0};
+    measure known = {0, problem->w_terms};
+    real terms = 0;
     for (int i = 0; i < problem->n; i++) {
         const real x = problem->w[i] * f->scale[i];
         known.required += x * x;
@@ -93,10 +94,11 @@ measure towline_measure(const form *f, const towline_problem *problem, const rea
     }
     for (int c = 0; c < problem->m; c++) {
         const real norm = root(squares[c]);
-        known.largest = larger(known.largest, norm);
         known.required += norm * magnitude(between(problem->t_min[c], 0, problem->t_max[c]));
-        known.rounding += norm * (magnitude(t[c]) + magnitude(reference(problem, c)));
+        known.rounding += norm * magnitude(reference(problem, c));
+        terms += norm * magnitude(t[c]);
     }
+    known.rounding += smaller(terms, CANCELLED * known.required + known.rounding);
     return known;
 }
 
@@ -160,6 +162,9 @@ int towline_proves_feasible(const form *f, const towline_problem *problem, const
 /*
  * Check whether the scaled direction in `answer`, made unit and unscaled here, proves w out of reach: by how much d . w
  * exceeds the most that tensions inside the limits can give along d. Fill support and shortfall.
+ *
+ * The doubt has in it the rounding of each pull, times the limit. Of a cable without a limit a pull is accepted that is
+ * smaller than ROUNDING: whatever its tension, it gives no more along d than A t is rounded by.
  */
 towline_status towline_proves_infeasible(const form *f, const towline_problem *problem, const measure *known,
                                          towline_answer *answer) {
@@ -180,23 +185,27 @@ towline_status towline_proves_infeasible(const form *f, const towline_problem *p
         demand += d[i] * problem->w[i];
     }
     for (int c = 0; c < m; c++) {
-        real pull = 0;
+        real pull = 0, terms = 0, norm = 0;
         for (int i = 0; i < n; i++) {
-            pull += d[i] * problem->A[i * m + c];
+            const real entry = problem->A[i * m + c], x = d[i] * entry, scaled = f->scale[i] * entry;
+            pull += x;
+            terms += magnitude(x);
+            norm += scaled * scaled;
         }
+        norm = root(norm);
         const real limit = pull > 0 ? problem->t_max[c] : problem->t_min[c];
-        if (magnitude(pull) > NEGLIGIBLE * known->largest) {
+        if (magnitude(pull) > NEGLIGIBLE * norm) {
             status = TOWLINE_INFEASIBLE;
-            support += pull * limit;
-            rounding += REACH_OF_PULL * magnitude(pull * limit);
         }
-        if (REACH_OF_LIMIT > 0 && pull != 0) {
-            rounding += REACH_OF_LIMIT * magnitude(limit) * known->largest;
+        if (magnitude(limit) <= LARGEST) { /* what it gives is known, and counts at any size */
+            support += pull * limit;
+            rounding += REACH_OF_PULL * magnitude(pull * limit) + REACH_OF_TERMS * terms * magnitude(limit);
+        } else if (magnitude(pull) > ORTHOGONAL * norm) {
+            return TOWLINE_INACCURATE; /* it gives any amount */
         }
     }
     answer->support = support;
     answer->shortfall = demand - support;
-    /* With infinite limits the shortfall may be no number. */
     return answer->shortfall > CLEAR * (FEASIBILITY * known->required + ROUNDING * rounding) ? status
                                                                                              : TOWLINE_INACCURATE;
 }

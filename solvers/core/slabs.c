@@ -75,7 +75,7 @@ outcome towline_slabs(form *f) {
         const real a[2] = {normal[0][worst], normal[1][worst]};
         const real square = a[0] * a[0] + a[1] * a[1];
         side[worst] = value < f->low[worst] ? (real)1 : (real)-1;
-        if (square <= PARALLEL * PARALLEL) { /* nothing moves this s, and it is beyond its limit */
+        if (square <= f->parallel * f->parallel) { /* nothing moves this s, and it is beyond its limit */
             f->push[worst] = -side[worst];
             return EXCLUDED;
         }
@@ -91,7 +91,7 @@ outcome towline_slabs(form *f) {
             const real slope = b[0] * along[0] + b[1] * along[1];
             const real low = f->low[j] - here, high = f->high[j] - here;
             f->inner++;
-            if (magnitude(slope) < PARALLEL) {
+            if (magnitude(slope) < f->parallel) {
                 if (larger(low, -high) > f->slack) {
                     const cut alone = {0, j, 1, low > 0 ? (real)1 : (real)-1};
                     return exclude(f, worst, a, square, &alone, 0);

@@ -23,9 +23,9 @@
  *
  *        1e-9 (|S w| + sum_i |S a_i| |u_i|) + 1e-13 sum_i |S a_i| (|t_i| + |t_ref_i|)
  *
- *    with u_i the tension inside the limits that is nearest to zero, and if the multipliers are their gradient in the
- *    null space. Limits that exclude each other give a direction: their multipliers x satisfy N^T x = 0, so that
- *    x = B^T d has a solution d, and the shortfall
+ *    with u_i the tension inside the limits that is nearest to zero, the terms of t up to 1e10 times the first sum and
+ *    those of t_ref, and if the multipliers are their gradient in the null space. Limits that exclude each other give
+ *    a direction: their multipliers x satisfy N^T x = 0, so that x = B^T d has a solution d, and the shortfall
  *
  *        d . w - max { d . A t : t_min <= t <= t_max } > 0
  *

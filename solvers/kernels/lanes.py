@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
-from ...tolerances import FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ...tolerances import CANCELLED, FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, OPTIMAL, SLACK, UNSURE
 from .jit import compilable
 
@@ -172,11 +172,11 @@ def judge(soft, n, m, W):
 
     The code is optimal, with `soft` also inaccurate, else unsure; where PROVEN is one the problem is infeasible.
     """
-    error, rounded = splat(0.0), load(W, ROUNDED)
+    error, terms, rounded = splat(0.0), splat(0.0), load(W, ROUNDED)
     for c in range(m):
         x = load(W, cable(REF, m) + c) + load(W, cable(UNIT, m) + c) * load(W, cable(S_, m) + c)
         x = minimum(maximum(x, load(W, cable(T_LOW, m) + c)), load(W, cable(T_HIGH, m) + c))
-        rounded = rounded + load(W, cable(NORM, m) + c) * magnitude(x)
+        terms = terms + load(W, cable(NORM, m) + c) * magnitude(x)
         store(W, cable(S_, m) + c, x)
     for r in range(n):
         total = -load(W, wrench(SW, n, m) + r)
@@ -184,6 +184,7 @@ def judge(soft, n, m, W):
             total = total + load(W, matrix(SA, n, m) + r * m + c) * load(W, cable(S_, m) + c)
         error = error + total * total
     error = sqrt(error)
+    rounded = rounded + minimum(terms, CANCELLED * load(W, REQUIRED) + rounded)
     met = error <= FEASIBILITY * load(W, REQUIRED) + ROUNDING * rounded
     good = load(W, GOOD) > 0.0
     code = where(met, splat(1.0 * OPTIMAL), splat(1.0 * (INACCURATE if soft else UNSURE)))

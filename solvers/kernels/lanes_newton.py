@@ -26,7 +26,7 @@ __all__ = ["newton_in_lanes", "newton_size"]
 _ON_THE_WAY = 4  # steps of the search along a step
 _MET = 3e-14  # wrench error that is rounding, relative to the terms that it is the sum of
 _DAMPING = 1e-12  # relative to the mean of H's diagonal
-_SMALL_PIVOT = 1e-8  # relative to the same
+_SMALL_PIVOT = 1e-8  # or eigenvalue, relative to the same
 
 
 @compilable()
@@ -63,9 +63,9 @@ def newton_in_lanes(soft, steps, again, n, m, W, V):
         for i in range(n):
             store(V, r + i, load(W, wrench(Y, n, m) + i))
         smallest = _factor(n, m, W, V, damping)
-        _solve(n, m, V)
         # Without full rank "infeasible" may be wrong: such matrices are left to `single`, and nan marks them next time.
-        judged = (smallest > _SMALL_PIVOT * size) | (splat(soft) > 0.0)
+        judged = (_least_eigenvalue(n, m, V) > _SMALL_PIVOT * size) | (splat(soft) > 0.0)
+        _solve(n, m, V)
         for i in range(n):
             store(V, y + i, where(judged, load(V, step + i), splat(np.nan)))
     going = going & (load(V, y) <= np.inf)
@@ -194,6 +194,27 @@ def _make_H(n, m, W, V):
             store(V, H + next_row * n + first, b0)
             store(V, H + next_row * n + second, b1)
             store(V, H + next_row * n + third, b2)
+
+
+@compilable()
+def _least_eigenvalue(n, m, V):
+    """Bound the least eigenvalue of H, factored, from below: by one over the trace of its inverse. Overwrites step.
+
+    The least pivot is no bound. Rows are not in the order of their size, and damping makes pivots of what depends on a
+    short row before it.
+    """
+    _, step, _, _, _, _, H = _rows(n, m)
+    trace = splat(0.0)
+    for j in range(n):
+        store(V, step + j, splat(1.0))
+        trace = trace + load(V, H + j * n + j)
+        for i in range(j + 1, n):
+            x = splat(0.0)
+            for e in range(j, i):
+                x = x - load(V, H + e * n + i) * load(V, step + e)
+            store(V, step + i, x)
+            trace = trace + x * x * load(V, H + i * n + i)
+    return 1.0 / trace
 
 
 @compilable()

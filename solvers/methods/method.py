@@ -1,9 +1,12 @@
 """What a tension-distribution method is: a class with three sentences about itself and one function."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, NamedTuple
 
-from ..problem import Array
+from ...display import record
+from ..problem import Array, TensionProblem
 from ..standard_form import StandardForm
 
 __all__ = ["Array", "Method", "Proposal", "StandardForm"]
@@ -29,6 +32,8 @@ class Proposal(NamedTuple):
     iterations: int | None = None
     detail: str = ""
     final: bool = False
+
+    __repr__ = record
 
 
 class Method(ABC):
@@ -68,6 +73,10 @@ class Method(ABC):
     def backends(self) -> list[str]:
         """Return the names of the installed back ends, the default first; empty for methods that have none."""
         return []
+
+    def for_options(self, problem: TensionProblem, options: dict[str, Any]) -> Method:
+        """Return the method that answers with these options; default: this one."""
+        return self
 
     @abstractmethod
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

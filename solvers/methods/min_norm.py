@@ -1,23 +1,29 @@
 r"""Method "min-norm": pseudo-inverse plus null space, Eq. 16 and 17 of Wang, Zhao, Li, Ji (m robots towing one object).
 
-The paper prints $T = J^T (J J^T)^{-1} w + N \lambda$ with a scalar $\lambda \in (0, 1)$. That inverse does
-not exist for fewer than six cables and one scalar cannot move along a null space of several dimensions, so here the
-pseudo-inverse comes from the singular value decomposition and $\lambda \in R^{m - rank}$ is the shortest one that
-brings the tensions inside their limits. T' and N lambda are orthogonal: the result is the least norm of all.
+The paper prints $T = J^T (J J^T)^{-1} w + N \lambda$ with any scalar $\lambda \in (0, 1)$. That inverse does not exist
+for fewer than six cables, and one scalar multiplies one null-space vector, so here the pseudo-inverse comes from the
+singular value decomposition and $\lambda \in R^{m - rank}$. Without the option `lambda_` it is the shortest one that
+brings the tensions inside their limits: T' and N lambda are orthogonal, so the result is the least norm of all. With
+`lambda_`, a number where m - rank = 1 as the paper has it, the tensions are T' + N lambda, if the limits permit these.
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from ...errors import InputError
+from ...inputs import real_array, shown
+from ...tolerances import DOUBTFUL
+from ..problem import TensionProblem
 from .method import Array, Method, Proposal, StandardForm
 from .numerics.least_norm import least_norm_in_null_space
 
 _SLACK = 1e-12  # How far s, of order one, may pass a limit; `solve` moves it back.
+_LARGEST = 1e50  # of an entry of lambda [N], as of all numbers of a problem
 
 
 class MinNorm(Method):
-    """Pseudo-inverse solution, moved along the null space as little as the limits require."""
+    """Pseudo-inverse solution, moved along the null space as little as the limits require, or by a given lambda."""
 
     name = "min-norm"
     guarantee = "the unique optimum, in closed form up to m - rank = 1; no tensions and a certificate if there are none"
@@ -26,6 +32,15 @@ class MinNorm(Method):
     continuous = True
     least_squares = True
     seeks_reference = True
+    options: ClassVar[dict[str, str] | None] = {
+        "lambda_": "null-space coordinates [N], a number or (m - rank,): tensions A^+ w + N lambda_ with N = "
+        "problem.null_space, failed where these leave the limits; the shortest inside the limits if not given"
+    }
+
+    def for_options(self, problem: TensionProblem, options: dict[str, Any]) -> Method:
+        """Return the method that takes lambda as it is, if there is one among the options."""
+        given = options.get("lambda_")
+        return self if given is None else GivenLambda(problem, given)
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Take s' = Q^T b, and s' + N^T lambda if that is outside the limits."""
@@ -42,6 +57,40 @@ class MinNorm(Method):
                 return Proposal(None, detail="no multiple of the null-space vector lies inside the limits")
             return Proposal(s + shift * form.N[0])
         return least_norm_in_null_space(form)
+
+
+class GivenLambda(Method):
+    """Pseudo-inverse solution plus N lambda, whatever t_ref and weights: no optimum, so it is not judged as one."""
+
+    name = MinNorm.name
+    guarantee = "A^+ w + N lambda_; failed where these tensions leave the limits though others would not"
+    source = MinNorm.source
+    exact = False
+    options = MinNorm.options
+
+    def __init__(self, problem: TensionProblem, given: Any) -> None:
+        null = problem.null_space
+        size = null.shape[1]
+        shift = np.atleast_1d(real_array("lambda_", given).astype(float))
+        if shift.shape != (size,) or not (np.abs(shift) < _LARGEST).all():
+            numbers = (
+                f"{size} finite numbers, one for each column of the null space" if size != 1 else "a finite number"
+            )
+            accepted = numbers if size else "empty, as A has no null space"
+            raise InputError(
+                f"lambda_ must be {accepted} (m = {problem.m}, rank {problem.m - size}), got {shown(given)}"
+            )
+        t = np.linalg.pinv(problem.scaled_A, rcond=DOUBTFUL) @ problem.scaled_w + null @ shift
+        beyond = np.maximum(problem.t_min - t, t - problem.t_max)
+        worst = int(np.argmax(beyond))
+        self.tensions, self.detail = t, ""
+        if beyond[worst] > _SLACK * np.abs(t).max():
+            self.detail = f"A^+ w + N lambda_ leaves the limits of cable {worst} by {beyond[worst]:.3g} N"
+
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Propose these tensions if they are inside the limits."""
+        s = (self.tensions - form.origin)[form.moving] / form.unit
+        return Proposal(None, detail=self.detail) if self.detail else Proposal(s)
 
 
 def _shortest_shift(null: Array, low: Array, high: Array) -> float | None:
