@@ -65,7 +65,7 @@ class Account:
 
     @property
     def errata(self) -> list[Claim]:
-        """Return the claims that were not reproduced."""
+        """Return the claims that were not reproduced, and what is possible instead."""
         return [claim for claim in self.claims if claim.verdict is not Verdict.REPRODUCED]
 
     @property
@@ -74,11 +74,13 @@ class Account:
         return bool(self.claims) and not self.broken
 
     def summary(self) -> str:
-        """Return how many claims have which verdict, in one line."""
+        """Return how many claims of the paper have which verdict, in one line, and how many repairs there are."""
         counts = Counter(claim.verdict for claim in self.claims)
+        repairs = counts.pop(Verdict.REPAIRED, 0)
         parts = [f"{counts[verdict]} {verdict.value}" for verdict in Verdict if counts[verdict]]
+        beside = [f"{repairs} repaired, which are not in the paper"] if repairs else []
         missing = [f"not computed: {', '.join(self.broken)}"] if self.broken else []
-        return "; ".join([f"{len(self.claims)} claims: {', '.join(parts)}", *missing])
+        return "; ".join([f"{counts.total()} claims: {', '.join(parts)}", *beside, *missing])
 
     def to_dict(self) -> dict[str, Any]:
         """Return {"paper", "complete", "broken", "seconds", "claims"} for JSON."""

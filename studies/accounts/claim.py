@@ -1,8 +1,8 @@
 """`Claim`: one statement of a paper beside the result of computing it.
 
 A verdict follows from numbers, never from opinion: `compared` compares numbers with the printed ones, `stated` records
-whether a statement holds, `undetermined` records what the paper does not print. Each verdict comes with one sentence of
-its own.
+whether a statement holds, `undetermined` records what the paper does not print, `repaired` what is possible in place of
+an impossible statement. Each verdict comes with one sentence of its own.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from ...text import quantity, quantity_row
 
-__all__ = ["Claim", "Value", "Verdict", "compared", "stated", "undetermined", "value_text"]
+__all__ = ["Claim", "Value", "Verdict", "compared", "repaired", "stated", "undetermined", "value_text"]
 
 Value: TypeAlias = float | tuple[float, ...] | str | None
 DIGITS = 5  # of values in reports: one more than papers print
@@ -36,6 +36,9 @@ class Verdict(StrEnum):
     NOT_DETERMINED = "not determined"
     """The paper does not print what is needed to decide."""
 
+    REPAIRED = "repaired"
+    """No statement of the paper: something else, possible in the place of what the paper states and is impossible."""
+
 
 @dataclass(frozen=True)
 class Claim:
@@ -50,7 +53,8 @@ class Claim:
     statement
         The statement of the paper, in a sentence.
     printed, computed
-        Numbers in `unit`, or text; printed is None where the paper gives no number.
+        Numbers in `unit`, or text. `printed` is what the paper gives: a number that it prints, or the one that follows
+        from what it prints; None where it gives none.
     verdict, why
         The verdict, and the reason in one sentence.
     unit
@@ -144,6 +148,29 @@ def undetermined(
 ) -> Claim:
     """Return a claim that the paper leaves open; `missing` states what it does not print and what was assumed."""
     return Claim(id, place, statement, printed, computed, Verdict.NOT_DETERMINED, missing, unit, figure)
+
+
+def repaired(
+    id: str,
+    place: str,
+    statement: str,
+    computed: Value,
+    *,
+    holds: bool,
+    works: str,
+    fails: str,
+    unit: str = "",
+    figure: str | None = None,
+) -> Claim:
+    """Return something else than the paper has, in the place of what is impossible there; not determined if it fails.
+
+    Parameters
+    ----------
+    works, fails
+        The reason for either verdict.
+    """
+    verdict, why = (Verdict.REPAIRED, works) if holds else (Verdict.NOT_DETERMINED, fails)
+    return Claim(id, place, statement, None, computed, verdict, why, unit, figure)
 
 
 def value_text(value: Value, unit: str = "") -> str:

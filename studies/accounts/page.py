@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...figures import page as html
 from ...figures import style
 from .claim import Claim, Verdict, value_text
-from .text import READ
+from .text import BY_THE_PAPER, MEANING, READ
 
 if TYPE_CHECKING:
     from .account import Account, Chapter
@@ -45,7 +45,7 @@ def _errata(account: Account) -> list[str]:
         for claim in account.errata
     ]
     table = html.columns(NOT_REPRODUCED, ("where", "the paper states", "verdict", "why"), rows)
-    return ['<div id="errata">', table, html.paragraph(READ), "</div>"]
+    return ['<div id="errata">', table, html.paragraph(f"{MEANING} {READ}"), "</div>"]
 
 
 def _chapter(chapter: Chapter) -> list[str]:
@@ -61,7 +61,7 @@ def _chapter(chapter: Chapter) -> list[str]:
 
 def _claim(claim: Claim) -> str:
     rows = [
-        ("Printed", value_text(claim.printed, claim.unit)),
+        (BY_THE_PAPER.capitalize(), value_text(claim.printed, claim.unit)),
         ("Computed", value_text(claim.computed, claim.unit)),
         (claim.verdict.value.capitalize(), claim.why),
         ("Name", claim.id),

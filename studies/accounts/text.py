@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from .account import Account
 
 FIGURES = "figures"  # the folder beside the report
+BY_THE_PAPER = "by the paper"  # head of what it prints, or of what follows from that
+MEANING = "“By the paper” is a number that it prints, or the one that follows from what it prints."
 READ = (
     "The paper was read as text recognised from its pages (OCR): a single wrong symbol may be an error of the "
     "recognition, not of the authors."
@@ -22,7 +24,7 @@ def report(account: Account, form: str = "png") -> str:
 
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
     for title, chapter in account.chapters.items():
-        heads = ("claim", "where", "the paper states", "printed", "computed", "verdict", "why")
+        heads = ("claim", "where", "the paper states", BY_THE_PAPER, "computed", "verdict", "why")
         rows = [
             (
                 claim.id,
@@ -49,21 +51,23 @@ def errata(account: Account) -> str:
     lines = [
         f"# Errata of {account.paper.source}",
         "",
-        f"Each line is a claim of the report, and its verdict was computed. {READ}",
+        f"Each line is a claim of the report, and its verdict was computed. {MEANING} {READ}",
     ]
     titles = {
         Verdict.DIFFERS: "What is printed, and what holds",
         Verdict.IMPOSSIBLE: "Impossible",
         Verdict.NOT_DETERMINED: "Not printed in the paper",
+        Verdict.REPAIRED: "What is possible instead",
     }
     for verdict, title in titles.items():
         rows = [_row(claim) for claim in account.errata if claim.verdict is verdict]
+        statement = "instead" if verdict is Verdict.REPAIRED else "the paper states"
         if rows:
             lines += [
                 "",
                 f"## {title}",
                 "",
-                *_table(("claim", "where", "the paper states", "printed", "computed", "why"), rows),
+                *_table(("claim", "where", statement, BY_THE_PAPER, "computed", "why"), rows),
             ]
     return "\n".join([*lines, ""])
 

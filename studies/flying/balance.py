@@ -24,6 +24,7 @@ def chapter() -> Chapter:
             _force(dynamics, samples),
             _euler(dynamics, samples),
             _last_term(dynamics, samples),
+            _right_side(dynamics, samples),
             _first_term(dynamics, samples),
             _turned_increments(dynamics, samples),
             _moment(dynamics, samples),
@@ -47,24 +48,24 @@ def newton_euler(dynamics: Dynamics, samples: Instants) -> np.ndarray:
 
 
 def _newton(dynamics: Dynamics, samples: Instants) -> Claim:
-    """Give the platform the tensions that hold it in the wind, and form m ddx_B - m g - [u] (T + dT) of Eq. 24."""
+    """Give the platform the tensions that hold it in the wind, and form m ddx_B - m g - [u] (T + dT) - F_e."""
     pose, velocity, acceleration = dynamics.relative.motion_in_world(*samples.body, *samples.base)
     A = dynamics.wrench_matrix(pose, samples.base.pose[:, None])
     w = dynamics.required_wrench(pose, velocity, acceleration, wind=WIND)
     T = np.linalg.solve(A, w[..., None])[..., 0]
-    left = newton_euler(dynamics, samples)[:, :3] - _turn(A[:, :3], T)
     wind = dynamics.aerodynamic_wrench(pose, velocity, WIND)[:, :3]
+    left = newton_euler(dynamics, samples)[:, :3] - _turn(A[:, :3], T) - wind
     return compared(
         "eq-24",
         "Eq. 24",
-        "m ddx_B = m g + [u] (T + dT) (largest force left over, with the tensions that the motion requires in the "
-        "strongest wind).",
+        "m ddx_B = m g + [u] (T + dT) + F_e in {G} (largest force left over, with the tensions that the motion "
+        "requires in the strongest wind).",
         0.0,
         float(np.linalg.norm(left, axis=1).max()),
         within=ROUNDING,
-        agrees="The equation is in balance.",
-        differs="F_e, the force of the wind, is defined below the equation and used in Eq. 26, but is not in Eq. 24; "
-        f"with it the remainder is {np.abs(left - wind).max():.0e} N.",
+        agrees="The equation is in balance, with F_e of the air relative to the platform; the wind alone has "
+        f"{np.linalg.norm(wind, axis=1).max():.1f} N at most.",
+        differs="The equation is not in balance.",
         unit="N",
     )
 
@@ -106,6 +107,26 @@ def _last_term(dynamics: Dynamics, samples: Instants) -> Claim:
     )
 
 
+def _right_side(dynamics: Dynamics, samples: Instants) -> Claim:
+    """Compare [R_B b x u] (T' + F') with T' = dT, as step 7 needs it, and F' = F = T + dT with the moment of T + dT."""
+    J = dynamics.relative.wrench_matrix(samples.body.pose)
+    T = np.linalg.solve(J, dynamics.relative.required_wrench(*samples.body, *samples.base)[..., None])[..., 0]
+    twice, once = (_turn(J[:, 3:], T + count * INCREMENTS) for count in (2, 1))
+    off = np.linalg.norm(twice - once, axis=1) / np.linalg.norm(once, axis=1)
+    return compared(
+        "eq-33-right",
+        "Eqs. 29, 33, 34",
+        "The right side of Eq. 33 has the moments of T' + F' (median relative difference from those of T + dT, with "
+        "T' = dT, as step 7 needs it, F' = F = T + dT, and increments of 0.1 N to 0.4 N).",
+        0.0,
+        float(np.median(off)),
+        within=ROUNDING,
+        agrees="The moments are the same.",
+        differs="Neither T' nor F' is defined, and dT counts twice if they are read like this. T + dT is meant, as in "
+        "Eqs. 29 and 34.",
+    )
+
+
 def _first_term(dynamics: Dynamics, samples: Instants) -> Claim:
     """Compare the left side of Eq. 34 with dTheta_b, as printed, in place of ddTheta_b, with dL/dt."""
     printed = samples.body.velocity[:, 3:] - samples.body.acceleration[:, 3:]
@@ -121,7 +142,8 @@ def _first_term(dynamics: Dynamics, samples: Instants) -> Claim:
         float(np.median(off)),
         within=ROUNDING,
         agrees="The moment is the derivative of the angular momentum.",
-        differs="It must be ddTheta_b, as in Eq. 37; a dot may be an error of the recognition.",
+        differs="It must be ddTheta_b, as in Eq. 37; a dot may be an error of the recognition, as may the letters F_o "
+        "and D_o there, which are the F_M and D_M of Eqs. 35 and 36.",
     )
 
 
@@ -142,23 +164,27 @@ def _turned_increments(dynamics: Dynamics, samples: Instants) -> Claim:
 
 
 def _force(dynamics: Dynamics, samples: Instants) -> Claim:
-    """Compare the left side of Eq. 26, with dR_A and ddR_A as printed, with this toolkit's form in omega and alpha."""
+    """Compare D_F of Eq. 26, literally and with 2 dR_A dx_b, with this toolkit's form in omega and alpha.
+
+    Literally, bars are second derivatives, and the last term is 2 R_A ddx_b.
+    """
     m, g = dynamics.robot.platform.mass, np.array(dynamics.robot.gravity)
-    _, dR, ddR = samples.R_A
-    x, dx = samples.body.pose[:, :3], samples.body.velocity[:, :3]
-    felt = samples.base.acceleration[:, :3] + _turn(ddR, x) + 2 * _turn(dR, dx) - g
-    printed = m * _turn_back(samples.R_A.R, felt)
+    R, dR, ddR = samples.R_A
+    x, dx, ddx = (part[:, :3] for part in samples.body)
+    felt = samples.base.acceleration[:, :3] + _turn(ddR, x) - g
+    printed, meant = (m * _turn_back(R, felt + 2 * term) for term in (_turn(R, ddx), _turn(dR, dx)))
     ours = dynamics.relative.base_disturbance(samples.body.pose, samples.body.velocity, *samples.base)[:, :3]
     return compared(
         "eq-26",
         "Eq. 26",
-        "D_F = m R_A^T (ddx_A + ddR_A x_b + 2 dR_A dx_b) - m R_A^T g (difference from the form with omega_A).",
+        "D_F ends in 2 R_A ddx_b, with one bar for each second derivative (median relative difference from the force "
+        "of the base's motion).",
         0.0,
-        float(np.abs(printed - ours).max()),
+        float(np.median(np.linalg.norm(printed - ours, axis=1) / np.linalg.norm(ours, axis=1))),
         within=ROUNDING,
-        agrees="The printed D_F holds to rounding; ddR_A is that of omega_A and alpha_A.",
-        differs="The printed D_F is not the force of the base's motion.",
-        unit="N",
+        agrees="The printed D_F is the force of the base's motion.",
+        differs="The last term must be 2 dR_A dx_b, with which the difference is at most "
+        f"{np.abs(meant - ours).max():.0e} N. Bars for dots may be an error of the recognition.",
     )
 
 

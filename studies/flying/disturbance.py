@@ -1,9 +1,9 @@
-"""Paper F's section VI.C: the tension of cable 1 with and without D_B, under a quadrotor that moves and pitches.
+"""Paper F's figures 12 to 15: the tension of cable 1 with and without D_B, under a quadrotor that moves and pitches.
 
-The paper draws the flight and the pitch and prints no numbers. Assumed, as in `plans`: VI.A's line, pitching by
-0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its thrust pitches; and a circle of radius 0.15 m in
-{A}, on which every cable pulls. "Without D_B" means with the D_B of a level, hovering quadrotor, which is the weight
-alone.
+The recognised text has the captions of these figures and not their section. Assumed, as in `plans`: VI.A's line,
+pitching by 0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its thrust pitches; and a circle of radius
+0.15 m in {A}, on which every cable pulls. "Without D_B" means with the D_B of a level, hovering quadrotor, which is the
+weight alone.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..accounts.account import Chapter
 from ..accounts.claim import Claim, stated, undetermined
 from .helix import flight
 from .motion import FEASIBLE, TIMES, circle, steady_tensions
-from .plans import PITCH, SECONDS, pitching_flight
+from .plans import NOT_READ, PITCH, SECONDS, pitching_flight
 
 PITCHES = np.linspace(0.0, 0.3, 7)  # largest pitch [rad]
 
@@ -71,12 +71,11 @@ def pitching_on_the_line() -> Motion:
 def _motion() -> Claim:
     return undetermined(
         "fig-12-13",
-        "VI.C, figures 12 and 13",
+        "figures 12 and 13",
         "The quadrotor moves and pitches (largest pitch).",
         None,
         float(np.degrees(PITCH)),
-        missing="Neither the flight nor the pitch is printed. Assumed: VI.A's line, a sine of pitch, its surge along "
-        "x.",
+        missing=f"{NOT_READ} Assumed: VI.A's line, a sine of pitch, its surge along x.",
         unit="degrees",
         figure="disturbance-flight",
     )
@@ -85,12 +84,12 @@ def _motion() -> Claim:
 def _error(error: np.ndarray, worse: np.ndarray) -> Claim:
     return undetermined(
         "fig-15",
-        "VI.C, figures 14 and 15",
+        "figures 14 and 15",
         "Without D_B the tension of cable 1 has a relative error (its largest value).",
         None,
         float(error[:, 0].max()),
-        missing="Neither a value nor the motion is printed. With the surge the load pulls mostly along the quadrotor's "
-        f"own axis; the same pitch on a straight line would give {worse[:, 0].max():.0f} %.",
+        missing=f"{NOT_READ} With the assumed surge the load pulls mostly along the quadrotor's own axis; "
+        f"the same pitch on a straight line would give {worse[:, 0].max():.0f} %.",
         unit="%",
         figure="disturbance",
     )
@@ -100,7 +99,7 @@ def _felt(error: np.ndarray) -> Claim:
     most = float(error.max())
     return stated(
         "conclusion-D_B",
-        "abstract, VI.C, conclusion 3",
+        "abstract, conclusion 3",
         "The motion of the quadrotor affects the tensions apparently (largest relative error of any cable without "
         "D_B).",
         "apparently",

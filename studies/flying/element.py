@@ -28,7 +28,7 @@ UNDEFINED = "undefined"
 
 def chapter() -> Chapter:
     """Check signs and sizes of the equations of one element, and the nodes of figure 3."""
-    claims = [_nodes(), _increment(), _winding(), _in_world(), *_sizes()]
+    claims = [_nodes(), _increment(), _winding(), _in_world(), _brackets(), *_sizes()]
     return Chapter(claims, {"elements": _figure()})
 
 
@@ -138,10 +138,25 @@ def _in_world() -> Claim:
     )
 
 
+def _brackets() -> Claim:
+    """Form [k_5 k_6]^T of Eq. 18 from its two columns; 6 x 1 is printed beside the bracket."""
+    column = np.zeros((3, 1))
+    size = "{} x {}".format(*np.concatenate([column, column]).shape)
+    return stated(
+        "eq-18-size",
+        "Eqs. 17, 18",
+        "[k_5 k_6]^T, [dx u dx u]^T and [de u de u]^T, where u is a column, are 6 x 1.",
+        "6 x 1",
+        size,
+        holds=size == "6 x 1",
+        agrees="They are, with one column below the other, as the size printed beside each bracket implies.",
+        differs="The sizes do not fit.",
+    )
+
+
 def _sizes() -> list[Claim]:
-    """Form the products of Eqs. 14, 18, 20 and 21 with the printed sizes."""
-    column, nodes = np.zeros((3, 1)), 3 * (ELEMENTS + 1)
-    bracket = "{} x {}".format(*np.hstack([column, column]).T.shape)
+    """Form the products of Eqs. 14, 20 and 21 with the printed sizes."""
+    nodes = 3 * (ELEMENTS + 1)
     rows = [
         (
             "eq-14-size",
@@ -150,14 +165,6 @@ def _sizes() -> list[Claim]:
             "2 x 1",
             product((2, 1), (2, 1)),
             f"de must be a number, with which the product is {product((2, 1), (1, 1))}.",
-        ),
-        (
-            "eq-18-size",
-            "Eqs. 17, 18",
-            "[k_5 k_6]^T, [dx u dx u]^T and [de u de u]^T, where u is a column, are 6 x 1",
-            "6 x 1",
-            bracket,
-            "The brackets must be the columns, one below the other.",
         ),
         (
             "eq-20-size",

@@ -3,7 +3,10 @@
 The plans are those of `plans`, which know no air. Each is flown three times: by the lengths of Eq. 5 without control
 (`wound`), by computed torque under a quadrotor that stays on its plan, and by computed torque under one that gives way
 to the wind by up to 0.5 m. The last two also fly the circle of radius 0.15 m under a hovering quadrotor. Where there is
-no wind the air rests, so a platform that flies at 8 m/s has drag without any.
+no wind the air rests, so a platform that flies straight at 10 m/s has drag without any.
+
+The quadrotor of the paper hovers or flies straight, so these flights reproduce nothing of VI.A and VI.B: they are
+repairs. Its motion is prescribed, level whatever its acceleration, and no cable pulls it off.
 """
 
 from __future__ import annotations
@@ -21,15 +24,15 @@ from ...ocp.tasks.paths import CirclePath, Motion
 from ...simulation import Flight, simulate
 from ...simulation.trajectory import read_trajectory
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated, undetermined
+from ..accounts.claim import Claim, compared, repaired, stated, undetermined
 from .motion import FEASIBLE, TIMES
-from .plans import BELOW, RATE, SECONDS, Name, planned
+from .plans import BELOW, NOT_READ, RATE, SECONDS, Name, planned
 from .repair import ON_CIRCLE
 from .wind import NOISE, PEAK
 from .wound import FLIGHT, Wound, wind_up
 
 MOTIONS: tuple[Name, ...] = get_args(Name)
-PLACES = {"circle": "VI.B, figure 8", "helix": "VI.A, figure 6", "pitching": "VI.C, figures 12 and 13"}
+PLACES = {"circle": "VI.B, figure 8", "helix": "VI.A, figure 6", "pitching": "figures 12 and 13"}
 WHAT = {
     "circle": "the circle of 1 m under a free quadrotor",
     "helix": "the helix of 1 m under a free quadrotor",
@@ -113,6 +116,13 @@ def moved(flight: Flight) -> float:
     return float(np.linalg.norm((motion - plan)[..., :3], axis=-1).max())
 
 
+def accelerated(flight: Flight) -> float:
+    """Return the largest horizontal acceleration of the quadrotor [m/s^2], over steps of 10 ms."""
+    steps = slice(None, None, 10)
+    velocity, times = flight.trajectory["carrier_velocity"].values[steps, 0, :2], flight.times[steps]
+    return float(np.linalg.norm(np.diff(velocity, axis=0), axis=1).max() / (times[1] - times[0]))
+
+
 def _off(flown: Flown, run: Wound) -> float:
     return float(np.linalg.norm((run.states.pose - flown.body.pose)[:, :3], axis=1).max())
 
@@ -122,8 +132,9 @@ def _lengths(flown: dict[Name, Flown]) -> Claim:
     return compared(
         "eq-6-flown",
         "section II.B, Eqs. 5, 6",
-        "The lengths of Eq. 5, without elongation, give the motion (largest distances from the motions of VI.B, VI.A "
-        "and VI.C of a platform on the elastic cables of Table 1, with these lengths commanded, no air).",
+        "The lengths of Eq. 5, without elongation, give the motion (largest distances, of a platform on the elastic "
+        "cables of Table 1 with these lengths commanded and no air, from the plans with a free quadrotor for VI.B and "
+        "VI.A, and from that assumed for figures 12 to 15).",
         (0.0,) * len(off),
         off,
         within=ON_CIRCLE,
@@ -137,17 +148,20 @@ def _followed(claim: str, name: Name, flown: dict[Name, Flown]) -> Claim:
     part = flown[name]
     most = float(part.gives.error.max())
     low, high = (float(edge) for edge in (part.gives.record.tensions.min(), part.gives.record.tensions.max()))
-    return stated(
+    floor = float(part.gives.robot.t_min.max())
+    below = float((part.gives.record.tensions.min(axis=1) < floor).mean())
+    return repaired(
         claim,
         PLACES[name],
-        f"The platform follows {WHAT[name]} (largest distance in a flight on elastic cables, in the wind of figure 5).",
-        0.0,
+        f"Not in the paper: the platform follows {WHAT[name]} that gives way to the wind (largest distance in a "
+        "simulation on elastic cables, in the wind of figure 5).",
         most,
         holds=part.gives.lasted == len(part.gives.references) and most <= ON_CIRCLE,
-        agrees=f"It does, with tensions from {low:.2f} N to {high:.2f} N, if the quadrotor gives way to the wind by up "
-        f"to {100 * moved(part.gives):.0f} cm. Under a quadrotor that stays on the plan, which knows no air, the "
-        f"distance is up to {100 * float(part.stays.error.max()):.0f} cm.",
-        differs=f"The distance is more than {1e3 * ON_CIRCLE:g} mm.",
+        works=f"The quadrotor, prescribed and level at up to {accelerated(part.gives):.1f} m/s^2 across, gives way by "
+        f"up to {100 * moved(part.gives):.0f} cm. Tensions are from {low:.2f} N to {high:.2f} N, {below:.1%} of the "
+        f"time below the assumed t_min = {floor:g} N. Under a quadrotor that stays on the plan, which knows no air, "
+        f"the distance is up to {100 * float(part.stays.error.max()):.0f} cm.",
+        fails=f"The distance is more than {1e3 * ON_CIRCLE:g} mm, which is no proof that no other control is nearer.",
         unit="m",
         figure=f"flown-{name}",
     )
@@ -159,11 +173,11 @@ def _pitching(part: Flown) -> Claim:
     return undetermined(
         "VI.C-flown",
         PLACES["pitching"],
-        f"The platform follows {WHAT['pitching']} (largest distance in a flight on elastic cables, in the wind of "
+        f"The platform follows {WHAT['pitching']} (largest distance in a simulation on elastic cables, in the wind of "
         "figure 5).",
-        0.0,
+        None,
         float(part.gives.error.max()),
-        missing=f"The flight and the pitch are not printed. With the assumed ones the distance is largest at "
+        missing=f"{NOT_READ} With the assumed flight and pitch the distance is largest at "
         f"{part.gives.times[worst]:.1f} s: the drag sets in before a quadrotor that gives way has left "
         f"its plan, and tensions inside the limits are short by up to {short:.1f} N. Under one that stays on the plan "
         f"it is {100 * float(part.stays.error.max()):.0f} cm.",
@@ -176,17 +190,17 @@ def _positive(flown: dict[Name, Flown]) -> Claim:
     least = tuple(float(part.gives.record.tensions.min()) for part in flown.values())
     slack = max(float((part.windy.tensions <= 0).any(axis=1).mean()) for part in flown.values())
     most = max(float(part.windy.tensions.max()) for part in flown.values())
-    return stated(
+    return repaired(
         "flown-positive",
         "sections II.B, VI",
-        "Cables pull, F > 0 (smallest tensions in the flights of VI.B, VI.A and VI.C in the wind of figure 5).",
-        "> 0 N",
+        "Not in the paper: cables pull, F > 0, under a quadrotor that is free and gives way to the wind of figure 5 "
+        "(smallest tensions in the flights in the place of VI.B and VI.A, and in that assumed for figures 12 to 15).",
         f"{', '.join(f'{value:.2f}' for value in least)} N",
         holds=min(least) > 0,
-        agrees="They do under a quadrotor that gives way to the wind. Without control, with the lengths of Eq. 5 "
+        works="All cables are taut. Without control, with the lengths of Eq. 5 "
         f"commanded under a quadrotor on its plan, cables are slack for up to {slack:.0%} of the time, and pull with "
         f"up to {most:.0f} N.",
-        differs="Some cable gets slack.",
+        fails="Some cable gets slack.",
         figure="flown-circle",
     )
 
@@ -215,6 +229,7 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
     dynamics = Dynamics(robot)
     drag = dynamics.aerodynamic_wrench(part.body.pose, part.body.velocity, np.zeros(3))[:, :2]
     strongest = dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[:2]
+    along = (part.carriers.pose[-1, 0, :3] - part.carriers.pose[0, 0, :3]) / SECONDS
     return compared(
         "eq-25-flight",
         "Eq. 25, VI.A",
@@ -224,7 +239,8 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
         float(np.linalg.norm(drag, axis=1).max()),
         within=1e-9,
         agrees="There is no force.",
-        differs="The platform flies at 8 m/s through air at rest. For comparison: the strongest wind of figure 5 gives "
+        differs=f"The platform flies at {np.linalg.norm(along):.1f} m/s, {np.linalg.norm(along[:2]):.1f} m/s of it "
+        "horizontally, through air at rest. For comparison: the strongest wind of figure 5 gives "
         f"{np.linalg.norm(strongest):.1f} N on a platform at rest.",
         unit="N",
     )
@@ -233,19 +249,19 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
 def _stability(stays: Flight, gives: Flight) -> Claim:
     unanswered = 1 - stays.answered["as planned"] / len(stays.references)
     off = tuple(float(flight.error.max()) for flight in (stays, gives))
-    return stated(
+    return undetermined(
         "conclusion-stability",
         "conclusion 3",
         "To keep the tensions in their range, the quadrotor should be as stable as possible (largest error on a circle "
         f"of radius {FEASIBLE:g} m in the wind of figure 5, under a quadrotor that hovers, and under one that gives "
         "way).",
-        "hovering is better",
+        None,
         f"{1e3 * off[0]:.0f} mm hovering, {1e3 * off[1]:.1f} mm giving way",
-        holds=off[0] <= off[1],
-        agrees="The error is smaller under a quadrotor that hovers.",
-        differs=f"Under a quadrotor that hovers, no tensions in their range give the wrench in {unanswered:.0%} of the "
-        f"steps. One that moves with the wind by up to {100 * moved(gives):.0f} cm relieves the cables, with "
-        f"tensions in their range in {gives.answered['as planned'] / len(gives.references):.0%} of the steps.",
+        missing="The paper does not define stable. If it means little motion of its own, see the sentence before it, "
+        "which holds. If it means not to yield to the wind: under a quadrotor that hovers, no tensions in their range "
+        f"give the wrench in {unanswered:.0%} of the steps, and one that moves with the wind by up to "
+        f"{100 * moved(gives):.0f} cm relieves the cables, with tensions in their range in "
+        f"{gives.answered['as planned'] / len(gives.references):.0%} of the steps.",
         figure="flown-hovering",
     )
 

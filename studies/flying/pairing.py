@@ -1,4 +1,9 @@
-"""The pairing of anchors and attachments: with the printed one J has no inverse."""
+"""The pairing of anchors and attachments: with the printed one J has no inverse.
+
+While the platform is level, at any position and yaw, the six lines A_i B_i have Pluecker coordinates that are affine in
+cos a_i and sin a_i, a_i = 60 degrees (i - 1): their only products of second order are r_A r_B sin(yaw) times
+cos^2 a_i + sin^2 a_i, a constant. Six points of three functions, 1, cos a_i and sin a_i, span three dimensions at most.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,7 @@ from ..accounts.account import Chapter
 from ..accounts.claim import Verdict, stated
 
 ROWS = 6  # of J, whose inverse step 7 of section V takes
+LEVEL = 200  # positions and yaws at which the coordinates are formed
 
 
 def chapter() -> Chapter:
@@ -28,9 +34,10 @@ def chapter() -> Chapter:
         holds=printed.rank_level == ROWS,
         otherwise=Verdict.IMPOSSIBLE,
         agrees="J has full rank at level poses.",
-        differs=f"At every level pose that was tried J has the computed rank, because {printed.reason}. Crossed pairs "
-        "of "
-        f"the same points (A1-B2, A2-B1, ...) have rank {crossed.rank} and singular values {values} (moments over "
+        differs="While the platform is level, at every position and yaw, the Pluecker coordinates of the six lines are "
+        f"affine in the cosine and sine of 60 degrees (i - 1), here to {off_affine():.0e} of the largest, so the rank "
+        f"is 3 at most. At yaw 0 {printed.reason}. Crossed pairs of the same points (A1-B2, A2-B1, ...) have rank "
+        f"{crossed.rank} and singular values {values} (moments over "
         f"{robot.length:.3g} m); all other chapters use them.",
         figure="pairing",
     )
@@ -39,6 +46,20 @@ def chapter() -> Chapter:
         f"crossed: rank {crossed.rank}": _points("wang-flying"),
     }
     return Chapter([claim], {"pairing": Drawing("The numbered cables from above", from_above(pairs))})
+
+
+def off_affine(seed: int = 0) -> float:
+    """Return how far the lines' coordinates are from affine ones at random level poses, over the largest."""
+    rng, (anchors, attachments) = np.random.default_rng(seed), _points("wang-flying-printed")
+    angles = np.radians(60) * np.arange(6)
+    basis = np.column_stack([np.ones(6), np.cos(angles), np.sin(angles)])
+    rest = np.eye(6) - basis @ np.linalg.pinv(basis)
+    places, yaws = rng.uniform(-2, 2, (LEVEL, 1, 3)), rng.uniform(-np.pi, np.pi, (LEVEL, 1))
+    across = attachments[:, 0] * np.sin(yaws) + attachments[:, 1] * np.cos(yaws)
+    along = attachments[:, 0] * np.cos(yaws) - attachments[:, 1] * np.sin(yaws)
+    ends = places + np.stack([along, across, np.tile(attachments[:, 2], (LEVEL, 1))], axis=-1)
+    lines = np.concatenate([anchors - ends, np.cross(ends, anchors - ends)], axis=-1)
+    return float(np.abs(rest @ lines).max() / np.abs(lines).max())
 
 
 def _points(name: str) -> tuple[np.ndarray, np.ndarray]:

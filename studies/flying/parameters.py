@@ -81,7 +81,7 @@ def _used(robot: Robot) -> list[Claim]:
             printed,
             tuple(float(value) for value in computed),
             within=1e-9 * max(printed),
-            agrees="The robot file of this run has the same numbers.",
+            agrees="The robot file of this run has the same numbers; they are its input, no result.",
             differs="The robot file of this run has other numbers.",
         )
         for name, statement, printed, computed in groups

@@ -5,10 +5,11 @@ hovers or flies straight (`circle`). These plans replace them:
 
 - VI.B, the circle in {G}, with the quadrotor free to move beside its hovering point;
 - VI.A, the helix in {G}, with the quadrotor free to leave its straight line;
-- VI.C, a circle of radius 0.15 m in {A}, with the quadrotor moving and pitching as given.
+- figures 12 to 15, a circle of radius 0.15 m in {A}, with the quadrotor moving and pitching as assumed.
 
-The paper draws VI.C's flight and pitch and prints no numbers. Assumed here: VI.A's line at its mean velocity, pitching
-by `PITCH` sin(0.2 pi t), and along x the surge that a quadrotor has when its thrust pitches: ddx = g tan(pitch).
+The recognised text of the paper has no section VI.C, only the captions of its figures 12 to 15: what is printed there
+is not known here. Assumed: VI.A's line at its mean velocity, pitching by `PITCH` sin(0.2 pi t), and along x the
+surge that a quadrotor has when its thrust pitches: ddx = g tan(pitch).
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ START, END, SECONDS = np.array([-20.0, -30.0, 40.0]), np.array([40.0, 20.0, 102.
 RATE = 0.2 * np.pi  # [rad/s]
 BELOW = 1.0  # of the circle's centre under the quadrotor [m]
 PITCH = 0.1  # [rad], assumed
+NOT_READ = (
+    "The recognised text has the captions of figures 12 to 15 but not their section, so what the paper prints there is "
+    "not known here."
+)
 GRAVITY = 9.81
 Vector = tuple[float, float, float]
 Name = Literal["circle", "helix", "pitching"]
@@ -53,7 +58,7 @@ def helix() -> Task:
 
 
 def pitching() -> Task:
-    """Return VI.C: a small circle in the frame of a quadrotor that moves and pitches."""
+    """Return the motion for figures 12 to 15: a small circle in the frame of a quadrotor that moves and pitches."""
     path = CirclePath(kind="circle", frame="quad", centre=(0, 0, -BELOW), radius=0.15, rate=RATE)
     return Task(name="circle-pitching", path=path, base=GivenBase(kind="given", paths={"quad": pitching_flight()}))
 
@@ -65,7 +70,7 @@ def planned(name: Name) -> Plan:
 
 
 def pitching_flight(largest: float = PITCH) -> SamplePath:
-    """Return the flight of VI.C, pitching by up to `largest` [rad], with its surge."""
+    """Return the assumed flight of figures 12 to 15, pitching by up to `largest` [rad], with its surge."""
     times = np.linspace(0.0, SECONDS, 101)
     pitch = largest * np.sin(RATE * times)
     flight = START + times[:, None] * (END - START) / SECONDS

@@ -101,7 +101,7 @@ def _inward() -> Claim:
         agrees="The weight does not exclude it.",
         differs="The platform is outside the ring, so each of the 36 lines from an anchor to an attachment leads "
         "inward: cables that pull and carry the weight pull inward with at least the computed force, whatever they "
-        "join.",
+        "join. No wind is in it.",
         unit="N",
         figure="radius",
     )

@@ -1,4 +1,7 @@
-"""Paper F's motions with r = 1 m: a proof that the base cannot hover, and plans with the base free."""
+"""Paper F's motions with r = 1 m: a proof that the base cannot hover, and plans with the base free.
+
+The quadrotor of the paper hovers or flies straight, so a plan with a free one reproduces nothing: it is a repair.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from ...figures.drawing import Drawing
 from ...models import load
 from ...ocp import Plan, plan
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, stated
+from ..accounts.claim import Claim, Verdict, repaired, stated
 from . import plans
 from .circle import tasks
 from .every_pairing import pull_inward
@@ -46,7 +49,7 @@ def _hovering(planned: Plan) -> Claim:
         cables = ", ".join(str(index + 1) for index in proof.binding)
         why = (
             f"At {proof.time:.2f} s tensions inside {robot.t_min.min():g} N to {robot.t_max.max():g} N are short by "
-            f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind."
+            f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind. No wind is in it."
         )
     why += (
         f" With any other pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
@@ -75,18 +78,16 @@ def _repaired(name: str, place: str, what: str, planned: Plan, figure: str) -> C
     tensions = "" if low is None or high is None else f"tensions from {low:.2f} N to {high:.2f} N"
     apart = planned.trajectory["carrier_pose"].values[:, 0, :2] - planned.trajectory["pose"].values[:, :2]
     away = float(np.linalg.norm(apart, axis=1).max())
-    return stated(
+    return repaired(
         name,
         place,
-        f"The platform follows the {what} of {RADIUS:g} m in {{G}} (largest distance from it, with the quadrotor "
-        f"free).",
-        0.0,
+        f"Not in the paper: the quadrotor is free to move, and the platform follows the {what} of {RADIUS:g} m in "
+        "{G} (largest distance from it).",
         planned.tracking_error_max,
         holds=followed,
-        agrees=f"It does if the quadrotor moves too, at most {100 * away:.0f} cm beside the platform: {tensions}, "
-        "audited at "
-        f"{planned.audit.rate:.0f} Hz.",
-        differs="The planner has no feasible plan.",
+        works=f"The quadrotor, level all the time, is at most {100 * away:.0f} cm beside the platform: {tensions}, "
+        f"audited at {planned.audit.rate:.0f} Hz.",
+        fails="The planner has no feasible plan, which is no proof that there is none.",
         unit="m",
         figure=figure,
     )

@@ -19,7 +19,8 @@ SMALL = 1e-4  # [rad], a small rotation for Eq. 9
 def chapter() -> Chapter:
     """Check the equations that give angular velocity and acceleration from angles."""
     samples = instants()
-    return Chapter([_matrix(samples), _small_turn(), _rate(samples), _acceleration(samples), _composed(samples)])
+    claims = [_matrix(samples), _small_angle(), _small_turn(), _rate(samples), _acceleration(samples)]
+    return Chapter([*claims, _composed(samples), _relative_to(samples)])
 
 
 def _matrix(samples: Instants) -> Claim:
@@ -43,6 +44,30 @@ def _matrix(samples: Instants) -> Claim:
         differs="Whether each phi is read as roll or as yaw, the third row is no unit vector (computed: the best "
         "reading "
         f"at its worst angles); R = Rz(yaw) Ry(pitch) Rx(roll) is meant, orthogonal to {ours:.0e}.",
+    )
+
+
+def _small_angle() -> Claim:
+    """Form R - 1 of Rz Ry Rx with the sines and cosines that are printed for small angles, and with sin u = u."""
+    angles = SMALL * np.array([0.6, -0.8, 1.0])
+    sizes = []
+    for sines in (np.zeros(3), angles):  # as printed, and as Eq. 9 has them
+        (sr, sp, sy), identity = sines, np.eye(3)
+        Rx = identity + sr * np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0]])
+        Ry = identity + sp * np.array([[0, 0, 1], [0, 0, 0], [-1, 0, 0]])
+        Rz = identity + sy * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]])
+        sizes.append(float(np.abs(Rz @ Ry @ Rx - identity).max()))
+    printed, meant = sizes
+    return compared(
+        "eq-9-small",
+        "section III.B, above Eq. 9",
+        "For a small u, sin u = 0 and cos u = 1 (largest entry of the matrix of Eq. 9, for angles up to "
+        f"{SMALL:g} rad).",
+        printed,
+        meant,
+        within=SMALL**2,
+        agrees="The matrix is that of Eq. 9.",
+        differs="With sin u = 0 there is no rotation and the matrix of Eq. 9 is zero; sin u = u is meant.",
     )
 
 
@@ -133,6 +158,23 @@ def _composed(samples: Instants) -> Claim:
         agrees="Eq. 30 holds to rounding, with the correct alpha_A and alpha_B.",
         differs="Eq. 30 is not the angular acceleration of the product of both rotations.",
         unit="rad/s^2",
+    )
+
+
+def _relative_to(samples: Instants) -> Claim:
+    """Compare the derivative of omega_BA with the angular acceleration of {B} relative to {G}, both in {B}."""
+    whole, own = samples.R_A.then(samples.R_B).acceleration, samples.R_B.acceleration
+    off = np.linalg.norm(whole - own, axis=1) / np.linalg.norm(whole, axis=1)
+    return compared(
+        "eq-32-frame",
+        "text below Eq. 30, Eq. 32",
+        "alpha_BA, the derivative of omega_BA, is the angular acceleration of {B} relative to {G} (median relative "
+        "difference).",
+        0.0,
+        float(np.median(off)),
+        within=ROUNDING,
+        agrees="Both are the same.",
+        differs="It is the one relative to {A}, with which Eq. 30 holds.",
     )
 
 

@@ -14,6 +14,7 @@ from . import (
     parameters,
     procedure,
     radius,
+    references,
     repair,
     rotations,
     shaken,
@@ -34,6 +35,7 @@ CHAPTERS = {
     "A vibrating cable (section III)": cable.chapter,
     "An element of a cable (section III)": element.chapter,
     "Forces and moments (section IV)": balance.chapter,
+    "References, frames and letters": references.chapter,
     "The procedure (section V)": procedure.chapter,
     "Wind (section VI)": wind.chapter,
     "A straight flight (section VI.A)": helix.chapter,
@@ -41,8 +43,8 @@ CHAPTERS = {
     "The largest circle (section VI.B)": radius.chapter,
     "A vibrating platform (section VI.B)": vibration.chapter,
     "A vibration in the elastic plant (sections III, V)": shaken.chapter,
-    "A moving quadrotor (section VI.C)": disturbance.chapter,
-    "The three motions flown in the wind (section VI)": flights.chapter,
+    "A moving quadrotor (figures 12 to 15)": disturbance.chapter,
+    "Motions flown in the wind (section VI)": flights.chapter,
 }
 
 

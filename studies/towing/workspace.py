@@ -14,7 +14,8 @@ a search for a placement and a posture (`ExistsPlacement`). The search can miss 
 the volume grows with the tries: from 96 to 1536 tries not at all for W2, by 6 % for W3 and by a quarter for W1, whose
 robot-ends must be at 1.2 m too.
 
-The paper's own figures contradict each other in two ways, whatever the sizes of the boxes, which it does not print.
+The paper does not print the widths of the boxes. With inferred ones a statement may be reproduced, but it differs or is
+impossible only if it does for any widths. The paper's own figures contradict each other in two such ways.
 It states that W1 lies inside W2, but by its ranges W1 extends up to 1.38 m and W2 to 1.18 m. And with the robot-ends at
 the printed x and y and at 1 m, their lowest height, cables of 1.2 m hold the load at 0.37 m, while the lowest height of
 W1 is printed as 0.6 m.
@@ -78,16 +79,19 @@ class Loops:
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)], axis=1)
 
 
-def loops(drive: Drive, condition: Condition | None = None, count: int = LOOPS, seed: int = 0) -> Loops:
+def loops(
+    drive: Drive, condition: Condition | None = None, count: int = LOOPS, seed: int = 0, widths: bool = True
+) -> Loops:
     """Draw poses of one system type and check whether a condition holds there; default: force balance, as in the paper.
 
-    With `EquilibriumPosture` and fixed lengths the returned poses are those at which the load rests.
+    With `EquilibriumPosture` and fixed lengths the returned poses are those at which the load rests. Without `widths`
+    the robot-ends have the printed x and y and any of the printed heights, which all boxes contain, however wide.
     """
     system, condition = robot("wang-ctmrts", drive), condition or ForceBalance()
     load_kernels(system)
     condition.holds(system, Places.at_home(system, system.home))
     start = time.perf_counter()
-    places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]))
+    places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]), widths)
     held = condition.holds(system, places)
     return Loops(system, places, held, time.perf_counter() - start)
 
@@ -127,11 +131,13 @@ def in_prism(system: Robot, points: np.ndarray) -> np.ndarray:
     return (shares >= 0).all(axis=0) & (points[:, 2] < shares.T @ ends[:, 2])
 
 
-def _draw(system: Robot, count: int, rng: np.random.Generator) -> Places:
+def _draw(system: Robot, count: int, rng: np.random.Generator, widths: bool) -> Places:
     """Return poses of one system type, uniform in what its drive moves."""
     carriers = np.tile(system.carrier_home, (count, 1, 1))
     if system.drive != "variable-length":
-        carriers[:, :, :3] = rng.uniform(*reach(system), carriers[:, :, :3].shape)
+        ends = rng.uniform(*reach(system), carriers[:, :, :3].shape)
+        moved = slice(0, 3) if widths else slice(2, 3)
+        carriers[:, :, moved] = ends[:, :, moved]
     angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
     if system.fixed_lengths is not None:
         places = three_cable_pose(system, angles, carriers, system.fixed_lengths)
