@@ -32,12 +32,14 @@ kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
 	$(BIN)/python -c "from towline.solvers.stages import machine; machine.solve_stages()"
 	$(BIN)/python -c "from towline.models.plant import machine; machine.run_rows()"
+	$(BIN)/python -c "from towline.models.forward_kinematics import machine; machine.load()"
 	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"
 	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"
 
-# Each worker starts with half of the tests in order, so that what a file's tests share is computed once.
+# Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has
+# one thread: two workers with two each would wait for one another.
 unit: .venv/dev.stamp
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 
 # The documentation site, in site/; a warning is an error, as long as no --quiet keeps it from being counted.
 docs: .venv/dev.stamp

@@ -9,24 +9,41 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, TypeVar
+from weakref import WeakSet
 
 from . import processors
 from .errors import InputError, SolverError
 from .inputs import shown, whole_number
+from .quiet import quiet
 
 MOST_WORKERS = 1024
 AHEAD = 3  # jobs for each worker, one of which it works on
 CONNECT_WITHIN = 5.0  # [s]
 WORKERS_WITHIN = 30.0  # [s]
+LOOK_EVERY = 1.0  # [s]
+WITHOUT_WORKERS = 5.0  # [s]; a scheduler's worker that was killed is often started again
+NOISY = ("distributed", "distributed.client", "asyncio", "tornado.application")  # of a scheduler that ends
+LEFT_TO_PARENT = {signal.SIGINT, signal.SIGTERM}
 
+_running: WeakSet[_Spawning] = WeakSet()
 Result = TypeVar("Result")
 
 
@@ -40,11 +57,14 @@ class Workers:
         Returns how many jobs may be under way now; a cluster may grow and shrink.
     failures
         Exceptions that mean that workers have failed, each with its message; {0} stands for the exception.
+    look
+        Raises SolverError if there are no workers any more; called again and again while a result is awaited.
     """
 
     executor: Executor
     limit: Callable[[], int]
     failures: Mapping[type[Exception], str] = field(default_factory=dict)
+    look: Callable[[], None] = lambda: None
 
     def map(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
         """Yield `function(*job)` of each job, in their order, while the next ones are being evaluated.
@@ -59,9 +79,9 @@ class Workers:
             for job in jobs:
                 under_way.append(self.executor.submit(function, *job))
                 if len(under_way) >= self.limit():
-                    yield under_way.popleft().result()
+                    yield self._next(under_way)
             while under_way:
-                yield under_way.popleft().result()
+                yield self._next(under_way)
 
     def as_completed(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
         """Yield `function(*job)` of each job as soon as it is there, so that no worker waits for a slow one.
@@ -80,9 +100,20 @@ class Workers:
             while under_way:
                 yield from self._done(under_way)
 
+    def _next(self, under_way: deque[Future[Result]]) -> Result:
+        """Wait until the first job is done; remove it and return its result."""
+        self._wait(under_way[0])
+        return under_way.popleft().result()
+
+    def _wait(self, *futures: Future[Result]) -> set[Future[Result]]:
+        """Wait until at least one of some jobs is done; return those that are."""
+        while not (done := wait(futures, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done):
+            self.look()
+        return done
+
     def _done(self, under_way: set[Future[Result]]) -> Iterator[Result]:
         """Wait until jobs are done; remove them and yield their results."""
-        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+        for future in self._wait(*under_way):
             under_way.remove(future)
             yield future.result()
 
@@ -152,53 +183,111 @@ class _ThisProcess(Executor):
 
 
 class _Processes(ProcessPoolExecutor):
-    """Processes that ignore interrupts of the terminal from their first instruction on."""
+    """Processes that leave signals that end a command to its first process, from their first instruction on."""
 
     def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
         if not hasattr(signal, "pthread_sigmask"):
             return super().submit(fn, *args, **kwargs)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which a process that starts inherits
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, LEFT_TO_PARENT)  # which a process that starts inherits
         try:
             return super().submit(fn, *args, **kwargs)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+class _Process(SpawnProcess):
+    """A process whose start is whole: an interrupt in the middle would leave one that ends in a traceback."""
+
+    started_by: _Spawning
+
+    @staticmethod
+    def _Popen(process_obj: Any) -> Any:
+        with ThreadPoolExecutor(1) as other_thread:  # Python raises KeyboardInterrupt in the main thread only
+            return other_thread.submit(process_obj.started_by.launch, process_obj).result()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "started_by"}
+
+
 class _Spawning(SpawnContext):
-    """Start new processes, and remember them."""
+    """Start new processes, until all are ended."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.started: list[SpawnProcess] = []
+        self._launched: list[Any] = []
+        self._launching = threading.Lock()  # held until one that starts has been given all that it reads
+        self._ended = False
+        _running.add(self)
 
     def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Return a process that is not started yet, as the executor makes it."""
-        process = SpawnProcess(*args, **kwargs)
-        self.started.append(process)
+        process = _Process(*args, **kwargs)
+        process.started_by = self
         return process
+
+    def launch(self, process: SpawnProcess) -> Any:
+        """Start a process.
+
+        Raises
+        ------
+        InterruptedError
+            If they are ended: what interrupts the main thread does not wait for the thread that starts one.
+        """
+        with self._launching:
+            if self._ended:
+                raise InterruptedError
+            self._launched.append(SpawnProcess._Popen(process))
+            return self._launched[-1]
+
+    def kill(self) -> None:
+        """End all processes at once, whatever they are doing."""
+        with self._launching:
+            self._ended = True
+            for each in self._launched:
+                with suppress(OSError):  # it has ended by itself
+                    each.kill()
+
+
+def end_processes() -> None:
+    """End all processes at once, for a process that ends without unwinding its blocks."""
+    for each in tuple(_running):
+        each.kill()
 
 
 @contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
     # New processes, not copies of this one: a copy would have its locks, but not the threads that hold them.
     context = _Spawning()
+    _start_tracker()
     alive, stop = context.Pipe(duplex=False)
     pool = _Processes(workers, mp_context=context, initializer=_begin_worker, initargs=(alive,))
     with alive, stop, processors.one_thread_each():
         try:
             yield pool
         except BaseException:
-            for process in context.started:  # nobody wants the rest: they end at once, whatever they are doing
-                if process.pid is not None:
-                    process.kill()
+            context.kill()  # nobody wants the rest
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
+def _start_tracker() -> None:
+    """Start Python's process that removes the semaphores of a process which ends early; nobody needs its report."""
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (before, "ignore:resource_tracker")))
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
+
+
 def _begin_worker(alive: Any) -> None:
-    """Leave interrupts to the process that started this one, and end when it ends, which closes its end of a pipe."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Leave signals to the process that started this one, and end when it ends, which closes its end of a pipe."""
+    for each in LEFT_TO_PARENT:
+        signal.signal(each, signal.SIG_IGN)
 
     def end_with_it() -> None:
         alive.poll(None)
@@ -223,6 +312,18 @@ def _cluster(address: str) -> Iterator[Workers]:
         reason = "no answer" if isinstance(error, OSError) else "not an address"
         raise InputError(f"{accepted}, got {shown(address)} ({reason})") from None
     ended = "the scheduler ended before the work was done; a checkpoint can be resumed"
+    seen = time.monotonic()
+
+    def look() -> None:
+        nonlocal seen
+        now = time.monotonic()
+        if client.nthreads():
+            seen = now
+        elif now - seen > WITHOUT_WORKERS:
+            raise SolverError(
+                "all workers of the scheduler ended before the work was done; a checkpoint can be resumed"
+            )
+
     failures: dict[type[Exception], str] = {
         distributed.KilledWorker: "one job ended several workers of the scheduler (out of memory?); a checkpoint can "
         "be resumed",
@@ -230,13 +331,14 @@ def _cluster(address: str) -> Iterator[Workers]:
         CancelledError: ended,
         OSError: ended,
     }
-    try:
+    with quiet(*NOISY):
         try:
-            client.wait_for_workers(1, timeout=WORKERS_WITHIN)
-        except TimeoutError:
-            raise InputError(f"scheduler must have a worker at least, got {shown(address)} without any") from None
-        # Not pure: Dask would take a hash of the job instead of a name of its own.
-        executor = client.get_executor(pure=False)
-        yield Workers(executor, lambda: AHEAD * max(sum(client.nthreads().values()), 1), failures)
-    finally:
-        client.close(timeout=CONNECT_WITHIN)
+            try:
+                client.wait_for_workers(1, timeout=WORKERS_WITHIN)
+            except TimeoutError:
+                raise InputError(f"scheduler must have a worker at least, got {shown(address)} without any") from None
+            # Not pure: Dask would take a hash of the job instead of a name of its own.
+            executor = client.get_executor(pure=False)
+            yield Workers(executor, lambda: AHEAD * max(sum(client.nthreads().values()), 1), failures, look)
+        finally:
+            client.close(timeout=CONNECT_WITHIN)

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .declared import check_hdf5
 from .errors import InputError
 from .inputs import printable, shown
+from .reading import check_file
 from .writing import whole_file
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Contents", "Variable", "check_units", "load_netcdf", "save_netcdf"]
 
 _alone = threading.Lock()
+LARGEST = 4_000_000_000  # [bytes]; an hour of a flight with a sample each millisecond
 # Of motions and their tensions, of the platform and of carriers.
 UNITS = {"time": "s", "pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2", "tensions": "N"}
 
@@ -108,13 +111,14 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
 
 
 def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
-    """Load a NetCDF file into memory.
+    """Load a NetCDF file into memory; `check_hdf5` looks at all that it declares first.
 
     Raises
     ------
     InputError
-        If it cannot be read: `refusal`, and the reason in brackets.
+        If it cannot or must not be read: `refusal`, and the reason in brackets.
     """
+    import h5py
     import xarray as xr
 
     with _alone:  # the hook and the warnings are those of the whole process
@@ -122,6 +126,9 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
         hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
         try:
             try:
+                size = check_file(path, "a NetCDF file", LARGEST)
+                with h5py.File(path) as file:
+                    check_hdf5(file, size)
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")  # of what is unusual in a file; whoever uses it checks what matters
                     return xr.load_dataset(path, engine="h5netcdf")

@@ -1,6 +1,17 @@
 """The numbers by which results are judged, in one place. All are relative and have no unit."""
 
-__all__ = ["AT_LIMIT", "DOUBTFUL", "FEASIBILITY", "NEGLIGIBLE", "OPTIMALITY", "RANK", "ROUNDING", "WEIGHTS_APART"]
+__all__ = [
+    "AT_LIMIT",
+    "CANCELLED",
+    "DOUBTFUL",
+    "FEASIBILITY",
+    "NEGLIGIBLE",
+    "OPTIMALITY",
+    "ORTHOGONAL",
+    "RANK",
+    "ROUNDING",
+    "WEIGHTS_APART",
+]
 
 # Wrench error that is accepted, relative to what the problem requires (see `TensionProblem.tolerance`). Tensions
 # are called optimal only below it and a certificate is believed only above it, so the two answers cannot both be given.
@@ -16,6 +27,10 @@ AT_LIMIT = 1e-9
 # Rounding of a matrix-vector product, relative to the sum of the absolute terms: 450 machine epsilons.
 ROUNDING = 1e-13
 
+# The terms of A t count at most at this many times what the problem requires: tensions that cancel to more digits than
+# that give no wrench that they are asked for.
+CANCELLED = 1e10
+
 # Singular values below this part of the largest count as zero.
 RANK = 1e-12
 
@@ -24,10 +39,14 @@ RANK = 1e-12
 # rounding. The C core, which looks at pivots, does the same below 4e-11 and leaves those up to 1e-9 alone.
 DOUBTFUL = 1e-10
 
-# A cable pulls along a direction d only if |d . a_i| exceeds this part of the largest column norm. Smaller products are
-# rounding: times an infinite tension limit they would void every certificate. It is larger than RANK, so that a
-# direction which the rank cut calls unreachable is not reached by the certificate's own count either.
+# A cable pulls along a direction d only if |d . a_i| exceeds this part of its column norm; if none does, w is outside
+# the range of A. It is larger than RANK, so that a direction which the rank cut calls unreachable is not reached by the
+# certificate's own count either. What a smaller pull gives inside a finite limit is known, and counts.
 NEGLIGIBLE = 1e-11
+
+# A cable without a limit along d may pull by this part of its column norm, which is ROUNDING: whatever its tension,
+# that gives no more along d than A t is rounded by. A larger pull may give anything, and voids the certificate.
+ORTHOGONAL = 1e-13
 
 # The heaviest weight of a problem, relative to the lightest: beyond it least squares have no digits left.
 WEIGHTS_APART = 1e14

@@ -49,7 +49,11 @@ def whole_folder(path: Path) -> Iterator[Path]:
     InputError
         If `path` exists already, or cannot be written.
     """
-    if path.exists() or path.is_symlink():
+    try:
+        there = path.exists() or path.is_symlink()
+    except OSError as error:  # too long for a file name
+        raise _refusal(path, error) from None
+    if there:
         raise InputError(f"{printable(str(path))} must be a new path, got one that exists")
     target = check_writable(path)
     with _beside(path, target, lambda: tempfile.mkdtemp(dir=target.parent, prefix="."), 0o777) as temporary:

@@ -10,6 +10,7 @@ import typer
 from ..errors import InputError
 from ..inputs import check_ending, one_of
 from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
+from .outputs import check_outputs
 
 SIGMA_KEYS = "lengths, position, rotation"
 
@@ -25,12 +26,13 @@ def calibrate(
         ),
     ],
     free: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAMES",
-            help="What to find, separated by commas: anchors, attachments, offsets, scales, radii, clock; or auto.",
+            help="What to find, separated by commas: anchors, attachments, offsets, scales, radii, clock; or auto. "
+            "Default: anchors, offsets, and clock if the log has times and poses of a motion.",
         ),
-    ] = "anchors,offsets",
+    ] = None,
     prior: Annotated[
         str | None,
         typer.Option(
@@ -62,37 +64,36 @@ def calibrate(
 ) -> None:
     """Find a robot's anchors, offsets and more from measured cable lengths, and write it as a robot file.
 
-    The file has the uncertainty of its new numbers. Carriers are at home. The exit code is 1 if the values did not
-    converge.
+    The file has the uncertainty of its new numbers. Carriers are at home. Nothing is written, and the exit code is 1,
+    if the log seems to have a slip (cables in another order, other units or angles), the values did not converge, or
+    samples left out fit worse than with the robot's file.
     """
     from ..calibration import calibrate as find
     from ..calibration import read_measurements
     from ..figures.style import FORMATS
     from ..models import load
-    from ..writing import check_writable
 
     one_of("--format", form, FORMATS)
-    groups = [name.strip() for name in free.split(",")]
+    names = None if free is None else [name.strip() for name in free.split(",")]
     stated = None if sigma is None else _sigma(sigma)
     known = None if prior is None else _by_name("--prior", prior)
     loaded = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
-    if figures is not None:
-        check_writable(figures / f"residuals.{form}")
-    if check_writable(target) == log.resolve():
-        raise InputError(f"--out must be another file than the log, got {target}")
+    check_outputs({"--out": target, "--figures": figures and figures / f"residuals.{form}"}, {"the log": log})
     check_ending("--out", target, ".yaml", ".yml")
     measurements = read_measurements(log, stated)
-    result = find(loaded, measurements, "auto" if groups == ["auto"] else groups, known, outliers)
+    result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     report = result.report()  # before anything is written
-    file = result.save(target)
+    file = None if result.refused else result.save(target)
     pictures = [] if figures is None else result.plot(figures, form)
     if as_json:
         print_json({**result.to_dict(), "file": file, "figures": pictures})
     else:
         typer.echo(report)
-        print_written([file, *pictures])
-    if not result.converged:
+        if written := [*([] if file is None else [file]), *pictures]:
+            print_written(written)
+    if result.refused:
+        typer.echo(f"towline: {target} is not written: {result.refused}", err=True)
         raise typer.Exit(1)
 
 

@@ -1,10 +1,11 @@
-"""The command `towline`: from its first import on Ctrl-C ends it."""
+"""The command `towline`: from its first import on Ctrl-C and SIGTERM end it."""
 
 from __future__ import annotations
 
 import gc
 import os
 import signal
+import sys
 from types import FrameType
 from typing import NoReturn
 
@@ -13,7 +14,10 @@ OBJECTS = 50_000  # by which they must have grown before Python looks for rubbis
 
 def main() -> None:
     """Run the command line."""
-    signal.signal(signal.SIGINT, _at_once)  # while what listens is imported
+    _open_streams()
+    for each in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, _at_once)  # while what listens is imported
     from .stopping import end, ignore, listen, requested
 
     try:
@@ -29,6 +33,13 @@ def main() -> None:
         if requested():
             end()
         raise
+
+
+def _open_streams() -> None:
+    """Open the standard streams that are closed, as of a daemon; another file would take their numbers."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - as long as the process lasts
 
 
 def _at_once(signum: int, frame: FrameType | None) -> NoReturn:

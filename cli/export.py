@@ -9,6 +9,7 @@ import typer
 
 from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json
+from .outputs import check_outputs
 
 
 def export(
@@ -37,7 +38,7 @@ def export(
     """Export a robot as a MuJoCo model (--mjcf), its dynamics as C code (--c), or a control step as C code (--step)."""
     from ..errors import InputError
     from ..models import load
-    from ..writing import check_writable, whole_file
+    from ..writing import whole_file
 
     if mjcf + c_code + (step is not None) != 1:
         raise InputError("export requires exactly one of --mjcf, --c and --step")
@@ -57,7 +58,7 @@ def export(
         return
     ending = ".xml" if mjcf else ".c"
     path = out if out is not None else Path(f"{loaded.name}{ending}")
-    check_writable(check_ending("--out", path, ending))
+    check_outputs({"--out": check_ending("--out", path, ending)})
     if mjcf:
         from ..models.mjcf import to_mjcf
 

@@ -9,6 +9,7 @@ import typer
 
 from ..inputs import check_ending
 from .options import PLAIN, Command, JsonOption, print_json
+from .outputs import check_outputs
 
 app = typer.Typer(**PLAIN)
 
@@ -32,11 +33,12 @@ def caspr(
     """Convert a CASPR robot to a robot file, and report what a robot file cannot express."""
     from ..models.caspr import read_caspr
     from ..models.parsing import to_yaml
-    from ..writing import check_writable, whole_file
+    from ..writing import whole_file
 
     if out is not None:
-        check_writable(check_ending("--out", out, ".yaml", ".yml"))
+        check_ending("--out", out, ".yaml", ".yml")
     result = read_caspr(folder, cable_set)
+    check_outputs({"--out": out})
     text = to_yaml(result.robot)
     if out is not None:
         with whole_file(out) as temporary:

@@ -3,13 +3,14 @@
 A command's module is imported only when the command runs or shows its help, so that `towline --help` starts at once.
 
 Exit codes: 0, the answer is yes (feasible, tensions exist); 1, it is no; 2, wrong input; 3, an error in towline itself;
-130, stopped by Ctrl-C.
+130, stopped by Ctrl-C; 143, by SIGTERM; 141, the reader of the output has closed it, as `| head -1` does.
 """
 
 from __future__ import annotations
 
 import difflib
 import os
+import select
 import sys
 from importlib import import_module
 from typing import Annotated, Any
@@ -40,6 +41,8 @@ COMMANDS = {
 }
 MODULES = {"import": "import_"}  # where the module is not named like the command
 TRACEBACK = "TOWLINE_TRACEBACK"  # environment variable: show the traceback of an error in towline itself
+CLOSED = 141  # 128 and SIGPIPE, as of the tools that this signal ends
+COMPLETION = "_TOWLINE_COMPLETE"  # environment variable: the shell completes a line, and Typer ends the process
 UsageError = typer.BadParameter.__bases__[0]  # the base of all that Typer reports about a command line
 
 
@@ -101,7 +104,7 @@ def _options(
     """Plan motions of cable robots and distribute the tensions of their cables.
 
     The exit code is 0 if the answer is yes (feasible, tensions exist), 1 if it is no, 2 for wrong input, 3 for an error
-    in towline itself, and 130 after Ctrl-C.
+    in towline itself, 130 after Ctrl-C, 143 after SIGTERM, and 141 if the reader of the output closes it (| head -1).
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
@@ -115,7 +118,7 @@ def main() -> None:
     except BaseException as error:
         if requested() or isinstance(error, KeyboardInterrupt):
             end()  # whatever the interrupt has become meanwhile
-        if not isinstance(error, Exception):
+        if isinstance(error, SystemExit) and COMPLETION in os.environ:
             raise
         code = _report(error)
     if requested():
@@ -123,24 +126,46 @@ def main() -> None:
     sys.exit(code)
 
 
-def _report(error: Exception) -> int:
+def _report(error: BaseException) -> int:
     """Print an error as one line; return the exit code."""
-    if isinstance(error, BrokenPipeError):
-        # Whoever read the output has enough of it. Python flushes once more at its end: that goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+    if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
+        error = error.__context__  # of which Typer makes exit code 1, which here means no
+    if isinstance(error, BrokenPipeError) and _reader_is_gone():
+        _to_nobody(1)
+        return CLOSED
     code = 2
     if isinstance(error, UsageError):
         message = _usage(error)
     elif isinstance(error, TowlineError | OSError | MemoryError):
         message = str(error) or "out of memory"
+        if isinstance(error, OSError):
+            _to_nobody(1)  # a full disk, where standard output is a file
     elif os.environ.get(TRACEBACK):
         raise error
     else:
         code = 3
         message = f"an error in towline itself: {type(error).__name__}: {error} ({TRACEBACK}=1 shows where)"
-    typer.echo(f"towline: {' '.join(message.split())}", err=True)
+    try:
+        typer.echo(f"towline: {' '.join(message.split())}", err=True)
+    except OSError:  # standard error is full or closed: the exit code is all that can be reported
+        _to_nobody(2)
     return code
+
+
+def _reader_is_gone() -> bool:
+    """Return whether nobody reads standard output any more; other pipes of this process may break too."""
+    if not hasattr(select, "poll"):
+        return True
+    watched = select.poll()
+    watched.register(1, 0)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in watched.poll(0))
+
+
+def _to_nobody(stream: int) -> None:
+    """Send what is still to be written to a standard stream nowhere; else Python fails once more, with code 120."""
+    handle = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(handle, stream)
+    os.close(handle)
 
 
 def _usage(error: Any) -> str:

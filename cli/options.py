@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,7 +19,14 @@ PLAIN: dict[str, Any] = {"rich_markup_mode": None, "add_completion": False}
 
 
 class Command(TyperCommand):
-    """A command whose usage line names arguments without braces."""
+    """A command whose usage line names arguments without braces, and which begins without files that others read."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; `check_outputs` looks at the files that it reads."""
+        reading = sys.modules.get("towline.reading")  # nothing has been read where it was never loaded
+        if reading is not None:
+            reading.files_read.clear()
+        return super().invoke(ctx)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the parts of the usage line."""

@@ -21,6 +21,7 @@ from .options import (
     print_json,
     print_written,
 )
+from .outputs import check_outputs
 from .resuming import checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
 from .watching import watching
@@ -120,7 +121,6 @@ def plan(
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task
-    from ..writing import check_writable
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
@@ -131,9 +131,8 @@ def plan(
         from ..figures.animation import check_film
 
         check_film(animate, speed, fps)
-    for file in (target, report, animate, figures and figures / f"path.{form}"):
-        if file is not None:
-            check_writable(file)
+    drawn = figures and figures / f"path.{form}"
+    check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": drawn})
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         planned = plan_motion(loaded, read, watch, robust=robust)
         written = {"file": planned.save(target)}

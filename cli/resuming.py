@@ -59,7 +59,7 @@ def resumable(
         more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
         add_to_message(f"; {more}")  # before the first result
     else:
-        more = "the table is lost: only --checkpoint and --resume store it"
+        more = "they are lost: only --checkpoint and --resume store them"
 
     def progress(done: int, total: int, counted: int) -> None:
         show(done, total, counted)

@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .options import JsonOption, print_json, print_table, robot_names
+from .outputs import check_outputs
 
 if TYPE_CHECKING:
     from ..models import Robot
     from ..models.diagnosis import Diagnosis
     from ..solvers import TensionSolution
+
+MOVES = {
+    "both": "winches change the lengths of cables, and carriers may move",
+    "fixed-length": "carriers move, and cables keep their lengths",
+    "variable-length": "winches change the lengths of cables, and mobile carriers stay",
+}
 
 
 def robots(
@@ -46,6 +53,7 @@ def robots(
         from ..solvers import solve
 
         robot = load(name)
+        check_outputs({"--figure": figure})
         at_home = solve(pose_problem(Dynamics(robot), robot.home))
         result = _to_dict(robot, diagnose(robot), at_home)
         if figure is not None:
@@ -83,6 +91,7 @@ def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> di
         "cables": robot.m,
         "carriers": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
         "home": robot.home.tolist(),
+        "drive": robot.drive,
         "mass": robot.platform.mass,
         "weight": robot.weight,
         "length": robot.length,
@@ -112,6 +121,7 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
         f"characteristic length {quantity(result['length'], 'm')}",
         f"  home ({quantity_row(result['home'])}) [m, rad], cable lengths there "
         f"{quantity_range(result['cable_lengths'], 'm')}",
+        f"  drive {robot.drive}: {MOVES[robot.drive]}",
         f"  tension limits: t_min {quantity_range(result['t_min'], 'N')}, t_max {quantity_range(result['t_max'], 'N')}",
         f"  wrench matrix: {rank}",
         f"  its singular values, moments divided by the characteristic length: "
@@ -144,6 +154,7 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
     from ..figures import robot as figure
     from ..figures import style
     from ..models import Dynamics
+    from ..models.rotor_discs import rotor_discs
     from ..workspace import hints
 
     positions, feasible = hints(Dynamics(robot))
@@ -160,5 +171,6 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
         t_max=robot.t_max,
         positions=positions,
         feasible=feasible,
+        rotors=rotor_discs(robot, robot.carrier_home[None])[0],
     )
     style.save(figure.draw(sketch), file)

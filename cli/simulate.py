@@ -25,6 +25,7 @@ from .options import (
     print_json,
     print_written,
 )
+from .outputs import check_outputs
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
 from .stopping import add_to_message
 from .watching import COMPILING, counting, watching
@@ -109,7 +110,8 @@ def simulate(
 ) -> None:
     """Fly a plan with a controller, in wind, with slack cables, sensors and faults.
 
-    A flight passes if it lasts, its error stays within --tolerance, no tension exceeds t_max and no cable goes slack.
+    A flight passes if it lasts, its error stays within --tolerance, no tension exceeds t_max by more than 0.1 % of the
+    cable's range, and no cable whose t_min is above zero goes slack.
     The exit code is 0 if the flight passes, with --runs if all of them do, and else 1.
     """
     from ..figures.style import FORMATS
@@ -131,22 +133,19 @@ def simulate(
         from ..models import load
         from ..models.parsing import read_yaml
         from ..simulation import Noise
-        from ..writing import check_writable
 
         loaded = load(robot)
         if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
             raise InputError(f"{printable(str(plan))}: no such file")
         target = out if out is not None else Path(f"{plan.stem}-flight{'' if runs is None else 's'}.nc")
-        if target.resolve() == plan.resolve():
-            raise InputError(f"--out must be another file than the plan, got {target}")
         check_ending("--out", target, ".nc")
         if animate is not None:
             from ..figures.animation import check_film
 
             check_film(animate, speed, fps)
-        for file in (target, animate, figures and figures / f"error.{form}"):
-            if file is not None and check_writable(file) == (stored and stored.resolve()):
-                raise InputError(f"--out must be another file than the checkpoint, got {file}")
+        outputs = {"the checkpoint": stored, "--out": target, "--animate": animate}
+        outputs["--figures"] = figures and figures / f"error.{form}"
+        check_outputs(outputs, {"the plan": plan, "--noise": noise})
         conditions = {
             "wind": None if wind is None else numbers("--wind", wind, 3),
             "controller": {"predictive": Predictive, "open-loop": OpenLoop}.get(controller, ComputedTorque)(loaded),

@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..inputs import check_ending
 from ..processors import one_thread_each
 from .options import print_json
+from .outputs import check_outputs
 from .resuming import checkpoint_of, resumable
 from .stopping import add_to_message
 from .watching import counting
@@ -43,7 +44,6 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     from ..ocp import read_task
     from ..ocp import sweep as sweep_plans
     from ..ocp.sweeps.axis import check_figure, read_axes, read_option
-    from ..writing import check_writable
 
     stored = checkpoint_of(options.checkpoint, options.resume)
     loaded, read = load(robot), read_task(task)
@@ -55,10 +55,8 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     picture = None if figures is None else figures / f"sweep.{options.form}"
     if picture is not None:
         check_figure(read_axes(vary))
-    taken = None if stored is None else stored.resolve()
-    for what, file in (("--out", target), ("--out", target.with_suffix(".csv")), ("--figures", picture)):
-        if file is not None and check_writable(file) == taken:
-            raise InputError(f"{what} must be another file than the checkpoint, got {file}")
+    table = {"--out": target, "the CSV file of --out": target.with_suffix(".csv")}
+    check_outputs({"the checkpoint": stored, **table, "--figures": picture})
     with counting(f"planning {read.name}", "feasible", quiet=as_json) as show:
         result = sweep_plans(
             loaded,

@@ -49,7 +49,7 @@ def tension(
 ) -> None:
     """Compute the cable tensions at one pose and motion, by every method.
 
-    The exit code is 1 if no tensions inside the limits exist; the proof is printed then.
+    The exit code is 1 if the method finds no tensions inside the limits; if none exist, the proof is printed.
     """
     from ..models import load
     from ..solvers import methods
@@ -113,7 +113,7 @@ def _show(robot: Robot, at: dict[str, Any], solutions: dict[str, TensionSolution
     ]
     cables = [column([row[i] for row in tensions], digits=5) for i in range(robot.m)]
     status = ["", *(each.status.value for each in solutions.values()), ""]
-    times = ["", *(f"{1e3 * each.time:.2f} ms" for each in solutions.values()), ""]
+    times = ["", *(f"{1e6 * each.time:.1f} us" for each in solutions.values()), ""]
     typer.echo(f"{robot.name} at ({quantity_row(at['pose'])}) [m, rad]: {solution.status.value.upper()}")
     print_table(
         ["tensions [N] of cable", *(str(i + 1) for i in range(robot.m)), "status", "time"],

@@ -9,6 +9,7 @@ import typer
 
 from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json, print_written
+from .outputs import check_outputs
 
 
 def time(
@@ -36,11 +37,10 @@ def time(
     """
     from ..models import load
     from ..ocp import read_task, time_along
-    from ..writing import check_writable
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-timed.yaml")
-    check_writable(check_ending("--out", target, ".yaml", ".yml"))
+    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml")})
     timing = time_along(loaded, read, grid=grid)
     file = timing.save_task(target, f"{read.name[:54]}-timed") if timing.feasible else None
     if as_json:

@@ -10,7 +10,8 @@ import typer
 from ..errors import InputError
 from ..inputs import check_ending
 from .options import JsonOption, print_json, robot_names
-from .stopping import unlisten
+from .outputs import check_outputs
+from .stopping import end_at_once, requested, unlisten
 
 HOST, PORT = "127.0.0.1", 8080
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -42,14 +43,14 @@ def view(
     import threading
 
     from ..viewer import read, save_page, serve
-    from ..writing import check_writable
 
     if html is not None:
         for name, differs in (("--host", host != HOST), ("--port", port != PORT)):
             if differs:
                 raise InputError(f"{name} must be left out with --html: a page needs no server")
-        check_writable(check_ending("--html", html, ".html", ".htm"))
+        check_ending("--html", html, ".html", ".htm")
     subject = read(target, robot, other)
+    check_outputs({"--html": html})
     summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})
     if html is not None:
         written = save_page(subject, html)
@@ -59,14 +60,17 @@ def view(
             typer.echo(str(written))
         return
     with serve(subject, host, port) as url:
-        if as_json:
-            print_json({**summary, "url": url})
-        else:
-            typer.echo(f"{subject.title}\n{url}   (Ctrl-C ends it)")
-        if host not in LOOPBACK:
-            typer.echo("towline: everyone who can reach this address can watch and move the sliders", err=True)
         unlisten()
         try:
+            if as_json:
+                print_json({**summary, "url": url})
+            else:
+                typer.echo(f"{subject.title}\n{url}   (Ctrl-C ends it)")
+            if host not in LOOPBACK:
+                typer.echo("towline: everyone who can reach this address can watch and move the sliders", err=True)
             threading.Event().wait()
         except KeyboardInterrupt:
+            if requested():  # SIGTERM
+                raise
             typer.echo("", err=True)
+            end_at_once(0)  # the server ends its threads one by one, and nothing is left to be written

@@ -10,7 +10,9 @@ import typer
 from ..errors import InputError
 from ..inputs import check_ending
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
-from .resuming import checkpoint_of, checkpoint_option, resume_option, scheduler_option
+from .outputs import check_outputs
+from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
+from .stopping import add_to_message, requested
 from .watching import counting
 
 if TYPE_CHECKING:
@@ -112,7 +114,6 @@ def workspace(
     from ..models import load
     from ..workspace import sample, save
     from ..workspace.condition import for_robots
-    from ..writing import check_writable
 
     for file in define or []:
         _import(file)
@@ -126,20 +127,15 @@ def workspace(
     stored = checkpoint_of(checkpoint, resume)
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh must be of a region in which only positions vary, got {mesh} of another")
-    taken = {} if stored is None else {stored.resolve(): "the checkpoint"}
     if target.suffix == ".zarr" and target.exists():
         raise InputError(f"--out must be a new .zarr folder or a NetCDF file, got {target}, which exists")
-    for what, file in (("--out", target), ("--figure", figure), ("--mesh", mesh)):
-        place = None if file is None else check_writable(file)
-        if place in taken:
-            raise InputError(f"{what} must be another file than {taken[place]}, got {file}")
-        if place is not None:
-            taken[place] = what
+    outputs = {"the checkpoint": stored, "--out": target, "--figure": figure, "--mesh": mesh}
+    check_outputs(outputs, {f"--define {file}": file for file in define or []})
     if figure is not None:
         style.check_picture(figure)
     # Before the samples, so that an error in it is reported before hours of work.
     surface = None if mesh is None else _boundary(loaded, required, region)
-    with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as progress:
+    with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as show:
         result = sample(
             loaded,
             required,
@@ -152,9 +148,10 @@ def workspace(
             scheduler=scheduler,
             checkpoint=stored,
             resume=resume is not None,
-            progress=progress,
+            progress=resumable(show, stored, "samples"),
             keep=keep,
         )
+    add_to_message("")
     written = [save(result, target)]
     if figure is not None:
         written.append(style.save(reached(result), figure))
@@ -192,8 +189,10 @@ def _import(file: Path) -> None:
         if Path(import_module(file.stem).__file__ or "").resolve() == file.resolve():
             return
         reason = "there is another module of that name"
-    except Exception as error:  # anything that a file of the user's may raise
-        reason = printable(f"{type(error).__name__}: {error}".splitlines()[0])
+    except BaseException as error:  # anything that a file of the user's may raise: a script may end the process
+        if requested():  # Ctrl-C
+            raise
+        reason = printable(f"{type(error).__name__}: {error}".splitlines()[0].removesuffix(": "))
     raise InputError(f"--define must be a Python file that can be imported, got {printable(str(file))} ({reason})")
 
 

@@ -164,7 +164,9 @@ def _section(name: str) -> str:
 
 def _comment(text: str) -> str:
     """Return a text as lines of a comment of C that is open."""
-    safe = " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+    # Characters that are not shown, such as U+202E, could make a comment look like code.
+    shown = "".join(char if char.isprintable() else f"U+{ord(char):04X}" for char in " ".join(text.split()))
+    safe = shown.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
     return "\n * ".join(textwrap.wrap(safe, 112))
 
 

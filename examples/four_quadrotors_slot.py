@@ -1,13 +1,16 @@
-"""Fly a load on four quadrotors through a slot of 1 m; run `python examples/four_quadrotors_slot.py`.
+"""Fly a load on four quadrotors through a slot of 1.8 m; run `python examples/four_quadrotors_slot.py`.
 
-The quadrotors start and end 1.7 m apart, as at home. To pass between the walls they must fly closer together, and
-spread again behind them. The user gives no initial guess: the planner starts with a formation that avoids the walls.
+The quadrotors start and end 1.7 m apart, as at home, and with their rotors they are 2.4 m wide. To pass between the
+walls they must fly closer together, and spread again behind them; no rotor touches a wall or another rotor. The user
+gives no initial guess: the planner starts with a formation that avoids the walls.
 """
 
 from towline import load, plan
 
-HALF_SLOT, HALF_WALL = 0.5, 0.2  # [m]
-KEEP = {"kind": "box", "platform": 0.05, "carriers": 0.1, "cables": 0.05}  # distances from the walls [m]
+HALF_SLOT, HALF_WALL = 0.9, 0.2  # [m]
+robot = load("multi-quadrotor-4")
+RADIUS = robot.carrier_radius.max()  # of a quadrotor with its rotors [m]
+KEEP = {"kind": "box", "platform": 0.05, "carriers": RADIUS + 0.05, "cables": 0.05}  # distances from the walls [m]
 WALLS = [
     {**KEEP, "name": "left wall", "min": [-HALF_WALL, HALF_SLOT, -2], "max": [HALF_WALL, 3, 4]},
     {**KEEP, "name": "right wall", "min": [-HALF_WALL, -3, -2], "max": [HALF_WALL, -HALF_SLOT, 4]},
@@ -15,7 +18,6 @@ WALLS = [
 
 TRAVEL = 2.5  # distance of start and end from the walls [m]
 
-robot = load("multi-quadrotor-4")
 escorts = {}  # the path of each quadrotor, at its home position relative to the load
 for carrier in robot.carriers:
     x, *rest = carrier.home
@@ -29,7 +31,7 @@ result = plan(
         "duration": 7,  # [s]
         "steps": 28,
         "base": {"kind": "free", "around": escorts, "ends": "exact"},  # within the thrust, torque and tilt limits
-        "limits": {"keep_out": WALLS, "carrier_separation": 0.6},  # [m]
+        "limits": {"keep_out": WALLS, "carrier_separation": 2 * RADIUS + 0.05},  # [m]
     },
     progress=lambda iteration, cost, missing: print(f"\r{iteration:4d} iterations", end="", flush=True),
 )

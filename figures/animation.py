@@ -6,7 +6,7 @@ take ten times as long.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs import number
 from . import film, style
+from .cut_cables import drawn_ends
 from .hull import faces
 from .robot import box_edges
 from .tension_colours import mark, place, scale, shades
@@ -22,6 +23,7 @@ from .tension_colours import mark, place, scale, shades
 SIZE = (7.0, 5.2)  # [inches]
 DPI = 100  # an even number of pixels in each direction, which MP4 requires
 MOST_FRAMES = 3000
+TORN = 0.6  # the grey of a cable that has been cut
 SLOWEST, FASTEST = 1e-6, 1e6  # seconds of the motion in one of the film
 
 
@@ -59,12 +61,16 @@ class Scene:
         For each carrier the indices of its cables; three or more anchors are drawn as a body.
     boxes
         Corners (low, high) of reach boxes.
+    rotors
+        Circles in which rotors turn, (k, r, p, 3); default: none.
     obstacles
         For each region to keep out of, the lines that outline it, (n, 3) each.
     tensions
         (k, m) [N], nan where there are none.
     t_min, t_max
         (m,) [N].
+    cut
+        Which cables have been cut, (k, m); None if none are.
     """
 
     title: str
@@ -80,6 +86,8 @@ class Scene:
     tensions: np.ndarray
     t_min: np.ndarray
     t_max: np.ndarray
+    rotors: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2, 3)))
+    cut: np.ndarray | None = None
 
 
 def check_film(path: Path, speed: float, fps: float) -> float:
@@ -144,13 +152,17 @@ class _Stage:
             body.set_points(scene.anchors[k, cables])
         for label, at in zip(self._labels, scene.carriers[k], strict=True):
             label.set_position_3d(at)
-        self._cables.set_segments(np.stack([scene.anchors[k], scene.attachments[k]], axis=1))
+        self._rotors.set_segments(scene.rotors[min(k, len(scene.rotors) - 1)])
+        gone = None if scene.cut is None else scene.cut[k]
+        ends = drawn_ends(scene.anchors[k], scene.attachments[k], gone)
+        self._cables.set_segments(np.stack([scene.anchors[k], ends], axis=1))
         there = np.isfinite(scene.tensions[k]).all()
         tensions = scene.tensions[k] if there else np.full_like(scene.tensions[k], np.nan)
-        self._cables.set_color(shades(place(tensions, scene.t_min, scene.t_max)) / 255.0)
+        colours = shades(place(tensions, scene.t_min, scene.t_max)) / 255.0
+        self._cables.set_color(colours if gone is None else np.where(gone[:, None], TORN, colours))
         self._cables.set_linestyle("-" if there else "--")
         self._clock.set_text(f"t = {self._when.times[k]:.2f} s" + ("" if there else "\nno tensions\ninside the limits"))
-        for artist in (self._trail, *self._shapes(), self._cables, *self._labels):
+        for artist in (self._trail, *self._shapes(), self._rotors, self._cables, *self._labels):
             if hasattr(artist, "do_3d_projection"):
                 artist.do_3d_projection()
             self._axes.draw_artist(artist)
@@ -180,7 +192,7 @@ class _Stage:
             reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
             named.append(ax.add_collection3d(reach))
         corners = [corner for box in scene.boxes for corner in box]
-        shown = (scene.anchors, scene.attachments, scene.path, scene.carriers, np.array(corners))
+        shown = (scene.anchors, scene.attachments, scene.path, scene.carriers, scene.rotors, np.array(corners))
         style.equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]), zoom=1.0)
         outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
         if outlines:
@@ -199,6 +211,8 @@ class _Stage:
         (self._trail,) = ax.plot(*scene.path[:1].T, color=style.colour(0), linewidth=1.8, animated=True)
         self._platform = _Body(ax, scene.attachments[0], style.colour(4), style.colour(0))
         self._bodies = [_Body(ax, scene.anchors[0, cables], "#dddddd", "#000000") for cables in scene.bodies]
+        circles = Line3DCollection(scene.rotors[0], colors="#000000", linewidths=0.8, animated=True)
+        self._rotors: Any = ax.add_collection3d(circles, autolim=False)
         segments = np.stack([scene.anchors[0], scene.attachments[0]], axis=1)
         self._cables: Any = ax.add_collection3d(Line3DCollection(segments, linewidths=2.2, animated=True))
         self._labels = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +22,7 @@ HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
 SCALES = ((1.0, "m"), (1e-4, "mm"), (1e-7, "µm"))  # the least lengths for which units are used
+EVENT_DASHES = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5))]
 THRUST = "thrust"  # an actuator of carriers that fly
 UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}
 
@@ -43,7 +46,8 @@ def flight(trajectory: xr.Dataset) -> Figure:
         draw(ax, trajectory)
         ax.set_xlim(time[0], _end(time))
     canvas.align_ylabels(panels[:-1])
-    style.legend_below(canvas, panels[0])  # of a tolerance outside the plot
+    _mark_events(panels, trajectory)
+    style.legend_below(canvas, panels[0])  # of a tolerance outside the plot, and of events
     return canvas
 
 
@@ -53,16 +57,17 @@ def tensions(trajectory: xr.Dataset) -> Figure:
     ax = style.axes(canvas, "time [s]", "tension [N]")
     time, real, commanded = (trajectory[name].values for name in ("time", "tensions", "tensions_commanded"))
     t_min, t_max = trajectory["t_min"].values, trajectory["t_max"].values
+    gone = trajectory["cut"].values > 0 if "cut" in trajectory else np.zeros(real.shape, dtype=bool)
     low, high = float(np.nanmin([real, commanded])), float(np.nanmax([real, commanded]))
-    differs = np.abs(real - commanded) > DIFFERENCE * max(high - low, 1e-9)
+    differs = (np.abs(real - commanded) > DIFFERENCE * max(high - low, 1e-9)) & ~gone
     for index in range(real.shape[1]):
-        ax.plot(time, real[:, index], **style.look(index))
+        ax.plot(time, np.where(gone[:, index], np.nan, real[:, index]), **style.look(index))
         commands = np.where(differs[:, index], commanded[:, index], np.nan)
         ax.plot(time, commands, color=style.colour(index), linewidth=0.6)
     ax.plot([], [], color="#444444", linewidth=1.5, label="real" if differs.any() else "real, and as commanded")
     if differs.any():
         ax.plot([], [], color="#444444", linewidth=0.6, label="commanded, where it differs")
-    slack = (real <= 0) & (t_min > 0)
+    slack = (real <= 0) & (t_min > 0) & ~gone
     if slack.any():
         for start, stop in _spans(time, np.asarray(slack.any(axis=1))):
             ax.axvspan(start, stop, color=GREY, linewidth=1.0, zorder=0)
@@ -79,7 +84,9 @@ def tensions(trajectory: xr.Dataset) -> Figure:
     if far := [f"{name} = {limit:g} N" for name, limit in limits if (name, limit) not in near]:
         style.far_limit(ax, f"{', '.join(far)}, outside the plot")
     ax.set_xlim(time[0], _end(time))
-    _name_at_the_end(ax, real[-1], [str(cable) for cable in trajectory["cable"].values])
+    left = ~gone[-1]
+    _name_at_the_end(ax, real[-1, left], [str(cable) for cable in trajectory["cable"].values[left]])
+    _mark_events([ax], trajectory)
     style.legend_below(canvas, ax)
     return canvas
 
@@ -103,6 +110,17 @@ def errors(flights: xr.Dataset) -> Figure:
     ax.set_xlim(0, 100)
     style.legend_below(canvas, ax)
     return canvas
+
+
+def _mark_events(panels: list[Axes], trajectory: xr.Dataset) -> None:
+    """Draw a line at each event of the flight through all panels, and name it in the legend."""
+    happened = json.loads(trajectory.attrs.get("report", "{}")).get("events", [])
+    for event, dashes in zip(happened, itertools.cycle(EVENT_DASHES), strict=False):
+        for ax in panels:
+            ax.axvline(event["at_s"], color="#000000", linewidth=0.8, linestyle=dashes, zorder=1)
+        panels[0].plot(
+            [], [], color="#000000", linewidth=0.8, linestyle=dashes, label=f"{event['at_s']:.4g} s: {event['what']}"
+        )
 
 
 def _draw_error(ax: Axes, trajectory: xr.Dataset) -> None:

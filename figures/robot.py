@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,8 @@ class RobotSketch:
         (c, 3) origins of the carriers' frames, and their names.
     boxes
         Corners (low, high) of reach boxes.
+    rotors
+        Circles in which rotors turn, (r, p, 3); default: none.
     tensions
         (m,) [N], or None for grey cables.
     t_min, t_max
@@ -49,6 +51,7 @@ class RobotSketch:
     t_max: np.ndarray
     positions: np.ndarray
     feasible: np.ndarray
+    rotors: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 
 def draw(sketch: RobotSketch) -> Figure:
@@ -69,9 +72,13 @@ def draw(sketch: RobotSketch) -> Figure:
     for low, high in sketch.boxes:
         for edge in box_edges(low, high):
             ax.plot(*edge.T, color=style.colour(3), linewidth=0.7)
+    for circle in sketch.rotors:
+        ax.plot(*circle.T, color="#000000", linewidth=0.7)
     for position, name in zip(sketch.carriers, sketch.names, strict=True):
         ax.text(*position, name, fontsize=style.NOTE)
-    style.equal_scales(ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers]))
+    style.equal_scales(
+        ax, np.vstack([sketch.anchors, sketch.attachments, sketch.com[None], sketch.carriers, *sketch.rotors])
+    )
     ax.set_title(sketch.title, fontsize=style.TEXT)
     style.legend_below(canvas, ax)
     if tensions is not None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from .animation import Scene
 
+SWEPT = 15  # instants at which rotors are drawn
 NEAR = 0.3  # of the robot's extent
 FORBIDDEN = {"facecolor": "#e8e8e8", "edgecolor": "#666666", "hatch": "////", "linewidth": 0.8}
 REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewidth": 0.8}
@@ -26,7 +27,7 @@ def views(scene: Scene) -> Figure:
     robot = np.vstack(
         [
             np.reshape(part, (-1, 3))
-            for part in (scene.anchors, scene.attachments, scene.path, scene.carriers, *scene.boxes)
+            for part in (scene.anchors, scene.attachments, scene.path, scene.carriers, scene.rotors, *scene.boxes)
         ]
     )
     near = NEAR * np.ptp(robot, axis=0).max()  # only this part of walls much larger than the robot is drawn
@@ -56,6 +57,7 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
         for index, cables in enumerate(scene.bodies):
             _body(ax, scene.anchors[k, cables][:, axes], shade, style.colour(index + 1))
             ax.plot(*scene.carriers[k, index, axes], "s", color=style.colour(index + 1), markersize=3)
+    _rotors(ax, scene.rotors[..., axes])
     fixed = np.setdiff1d(np.arange(scene.anchors.shape[1]), np.concatenate([[], *scene.bodies]))
     if len(fixed):
         ax.plot(*scene.anchors[0, fixed][:, axes].T, "^", color="#000000", markersize=3, label="anchors on the ground")
@@ -67,6 +69,16 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
             ax.plot(*curve.T, **look, label=name)
     ax.plot(*scene.path[:, axes].T, **style.look(0), label="platform")
     ax.plot(*scene.path[0, axes], "o", color=style.colour(0), markersize=4, label="start")
+
+
+def _rotors(ax: Axes, circles: np.ndarray) -> None:
+    """Draw the circles of rotors (k, r, p, 2) at some instants, so that what they sweep shows."""
+    from matplotlib.collections import LineCollection
+
+    shown = circles[np.unique(np.linspace(0, len(circles) - 1, SWEPT).round().astype(int))]
+    if shown.shape[1]:
+        lines = list(shown.reshape(-1, *shown.shape[2:]))
+        ax.add_collection(LineCollection(lines, colors="#999999", linewidths=0.4, label="rotors"))
 
 
 def _body(ax: Axes, corners: np.ndarray, inside: str, edge: str) -> None:

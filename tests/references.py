@@ -13,14 +13,17 @@ def row_scale(n, length):
     return [1.0 / length if n == 6 and row >= 3 else 1.0 for row in range(n)]
 
 
-def support_value(A, direction, t_min, t_max, negligible=1e-10):
-    """Return the most that tensions inside the limits can give along a direction, cable by cable."""
-    largest = max(np.linalg.norm(A[:, i]) for i in range(A.shape[1]))
+def support_value(A, direction, t_min, t_max):
+    """Return the most that tensions inside the limits can give along a direction, cable by cable.
+
+    A cable without a limit gives nothing only if its pull is no more than the rounding of its own column.
+    """
     total = 0.0
     for i in range(A.shape[1]):
         pull = sum(direction[row] * A[row, i] for row in range(A.shape[0]))
-        if abs(pull) > negligible * largest * np.linalg.norm(direction):
-            total += max(pull * t_min[i], pull * t_max[i])
+        limit = t_max[i] if pull > 0 else t_min[i]
+        if np.isfinite(limit) or abs(pull) > 1e-12 * np.linalg.norm(A[:, i]) * np.linalg.norm(direction):
+            total += pull * limit
     return total
 
 

@@ -60,6 +60,10 @@ def test_the_example_runs_and_resumes(folder):
         ("json.py", "x = 1", "another module of that name"),
         ("broken.py", "x =", "SyntaxError"),
         ("raising.py", "raise OSError('disk\\nand more')", "OSError: disk"),
+        ("script.py", "import sys; sys.exit(0)", "(SystemExit: 0)"),
+        ("farewell.py", "import sys; sys.exit('bye')", "(SystemExit: bye)"),
+        ("interrupt.py", "raise KeyboardInterrupt", "(KeyboardInterrupt)"),
+        ("generator.py", "raise GeneratorExit", "(GeneratorExit)"),
     ],
 )
 def test_a_file_that_cannot_be_imported_is_one_line(tmp_path, file, text, message):
@@ -69,6 +73,17 @@ def test_a_file_that_cannot_be_imported_is_one_line(tmp_path, file, text, messag
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"towline: --define must be a Python file that can be imported, got {file} (")
     assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_condition_that_ends_the_process_is_no_yes(tmp_path):
+    text = "from typing import Literal\n\nfrom towline.workspace import Condition\n\n\nclass Ending(Condition):\n"
+    text += "    kind: Literal['ending'] = 'ending'\n\n"
+    text += "    def evaluate(self, dynamics, places):\n        raise SystemExit(0)\n"
+    (tmp_path / "ending.py").write_text(text)
+    done = towline("workspace", "cogiro", "--define", "ending.py", "--condition", "ending", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (3, ""), done.stderr
+    assert done.stderr.startswith("towline: an error in towline itself: SystemExit: 0 (")
     assert done.stderr.count("\n") == 1
 
 

@@ -93,7 +93,7 @@ def states(name, count, seed=0):
 
 def check_certificate(problem, direction, support, shortfall):
     """Check a certificate from the definition: along the direction no tensions inside the limits reach w."""
-    reach = support_value(problem.A, direction, problem.t_min, problem.t_max, negligible=1e-11)
+    reach = support_value(problem.A, direction, problem.t_min, problem.t_max)
     size = 1e-9 * (np.linalg.norm(problem.scaled_w) + abs(reach))
     assert direction @ problem.w > reach
     assert support == pytest.approx(reach, abs=size)
@@ -342,7 +342,7 @@ def test_rows_of_a_batch(solve_packed, n, m, rho):
             assert ((t >= problem.t_min) & (t <= problem.t_max)).all()
         if not np.isnan(answer.shortfall[row]):
             d = answer.d[row]
-            reach = support_value(problem.A, d, problem.t_min, problem.t_max, negligible=1e-11)
+            reach = support_value(problem.A, d, problem.t_min, problem.t_max)
             assert 0.0 < answer.shortfall[row] <= (d @ problem.w - reach) * (1.0 + 1e-6)
 
 

@@ -49,9 +49,14 @@ def test_a_robot_with_any_source_compiles(tmp_path):
     """Its text cannot end the comment in which it stands."""
     required("cc")
     robot = load("planar-4").model_copy(
-        update={"source": "*/ int x; /* ??/ \\\n \\ \N{GREEK SMALL LETTER ALPHA} @name@"}
+        update={
+            "source": "*/ int x; /* ??/ \\\n \\ \N{GREEK SMALL LETTER ALPHA} @name@ \u202e\u2066 \x1b[31m \x00 \u200b"
+        }
     )
     folder = towline.export_step(robot, tmp_path / "step")
+    texts = [(folder / name).read_text(encoding="utf-8") for name in ("towline_step.c", "towline_step.h", "README.md")]
+    assert all(char.isprintable() or char in "\n\t" for text in texts for char in text)
+    assert any("U+202EU+2066 U+001B[31m U+0000" in " ".join(text.split()) for text in texts)
     subprocess.run(["cc", *FLAGS, "-fsyntax-only", folder / "towline_step.c"], check=True)
 
 

@@ -412,10 +412,10 @@ def test_a_single_estimate_takes_microseconds():
     robot = load("cogiro")
     lengths, start = dynamics_of(robot).cable_lengths(robot.home), robot.home + 1e-3
     pose_from_lengths(robot, lengths, start)
-    begin = time.perf_counter()
+    begin = time.process_time()
     for _ in range(200):
         pose_from_lengths(robot, lengths, start)
-    assert time.perf_counter() - begin < 0.2
+    assert time.process_time() - begin < 0.2
 
 
 @pytest.mark.parametrize(
@@ -510,3 +510,23 @@ def test_noise_costs_few_steps(name, most):
     machine.load()(problem.geometry.ravel(), 0, lengths.ravel(), weights, problem.radii, *how, *arrays)
     assert info[:, 0].all()
     assert info[:, 1].mean() < most
+
+
+def test_a_pose_that_cannot_be_held_is_another_one_all_the_same():
+    """The CoM of the file may be wrong: a pose with the same lengths is named, though cables cannot hold it."""
+    robot = load("nist-robocrane")
+    poses, met = poses_of_workspace(robot, 40, seed=3), 0
+    estimate = pose_from_lengths(robot, dynamics_of(robot).cable_lengths(poses))
+    for pose, lengths, ambiguous in zip(
+        estimate.pose, dynamics_of(robot).cable_lengths(poses), estimate.ambiguous, strict=True
+    ):
+        others = [
+            one for one in branches(robot, lengths) if np.abs(one.pose[:3] - pose[:3]).max() > 0.02 * robot.length
+        ]
+        loose = [one for one in others if not one.taut]
+        # Those near home are met without a doubt.
+        if others == loose and any(np.abs(one.pose[3:]).max() < 0.6 for one in loose):
+            np.testing.assert_allclose(dynamics_of(robot).cable_lengths(loose[0].pose), lengths, atol=1e-8)
+            assert ambiguous
+            met += 1
+    assert met >= 3

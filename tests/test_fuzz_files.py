@@ -238,14 +238,14 @@ def mutate_xml(rng, data):
 
 def outcome(read, data):
     """What became of the file: the robot, or the line. Anything else fails, and says for which file."""
-    start = time.perf_counter()
+    start = time.process_time()
     try:
         result = read()
     except InputError as error:
         result = str(error)
     except Exception as error:
         pytest.fail(f"{error!r} for {data!r}")
-    assert time.perf_counter() - start < 10, data
+    assert time.process_time() - start < 10, data
     return result
 
 

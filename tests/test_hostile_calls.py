@@ -26,6 +26,7 @@ from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.inputs import printable
 from towline.models import RelativeDynamics
 from towline.models.uncertainty import Uncertainty
+from towline.robust import Spread
 from towline.solvers import Horizon, StageProblem, solve_horizon
 from towline.workspace import Places, Region, StaticEquilibrium, sample
 
@@ -39,6 +40,7 @@ PACKAGES = (
     "towline.control",
     "towline.simulation",
     "towline.viewer",
+    "towline.robust",
 )
 EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long
@@ -63,6 +65,7 @@ NOT_CALLED = {
     "solvers.Margin",
     "Plan",
     "PoseEstimate",
+    "RobotShare",
     "Flight",
     "Calibration",
     "Compared",
@@ -269,6 +272,15 @@ VALID: dict[str, Callable[[], Any]] = {
     "folder": lambda: "folder",
     "format": lambda: "png",
     "precision": lambda: "double",
+    "uncertainty": lambda: robot().uncertainty,
+    "share": lambda: 0.95,
+    "changes": lambda: np.ones((3, 6, 2)),
+    "wrench": lambda: np.ones((1, 6)),
+    **{f"{name}.pose": lambda: robot().home[None] for name in ("spread", "Spread", "share_of_robots")},
+    **{f"{name}.carrier_pose": lambda: np.zeros((1, 1, 6)) for name in ("spread", "Spread", "share_of_robots")},
+    **{f"{name}.tensions": lambda: np.ones((1, 6)) for name in ("spread", "Spread.changes", "Spread.sigmas")},
+    "Spread.rows": lambda: np.arange(6),
+    "Spread.only.rows": lambda: np.zeros(1, dtype=int),
     "speed": lambda: 1.0,
     "fps": lambda: 5.0,
     "condition": StaticEquilibrium,
@@ -308,6 +320,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "damping": lambda: 1.0,
     "integral": lambda: 0.0,
     "observer": lambda: 10.0,
+    "tension_loop": lambda: 20.0,
+    "tension_lag": lambda: 0.02,
     "rate": lambda: None,
     "reach": lambda: (0.1, 0.1),
     "carrier_bandwidth": lambda: 5.0,
@@ -381,6 +395,7 @@ ALSO = {
     "data": ("condition",),
     "read.target": ("robot",),
     "read.other": ("robot",),
+    "check_share.share": ("robust",),
     "load.name": ("robot",),
     "read_measurements.path": ("log",),
     "nonsense": ("options",),
@@ -431,6 +446,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Measurements": measurements,
     "Calibration": a_calibration,
     "Robot": robot,
+    "Spread": lambda: Spread(robot(), robot().home[None], np.zeros((1, 1, 6))),
     "Task": lambda: towline.read_task(TASK),
     "Region": Region,
 }

@@ -9,9 +9,10 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from towline import InputError, load, plan, read_measurements, simulate
+from towline import InputError, Task, load, plan, read_measurements, simulate
 from towline.cli.main import app
-from towline.models.parsing import _without_branches
+from towline.models.parsing import _without_branches, parse_yaml
+from towline.models.uncertainty import Uncertainty
 from towline.viewer import read
 from towline.workspace import Lengths
 
@@ -104,6 +105,22 @@ def test_many_wrong_items_take_time_in_proportion():
 
     least = [min(took(count) for _ in range(3)) for count in (5000, 40_000)]
     assert least[1] < 24 * least[0]  # 8 in proportion, 64 if each copies the rest
+
+
+@pytest.mark.parametrize("item", ["x", "{a: 1}"])
+def test_a_yaml_file_of_many_items_is_refused_before_the_rest_is_read(item):
+    """Half a million took half a minute: each becomes several objects of the YAML reader, then an error of its own."""
+    text = f"name: many\npath:\n  points: [{', '.join([item] * 100_000)}}}"  # what ends it is never reached
+    with pytest.raises(InputError, match=r"^many\.yaml: is not YAML \(has more than 30000 values and keys, line 3\)"):
+        parse_yaml(text, Task, "many.yaml")
+
+
+def test_a_robot_of_24_cables_is_read_with_all_its_covariance(tmp_path):
+    robot = load("wang-flying")
+    parameters = [f"cables[{i}].{end}.{axis}" for i in range(24) for end in ("anchor", "attachment") for axis in "xyz"]
+    uncertainty = Uncertainty(parameters=parameters, covariance=(1e-6 * np.eye(144)).tolist())
+    large = robot.model_copy(update={"cables": 4 * robot.cables, "uncertainty": uncertainty})
+    assert np.array_equal(load(large.save(tmp_path / "large.yaml")).uncertainty.covariance, uncertainty.covariance)
 
 
 @pytest.mark.parametrize(

@@ -22,12 +22,16 @@ FLOORS = [
 COMMON = {
     *(
         "checkpoint",
+        "declared",
+        "display",
         "errors",
         "execution",
         "inputs",
         "kernel",
         "netcdf",
         "processors",
+        "quiet",
+        "reading",
         "simd",
         "simd_llvm",
         "text",

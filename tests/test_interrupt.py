@@ -1,7 +1,8 @@
-"""Ctrl-C as a user sends it: a real signal from outside, to Python's `plan` and to the command, at any moment."""
+"""Ctrl-C and SIGTERM as they are sent: real signals from outside to Python's `plan` and to the command."""
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from towline.ocp.nlp.interrupts import heeding
 from towline.ocp.nlp.waiting import wait_for
 
 TOWLINE = Path(sys.executable).with_name("towline")
-PROMPT = 1.0  # [s]
+PROMPT = 3.0  # [s]; where nothing else runs, a third of it, but these tests share their cores
 TASK = """\
 name: fast
 path: {kind: line, start: [0, 0, 0], end: [2, 0, 0]}
@@ -210,6 +211,114 @@ def test_an_interrupt_after_the_end_of_a_command_is_ignored(tmp_path):
     process = start([sys.executable, "-c", code], tmp_path)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (0, "False\n", "")
+
+
+STOP = {signal.SIGINT: 130, signal.SIGTERM: 143}
+SWEEP = ["plan", "wang-flying", "circle.yaml", "--vary", "robot.platform.mass=0.5:3:0.01", "--workers", "2"]
+CIRCLE = """\
+name: circle
+path: {kind: circle, centre: [0, 0, -1], radius: 0.5, rate: 3}
+base: {kind: free, acceleration_max: 3, ends: periodic}
+"""
+
+
+def processes_of(session):
+    """Return the ids of the living processes of a session, where the system has /proc."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = entry.read_text().rpartition(")")[2].split()
+            if int(fields[3]) == session and fields[0] != "Z":
+                found.append(int(entry.parent.name))
+    return found
+
+
+@pytest.mark.parametrize(("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False), (signal.SIGTERM, True)])
+def test_a_signal_ends_a_command_and_its_workers(number, to_all, tmp_path):
+    """A terminal, Slurm and systemd send it to the workers too, a container to the command alone."""
+    (tmp_path / "circle.yaml").write_text(CIRCLE)
+    command = [TOWLINE, *SWEEP, "--checkpoint", "c"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=tmp_path, preexec_fn=heed_interrupts, start_new_session=True, **pipes)
+    sizes = set()
+    while len(sizes) < 2:  # until the first plan is stored
+        time.sleep(0.05)
+        assert process.poll() is None, process.stderr.read()
+        sizes |= {(tmp_path / "c").stat().st_size} if (tmp_path / "c").exists() else set()
+    sent = time.perf_counter()
+    (os.killpg if to_all else os.kill)(process.pid, number)
+    out, err = process.communicate(timeout=60)
+    assert time.perf_counter() - sent < 2 * PROMPT  # the pipes end when the last process has
+    assert (process.returncode, out) == (STOP[number], "")
+    assert re.fullmatch(
+        r"towline: stopped after \d+ of 251 plans; to continue, repeat the command with --resume c\n", err
+    ), err
+    assert sorted(os.listdir(tmp_path)) == ["c", "circle.yaml"]
+    if Path("/proc/self").exists():
+        while processes_of(process.pid) and time.perf_counter() - sent < 5:
+            time.sleep(0.05)
+        assert not processes_of(process.pid)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="the moment is found in /proc")
+@pytest.mark.parametrize("running", [2, 4, 6])
+def test_a_signal_while_workers_start_is_one_line(running, tmp_path):
+    """A worker that has no work yet must not end in a traceback of its own."""
+    command = [TOWLINE, "workspace", "wang-flying", "--samples", "2e7", "--workers", "6", "--checkpoint", "c"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=tmp_path, start_new_session=True, **pipes)
+    while len(processes_of(process.pid)) < running:
+        assert process.poll() is None, process.stderr.read()
+    process.terminate()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err.count("\n")) == (143, "", 1), err
+    assert err.startswith("towline: stopped; to continue, repeat the command with --resume c") or running == 2
+
+
+def test_sigterm_leaves_nothing_half_written(tmp_path):
+    code = (
+        "import time, pathlib\n"
+        "from towline.cli import stopping\n"
+        "from towline.writing import whole_file\n"
+        "stopping.listen()\n"
+        "with whole_file(pathlib.Path('new/half')) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    print('ready', flush=True)\n"
+        "    while True:\n"
+        "        try:\n"
+        "            time.sleep(60)\n"
+        "        except KeyboardInterrupt:\n"
+        "            pass\n"
+    )
+    process = start([sys.executable, "-c", code], tmp_path)
+    assert process.stdout.readline() == "ready\n"
+    process.terminate()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (143, "", "towline: stopped\n")
+    assert not os.listdir(tmp_path)
+
+
+@pytest.mark.parametrize("number", STOP, ids=lambda number: signal.Signals(number).name)
+def test_a_signal_that_whoever_started_the_command_ignores_is_ignored(number, tmp_path):
+    """As a script's `&` does with SIGINT: the Ctrl-C is meant for the command in the foreground."""
+    (tmp_path / "rest.yaml").write_text("name: rest\npath: {kind: rest, pose: [0, 0, -1]}\nduration: 0.3\n")
+    command = [TOWLINE, "plan", "wang-flying", "rest.yaml"]
+    process = subprocess.Popen(command, cwd=tmp_path, preexec_fn=lambda: signal.signal(number, signal.SIG_IGN))
+    while process.poll() is None:
+        process.send_signal(number)
+        time.sleep(0.02)
+    assert process.returncode == 0
+    assert (tmp_path / "wang-flying-rest.nc").exists()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_a_signal_ends_the_viewer(number, code, tmp_path):
+    """Ctrl-C is how a user ends it, so that the answer is yes."""
+    process = start([TOWLINE, "view", "wang-flying", "--port", "0"], tmp_path)
+    assert any("http://" in line for line in iter(process.stdout.readline, ""))
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (code, "\n" if code == 0 else "towline: stopped\n")
 
 
 KEPT = """\

@@ -17,7 +17,7 @@ from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load
 from towline.studies.accounts import text
 from towline.studies.accounts.account import Chapter, Paper, gather
-from towline.studies.accounts.claim import Verdict, compared, stated, undetermined, value_text
+from towline.studies.accounts.claim import Verdict, compared, repaired, stated, undetermined, value_text
 from towline.studies.accounts.files import write
 from towline.studies.flying import (
     balance,
@@ -32,6 +32,7 @@ from towline.studies.flying import (
     plans,
     procedure,
     radius,
+    references,
     rotations,
     structure,
     study,
@@ -50,6 +51,7 @@ CHEAP = [
     cable,
     element,
     balance,
+    references,
     procedure,
     wind,
     helix,
@@ -83,6 +85,10 @@ def test_a_verdict_follows_from_the_numbers():
     assert compared("a", "Eq. 1", "x", 1.0, float("nan"), within=0.1, **words).verdict is Verdict.DIFFERS
     never = stated("b", "Eq. 2", "x", None, "y", holds=False, otherwise=Verdict.IMPOSSIBLE, **words)
     assert never.verdict is Verdict.IMPOSSIBLE
+    reasons = {"works": "yes", "fails": "no"}
+    possible, not_found = (repaired("c", "VI", "x", 1.0, holds=holds, **reasons) for holds in (True, False))
+    assert (possible.verdict, possible.why, possible.printed) == (Verdict.REPAIRED, "yes", None)
+    assert (not_found.verdict, not_found.why) == (Verdict.NOT_DETERMINED, "no")
     assert value_text((1.0, 2.5), "m") == "(1, 2.5) m"
     assert value_text(-0.0, "N") == "0 N"
 
@@ -123,6 +129,16 @@ def test_an_account_is_written_from_the_same_claims(tmp_path):
     assert [claim["verdict"] for claim in json.loads(data)["claims"]] == ["reproduced", "not determined"]
 
 
+def test_a_repair_is_no_claim_of_the_paper(tmp_path):
+    other = repaired("other", "VI", "Not in the paper: x.", 1.0, holds=True, works="It works.", fails="no")
+    account = example("small", Two=lambda: Chapter([other]))
+    assert account.summary() == ("2 claims: 1 reproduced, 1 not determined; 1 repaired, which are not in the paper")
+    errata = text.errata(account)
+    assert "| other |" in errata.split("## What is possible instead")[1]
+    assert "the paper states" not in errata.split("## What is possible instead")[1]
+    assert "| by the paper |" in text.report(account)
+
+
 def test_a_chapter_that_breaks_is_reported_and_stops_no_other():
     def breaks():
         raise SolverError("the solver fell over")
@@ -155,11 +171,12 @@ def test_known_errata_have_their_verdicts(claims):
     """Each row of the list of paper F's errors has its verdict, and so has what holds."""
     expected = {
         Verdict.DIFFERS: "eq-1 eq-2-height eq-15 eq-16 eq-22 eq-25-drag eq-26-frame eq-26-wind eq-31-32 eq-36-alpha "
-        "eq-37-J step-7 step-8 table-1-gyration eq-5 eq-17 eq-21 eq-12-13-sign eq-15-sign eq-14-size eq-18-size "
-        "eq-20-size eq-21-size fig-3 eq-24 eq-33 eq-34 eq-34-dT section-V-references fig-7-tensions",
+        "eq-37-J step-7 step-8 table-1-gyration eq-5 eq-8 eq-17 eq-21 eq-12-13-sign eq-15-sign eq-14-size eq-20-size "
+        "eq-21-size fig-3 eq-26 eq-33 eq-33-right eq-34 eq-34-dT section-V-references section-II-IV-references "
+        "section-VI-references frames eq-3-alpha eq-9-small eq-23-cables eq-32-frame fig-7-tensions",
         Verdict.IMPOSSIBLE: "pairing step-7-inverse fig-7-positive",
         Verdict.REPRODUCED: "table-1-geometry table-1-cable table-1-mass table-1-air table-1-rigid eq-9 eq-19 eq-27-28 "
-        "eq-30 eq-26 eq-36 eq-38 fig-6 VI.A-flight conclusion-mobility fig-1 fig-2 eq-3 eq-8 eq-20 eq-29",
+        "eq-30 eq-24 eq-36 eq-38 fig-6 VI.A-flight conclusion-mobility fig-1 fig-2 eq-3 eq-18-size eq-20 eq-29",
         Verdict.NOT_DETERMINED: "step-1 step-2 step-3 step-4 step-5 step-6 fig-5-peak fig-5-noise fig-5-shape "
         "eq-25-lift fig-7-lengths fig-12-13 fig-15",
     }
@@ -195,8 +212,8 @@ def test_other_printed_values_change_the_verdict(monkeypatch):
     # Beyond 0.234 m crossed pairs fail, but only from 0.8 m on does the bound exclude every pairing.
     monkeypatch.setattr(helix, "RADIUS", 0.3)
     assert verdict(helix, "fig-7-positive") is Verdict.NOT_DETERMINED
-    monkeypatch.setattr(procedure, "TAGS", tuple(range(1, 40)))
-    assert verdict(procedure, "section-V-references") is Verdict.REPRODUCED
+    monkeypatch.setattr(references, "TAGS", tuple(range(1, 40)))
+    assert verdict(references, "section-V-references") is Verdict.REPRODUCED
 
 
 def test_rates_and_accelerations_by_differences():
@@ -282,11 +299,18 @@ def test_the_command_reproduces_the_paper(tmp_path):
     assert not unnamed("flying", [claim["place"] for claim in printed["claims"]])
     by_name = {claim["id"]: claim for claim in printed["claims"]}
     assert by_name["circle"]["verdict"] == "impossible"
-    assert by_name["circle-repair"]["verdict"] == "reproduced"
-    assert by_name["helix-repair"]["verdict"] == "reproduced"
+    places = {by_name[name]["place"] for name in ("VI.A-flown", "VI.B-flown", "circle-repair", "helix-repair")}
+    assert places <= {"VI.A", "VI.B", "VI.A, figure 6", "VI.B, figure 8"}
+    for name in ("circle-repair", "helix-repair", "VI.A-flown", "VI.B-flown", "flown-positive"):
+        assert by_name[name]["verdict"] == "repaired"
+        assert by_name[name]["statement"].startswith("Not in the paper: ")
+        assert by_name[name]["printed"] is None
+    assert {"circle", "radius", "circle-any-pairing"} <= {
+        name for name, claim in by_name.items() if claim["verdict"] == "impossible"
+    }
     assert by_name["fig-11"]["verdict"] == "not determined"
-    assert by_name["VI.A-flown"]["verdict"] == by_name["VI.B-flown"]["verdict"] == "reproduced"
-    assert by_name["flown-positive"]["verdict"] == by_name["eq-6-flown"]["verdict"] == "reproduced"
+    assert by_name["eq-6-flown"]["verdict"] == "reproduced"
+    assert by_name["conclusion-stability"]["verdict"] == by_name["VI.C-flown"]["verdict"] == "not determined"
     assert by_name["fig-10-tension"]["verdict"] == "differs"
     assert all(Path(file).stat().st_size > 0 for file in printed["files"])
     drawn = {Path(file).stem for file in printed["files"] if file.endswith(".png")}

@@ -95,6 +95,7 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     assert len(robots) > 20
     step = {name for name in tracked if name.startswith("embedded/template/")} | {
         "benchmarks/step_rows.c",
+        "benchmarks/step_distribution.c",
         "benchmarks/step_osqp.c",
     }
     data = {f"towline/{name}" for name in robots | step | {"py.typed", "ocp/tasks/task.schema.json"}}

@@ -26,11 +26,10 @@ def mixture(count, m):
 
 
 def test_a_thousand_awkward_problems_are_right():
-    report = check(range(1000))
+    report = check(range(1000), "random")
     print(report.line())
-    assert set(report.statuses) == {"optimal", "infeasible", "singular"}
-    assert report.disagreements == []
-    assert report.worst < 1e-8
+    assert report.statuses == {"optimal", "infeasible", "singular"}
+    assert report.wrong == []
 
 
 # Problems once called optimal that were not, or whose optimum was not proven: a limit that rounding decides, weights
@@ -44,9 +43,9 @@ ONCE_WRONG = (
 
 @pytest.mark.parametrize("seed", ONCE_WRONG)
 def test_optimal_is_what_multipliers_prove(seed):
-    report = check(range(seed, seed + 1))
-    assert report.disagreements == []
-    assert set(report.statuses) == {"optimal"}
+    report = check(range(seed, seed + 1), "random")
+    assert report.wrong == []
+    assert report.statuses == {"optimal"}
 
 
 @pytest.mark.parametrize("seed", range(150))
@@ -276,7 +275,7 @@ def test_the_core_answers_as_the_lanes_do(rho, accuracy):
         for row in np.flatnonzero(np.isfinite(core.shortfall)):
             A, w, low, high, *_ = (array[row] for array in arrays)
             d = core.direction[row]
-            reach = support_value(A, d, low, high, negligible=1e-11)
+            reach = support_value(A, d, low, high)
             assert 0.0 < core.shortfall[row] <= (d @ w - reach) * (1.0 + 1e-6) + 1e-9 * abs(reach)
         rows += len(core.code)
         proven += np.isfinite(core.shortfall).sum()

@@ -112,9 +112,9 @@ def optimum_is_missed_by(problem, method, t):
 def test_answers_are_right_and_refusals_are_told(method):
     times, refused = [], 0
     for problem in PROBLEMS:
-        start = time.perf_counter()
+        start = time.process_time()
         solution = solve(problem, method)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
         if not solution.feasible:
             refused += 1
             assert solution.status == "failed"

@@ -428,7 +428,7 @@ def test_killed_interrupted_and_resumed_is_the_same_table(folder):
     sent = time.monotonic()
     second.send_signal(signal.SIGINT)
     out, err = second.communicate(timeout=60)
-    assert time.monotonic() - sent < 1
+    assert time.monotonic() - sent < 3  # a third of it where nothing else runs
     assert (second.returncode, out) == (130, "")
     assert err.startswith("towline: stopped after ")
     assert err.endswith(" of 12 plans; to continue, repeat the command with --resume run.chk\n")

@@ -4,13 +4,17 @@ import ast
 import json
 import re
 import socket
+import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import msgspec
 import numpy as np
 import pytest
+import viser
 import xarray as xr
 from scipy.spatial.transform import Rotation
 from websockets.datastructures import Headers
@@ -29,6 +33,7 @@ from towline.viewer.sliders import sliders
 from towline.viewer.words import readout
 from towline.workspace import StaticEquilibrium, sample, save
 
+from .viewer_wire import Wire
 from .warm import towline
 
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}
@@ -445,3 +450,32 @@ def test_viser_is_imported_in_one_place_and_when_it_is_used():
     assert importing == ["server.py"]
     code = "import sys, towline.viewer; print('viser' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+@pytest.mark.filterwarnings("ignore:.*does not match annotation")  # of viser, for a message that is none
+def test_connections_that_break_off_and_messages_that_are_none_make_no_noise(capfd):
+    with serve(read("planar-4"), port=0) as url:
+        host, port = url.removeprefix("http://").split(":")
+        opening = f"GET / HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: {url}\r\nUpgrade: websocket\r\n"
+        opening += "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+        opening += f"Sec-WebSocket-Protocol: viser-v{viser.__version__}\r\n\r\n"
+        for content in (b"", b"GET /", b"x" * 100_000, opening.encode(), opening.encode() + b"\x81\x85\0\0\0\0hello"):
+            for reset in (False, True):
+                with socket.create_connection((host, int(port))) as client:
+                    if reset:
+                        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                    client.sendall(content)
+                    time.sleep(0.05)
+        page = Wire(url)
+        controls = [uuid for uuid, part in page.panel.items() if "step" in part]
+        assert controls
+        for uuid in controls:
+            page.send(type="GuiUpdateMessage", uuid=uuid, updates={"value": float("nan")})
+        page.send(type="GuiUpdateMessage", uuid=[], updates=3)
+        for content in (b"", b"\xc1", msgspec.msgpack.encode([1, 2]), msgspec.msgpack.encode({"type": "Nothing"})):
+            other = Wire(url)
+            other.socket.send(content)
+            other.close()
+        time.sleep(0.5)
+        assert Wire(url).panel
+    assert capfd.readouterr().err == ""

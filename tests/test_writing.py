@@ -64,6 +64,12 @@ def test_a_folder_below_a_file_is_refused(tmp_path):
         check_writable(tmp_path / "file" / "new" / "robot.yaml")
 
 
+def test_a_name_that_is_too_long_is_refused(tmp_path):
+    for write in (whole_file, whole_folder):
+        with pytest.raises(InputError, match="cannot be written"), write(tmp_path / ("x" * 5000)):
+            pass
+
+
 def test_links_are_followed_and_permissions_kept(tmp_path):
     real, link = tmp_path / "real.txt", tmp_path / "link.txt"
     real.write_text("before")

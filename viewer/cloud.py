@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from ..display import Displayed
 from ..errors import InputError
 from ..figures import style
 from ..figures.tension_colours import rgb
@@ -18,7 +19,7 @@ ACCEPTED, REFUSED = style.colour(2), style.colour(5)  # bluish green and orange:
 
 
 @dataclass(frozen=True)
-class Cloud:
+class Cloud(Displayed):
     """Coloured points in {G}.
 
     Attributes

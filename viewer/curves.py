@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..display import Displayed
+
 if TYPE_CHECKING:
     from .replay import Replay
 
@@ -15,7 +17,7 @@ POINTS = 240  # of a curve, about one for each pixel of the panel
 
 
 @dataclass(frozen=True)
-class Curves:
+class Curves(Displayed):
     """Tensions and margins of a motion at k of its instants, which include its worst.
 
     Attributes

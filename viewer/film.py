@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..figures.animation import FASTEST, Scene, Timing, draw, timing
+from ..models.rotor_discs import rotor_discs
 from .replay import Replay
 
 RATE = 12.5  # [1/s]
@@ -43,4 +44,5 @@ def scene(replay: Replay, when: Timing) -> Scene:
         tensions=np.array([instant.tensions for instant in instants]),
         t_min=robot.t_min,
         t_max=robot.t_max,
+        rotors=rotor_discs(robot, carriers),
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..display import Displayed
 from ..distribution import pose_problem
 from ..models import Dynamics
 from ..solvers import Certificate, capacity_margin, solve
@@ -17,7 +18,7 @@ FORCELESS = 0.05  # shorter force parts are no arrow: the certificate is about m
 
 
 @dataclass(frozen=True)
-class Instant:
+class Instant(Displayed):
     """A robot at one instant.
 
     Attributes
@@ -39,6 +40,10 @@ class Instant:
         The proof that no tensions exist; None if they do.
     time
         [s]; None at rest.
+    cut
+        Which cables have been cut, (m,); None if none have.
+    events
+        What has happened in a flight until now, as texts.
     """
 
     pose: np.ndarray
@@ -51,6 +56,8 @@ class Instant:
     reserve: float = float("nan")
     certificate: Certificate | None = None
     time: float | None = None
+    cut: np.ndarray | None = None
+    events: tuple[str, ...] = ()
 
 
 def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Instant:

@@ -151,7 +151,10 @@ def _send_picture(client: viser.ClientHandle | None, name: str) -> None:
     from matplotlib.image import imsave
 
     width, height = client.camera.image_width, client.camera.image_height
-    picture = client.get_render(height, width, transport_format="png", timeout=PATIENCE) / 255.0
+    try:
+        picture = client.get_render(height, width, transport_format="png", timeout=PATIENCE) / 255.0
+    except RuntimeError:  # the browser has left
+        return
     opaque = picture[..., 3:]
     file = io.BytesIO()
     imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")

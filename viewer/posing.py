@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError, TowlineError
-from ..models import Dynamics
+from ..models import Dynamics, points
 from ..models.statics import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
@@ -123,7 +123,7 @@ class Posing:
         """Move the platform (None) or a carrier to its handle, as far as its sliders reach."""
         pose, carriers = self._pose.copy(), self._carriers.copy()
         place = pose if owner is None else carriers[owner]
-        turned = Rotation.from_quat(event.target.wxyz, scalar_first=True).as_euler("ZYX")[::-1]
+        turned = points.angles(Rotation.from_quat(event.target.wxyz, scalar_first=True).as_matrix())
         for setting in self._settings:
             if setting.carrier == owner:
                 wanted = [*event.target.position, *turned][setting.coordinate]
@@ -155,6 +155,8 @@ class Posing:
 
         Sliders and handles agree about a pose that cannot be shown too: the next event begins there.
         """
+        if not (np.isfinite(pose).all() and np.isfinite(carriers).all()):  # no page of ours sends that
+            return
         self._latest = number = self._latest + 1
         with self._busy:
             if number != self._latest:  # a later call came while this one waited

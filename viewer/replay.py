@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import cached_property
 
 import numpy as np
@@ -78,6 +79,8 @@ class Replay:
             _array(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
         )
         self._words = _answers(dataset) if self._flown else None
+        self._cut = _array(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
+        self._events = _events(dataset) if self._flown else []
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
         self._points = self.geometry(self._pose, self._carriers)
@@ -142,6 +145,8 @@ class Replay:
             nearest=nearest,
             certificate=certificate,
             time=float(self.times[index]),
+            cut=None if self._cut is None else self._cut[index],
+            events=tuple(what for at, what in self._events if at <= self.times[index] + 1e-9),
         )
 
     def _certificate(self, index: int) -> Certificate | None:
@@ -158,9 +163,13 @@ class Replay:
 
     @cached_property
     def _t_min(self) -> np.ndarray:
-        """Return the smallest tensions at each instant, (n, m) [N]: zero where a phase permits slack cables."""
+        """Return the smallest tensions at each instant, (n, m) [N]: zero where a phase permits slack cables.
+
+        A cable that has been cut has none, and so no margin.
+        """
         if self._task is None or self._task.phases is None:
-            return np.tile(self.robot.t_min, (len(self.times), 1))
+            t_min = np.tile(self.robot.t_min, (len(self.times), 1))
+            return t_min if self._cut is None else np.where(self._cut, -np.inf, t_min)
         return self._scenario.t_min_at(self.times)
 
     @cached_property
@@ -178,6 +187,16 @@ def _answers(dataset: xr.Dataset) -> list[str] | None:
     if not ((numbers >= 0) & (numbers < len(words))).all():
         return None
     return [printable(words[number].replace("_", " "), LONGEST) for number in numbers]
+
+
+def _events(dataset: xr.Dataset) -> list[tuple[float, str]]:
+    """Return the times [s] and the words of what happened in a flight; none if its file does not have them."""
+    try:
+        listed = json.loads(str(dataset.attrs.get("report", "{}")))["events"]
+        found = [(float(event["at_s"]), str(event["what"])) for event in listed]
+    except (ValueError, KeyError, TypeError):
+        return []
+    return [(at, f"{at:.4g} s: {printable(what, LONGEST)}") for at, what in found]
 
 
 def _array(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..inputs import file_path, required, shown, whole_number
 from ..models import Dynamics
+from ..quiet import quiet
 from ..writing import whole_file
 from .access import guarded
 from .geometry import Geometry
@@ -54,6 +55,12 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     """
     required("subject", subject, Subject)
     _check_address(host, port)
+    with quiet("websockets.server", "asyncio"):  # of connections that break off and messages that are none
+        yield from _served(subject, host, port)
+
+
+def _served(subject: Subject, host: str, port: int) -> Iterator[str]:
+    """Start the server, yield its address once, and stop it."""
     server = _start(host, port)
     try:
         geometry = Geometry(subject.robot)

@@ -11,8 +11,9 @@ ROUND = np.linspace(0.0, 2 * np.pi, 25)
 BLADE = 0.6  # of the arm: radius of a rotor
 
 
-def rotors(arm: float) -> list[np.ndarray]:
-    """Return two crossed arms and four circles, lines (k, 3) [m] in the frame of a quadrotor."""
+def rotors(radius: float) -> list[np.ndarray]:
+    """Return two crossed arms and four circles that reach to `radius` [m], lines (k, 3) in the frame of a quadrotor."""
+    arm = radius / (1 + BLADE)
     ends = arm * np.array([[1, 1, 0], [-1, -1, 0], [1, -1, 0], [-1, 1, 0]]) / np.sqrt(2)
     circle = BLADE * arm * np.stack([np.cos(ROUND), np.sin(ROUND), np.zeros_like(ROUND)], axis=1)
     return [ends[:2], ends[2:], *(end + circle for end in ends)]

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..figures import style
+from ..figures.cut_cables import drawn_ends
 from ..figures.hull import faces
 from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
@@ -88,7 +89,11 @@ class Stage:
         points = instant.points
         colours = shades(place(instant.tensions, self._robot.t_min, self._robot.t_max))
         exits = np.where(np.isfinite(points.exits), points.exits, points.anchors)
-        ways = np.stack([points.anchors, exits, exits, points.attachments], axis=1).reshape(-1, 2, 2, 3)
+        ends = drawn_ends(points.anchors, points.attachments, instant.cut)
+        if instant.cut is not None:  # nothing runs over the pulley of a cable that has been cut
+            exits, colours = np.where(instant.cut[:, None], points.anchors, exits), colours.copy()
+            colours[instant.cut] = GREY
+        ways = np.stack([points.anchors, exits, exits, ends], axis=1).reshape(-1, 2, 2, 3)
         for cable, way, colour in zip(self._cables, ways.astype(np.float32), colours, strict=True):
             cable.points = way
             cable.colors = colour
@@ -105,13 +110,11 @@ class Stage:
                 _place(handle, pose)
         # Not all at one height, for cables that run close to each other.
         along = (np.arange(self._robot.m) % 2 * 0.2 + 0.3)[:, None]
-        middles = (1 - along) * exits + along * points.attachments
+        middles = (1 - along) * exits + along * ends
         for index, (label, tension) in enumerate(zip(self._numbers, instant.tensions, strict=True)):
             label.position = middles[index]
-            _write(
-                label,
-                f"{index + 1}: {quantity(tension, 'N', 3)}" if np.isfinite(tension) else f"{index + 1}",
-            )
+            text = f"{index + 1}: {quantity(tension, 'N', 3)}" if np.isfinite(tension) else f"{index + 1}"
+            _write(label, f"{index + 1}: cut" if instant.cut is not None and instant.cut[index] else text)
         self._point(instant)
         if self._caption is not None:
             _write(self._caption, words.caption(instant))
@@ -305,8 +308,8 @@ class Stage:
                 )
             )
             self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)
-            if carrier.drawing.arm is not None:
-                self._lines(f"{name}/rotors", rotors(max(carrier.drawing.arm, 0.03 * size)), BLACK, 2 * THIN)
+            if carrier.drawing.rotors:
+                self._lines(f"{name}/rotors", rotors(float(robot.carrier_radius[index])), BLACK, 2 * THIN)
             scene.add_label(f"{name}/name", carrier.name, anchor="bottom-center", font_screen_scale=0.8)
         self._numbers = [
             scene.add_label(f"/tensions/{index + 1}", "", anchor="center-center", font_screen_scale=0.8)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..declared import check_zarr
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import file_path, printable, required, shown
 from ..models import Robot, available, load
@@ -24,7 +26,7 @@ ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towli
 
 
 @dataclass(frozen=True)
-class Subject:
+class Subject(Displayed):
     """A robot, a plan, a flight or a workspace to show.
 
     Attributes
@@ -161,6 +163,7 @@ def _open(path: Path) -> xr.Dataset:
     if path.suffix != ".zarr":
         return load_netcdf(path, refusal)
     try:
+        check_zarr(path)
         return xr.open_zarr(path).load()
     except ImportError:
         raise InputError(

@@ -45,6 +45,7 @@ def readout(instant: Instant, robot: Robot, other: Instant | None = None) -> str
     facts = [f'<b class="towline-status" style="color:{colour}">{escape(instant.status)}</b>']
     if instant.time is not None:
         facts.append(f'<span class="towline-time">t = {instant.time:.2f} s</span>')
+    facts += [f'<span class="towline-event">{escape(event)}</span>' for event in instant.events]
     facts += _margins(instant)
     if other is not None:
         apart = float(np.linalg.norm(instant.pose[:3] - other.pose[:3]))
@@ -83,6 +84,7 @@ def table(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
             "</div></div>"
         )
         shown = f"{tension:.2f} N" if there else "none"
+        shown = "cut" if instant.cut is not None and instant.cut[index] else shown
         if other is not None:
             at_other = other.tensions[index]
             beside = f"{at_other:.2f} N" if np.isfinite(at_other) else "none"
@@ -128,7 +130,7 @@ def legend(subject: Subject, cell: float) -> str:
     marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
     marks += [("post below an anchor", PART)] if not all(carrier.moves for carrier in robot.carriers) else []
     marks += [("pulley (its sheave)", BLACK)] if robot.pulley_radii.any() else []
-    marks += [("quadrotor (arms and rotors)", BLACK)] if any(c.drawing.arm for c in robot.carriers) else []
+    marks += [("quadrotor (arms and rotors)", BLACK)] if any(c.drawing.rotors for c in robot.carriers) else []
     marks += [("path of the platform", style.colour(0))] if subject.replay else []
     marks += [("reference of the platform", GHOST)] if subject.kind == "flight" else []
     marks += [("platform, cables and path of the other", OTHER)] if subject.other else []

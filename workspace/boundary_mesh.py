@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import finite_array, required, whole_number
 from ..models import Robot
@@ -23,7 +24,7 @@ _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribut
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Displayed):
     """Triangles, counter-clockwise when looked at from outside.
 
     Attributes

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import processors
+from ..display import Displayed
 from ..solvers import compiled
 from .condition import Condition
 from .counts import Counts
@@ -26,7 +27,7 @@ WORTH_KERNELS = 500_000  # samples of a run: the first kernels on a machine take
 
 
 @dataclass(frozen=True)
-class Counter:
+class Counter(Displayed):
     """Count where a condition holds among the samples of a domain.
 
     Attributes

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import shown
 from ..models import Robot
@@ -19,7 +20,7 @@ THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
 
 
 @dataclass(frozen=True)
-class Domain:
+class Domain(Displayed):
     """Ranges of the quantities that describe a place.
 
     Attributes

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..display import Displayed
 from ..errors import InputError
 from ..inputs import real_array, required, shown
 from ..models import Robot
@@ -15,7 +16,7 @@ __all__ = ["Places", "check_places"]
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class Places(Displayed):
     """Poses of platform and carriers, n times.
 
     Attributes

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..display import Displayed
 from ..inputs import one_of, whole_number
 
 CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
@@ -22,7 +23,7 @@ MOST_SOBOL = 2**32
 
 
 @dataclass(frozen=True)
-class Sampler:
+class Sampler(Displayed):
     """Points of the unit cube of as many dimensions as `extent` has.
 
     Attributes

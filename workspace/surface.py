@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..display import Displayed
 from ..errors import InputError
 from ..models import Robot
 from .boundary_mesh import Mesh, boundary_of_values
@@ -25,7 +26,7 @@ BANDS = 8  # of colour
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Displayed):
     """The boundary of a workspace, and the margins inside it.
 
     Attributes

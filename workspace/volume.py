@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..display import Displayed
 from ..inputs import number, whole_number
 
 __all__ = ["LEVEL", "Volume", "share_interval", "volume"]
@@ -20,7 +21,7 @@ MOST_SAMPLES = 10**15
 
 
 @dataclass(frozen=True)
-class Volume:
+class Volume(Displayed):
     """A volume and its confidence interval, in the unit of the box: [m^3], or [m^2] for a plane.
 
     Attributes

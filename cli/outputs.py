@@ -1,0 +1,43 @@
+"""The files that a command writes: none of them may be one that it reads, under whatever name or link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..errors import InputError
+
+__all__ = ["check_outputs"]
+
+
+def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None] | None = None) -> None:
+    """Check that the outputs of a command can be written, and are neither inputs nor the same file twice.
+
+    Call it when robot and task are read, and before anything takes long.
+
+    Parameters
+    ----------
+    outputs
+        The files by the names of their options, None if there is none.
+    inputs
+        Files by what they are; those that have been read so far need not be named.
+
+    Raises
+    ------
+    InputError
+        If one cannot be written, or is one of the other files.
+    """
+    from ..inputs import printable
+    from ..reading import files_read
+    from ..writing import check_writable
+
+    taken = [(what, file.resolve()) for what, file in (inputs or {}).items() if file is not None]
+    taken += [(f"{printable(str(file))}, which is read", file.resolve()) for file in dict.fromkeys(files_read)]
+    for what, file in outputs.items():
+        if file is None:
+            continue
+        target = check_writable(file)
+        for other, place in taken:
+            if target == place or (target.exists() and place.exists() and target.samefile(place)):
+                raise InputError(f"{what} must be another file than {other}, got {printable(str(file))}")
+        taken.append((what, target))
