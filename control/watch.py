@@ -99,7 +99,7 @@ class Watch:
         else:
             self._explained += dt * (self._acceleration + KNOWN * (self._by_tensions @ otherwise))
         left, steps = rate - self._explained, self._left
-        if self._ripple is not None and self._is_loud(dt, left):
+        if self._ripple is not None and self._is_loud(self._ripple, dt, left):
             return HandOver(time, LOUD)
         left = self._scale * left
         steps.append((time, left))
@@ -115,7 +115,7 @@ class Watch:
             return None
         return HandOver(time, f"{self.unexplained:.2g} m/s^2 of its acceleration are not as predicted")
 
-    def _is_loud(self, dt: float, left: np.ndarray) -> bool:
+    def _is_loud(self, ripple: np.ndarray, dt: float, left: np.ndarray) -> bool:
         """Update the noise, what is left beside a line, and return whether it is too much."""
         if self._trend is None or dt > QUICK:
             self._trend, self._slope = left.copy(), np.zeros(6)
@@ -125,7 +125,7 @@ class Watch:
         self._trend += 2 * share * off
         self._slope += share / QUICK * off
         self._noise += min(dt / LONG, 1.0) * (off * off - self._noise)
-        return bool((self._ripple @ self._noise).max() > 1.0)
+        return bool((ripple @ self._noise).max() > 1.0)
 
     def _add(self, dt: float, acceleration: float) -> None:
         self.unexplained += min(dt / MEAN, 1.0) * (acceleration - self.unexplained)
