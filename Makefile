@@ -31,8 +31,8 @@ types: .venv/dev.stamp
 kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
 	$(BIN)/python -c "from towline.solvers.stages import machine; machine.solve_stages()"
-	$(BIN)/python -c "from towline.models.plant import machine; machine.run_rows()"
-	$(BIN)/python -c "from towline.models.forward_kinematics import machine; machine.load()"
+	$(BIN)/python -c "from towline.plant import machine; machine.run_rows()"
+	$(BIN)/python -c "from towline.estimation.pose import machine; machine.load()"
 	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"
 	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"
 

@@ -1,43 +1,51 @@
 """Optimal control and tension distribution of cable robots.
 
 `import towline` costs nothing: each name below loads its package when it is first used (PEP 562). Packages, from the
-ground up: `towline.models` (robots and their mechanics), `towline.solvers` (tension distribution on plain arrays),
-`towline.figures` (matplotlib), `towline.distribution` (one instant of a robot as a tension problem),
-`towline.workspace` (reachable poses), `towline.calibration` (the robot as built), `towline.control` (one step of a
-controller), `towline.simulation` (flights), `towline.embedded` (a control step as C), `towline.ocp` (planning),
-`towline.studies` (the papers), `towline.cli`.
+ground up: `towline.base` (what all stand on), `towline.models` (robots and their mechanics), `towline.solvers` (tension
+distribution on plain arrays), `towline.figures` (matplotlib), `towline.statics` (one instant of a robot),
+`towline.plant` (motion in time), `towline.workspace` (reachable poses), `towline.estimation` (the pose from lengths,
+the robot as built), `towline.control` (one step of a controller), `towline.ocp` (planning), `towline.simulation`
+(runs), `towline.export` (a control step as C), `towline.studies` (the papers), `towline.cli`.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .base import former_names
+from .base.version import __version__ as __version__
+
+former_names.install()
+
 if TYPE_CHECKING:
-    from .calibration import Calibration, Measurements, calibrate, read_measurements
+    from .base.errors import InputError, SolverError, TowlineError
     from .control import Controller
-    from .distribution import tensions
-    from .embedded import export_step
-    from .errors import InputError, SolverError, TowlineError
+    from .estimation.calibration import Calibration, Measurements, calibrate, read_measurements
+    from .export.step import export_step
     from .models import Dynamics, Robot, available, load
     from .ocp import Plan, Planner, Sweep, Task, Timing, plan, read_task, sweep, time_along
     from .simulation import Flight, simulate
     from .solvers import Certificate, TensionProblem, TensionSolution, methods, solve, solve_batch
+    from .statics.distribution import tensions
     from .workspace import sample
-
-__version__ = "0.2.0"
 
 _HOMES = {
     "models": ("Dynamics", "Robot", "available", "load"),
     "solvers": ("Certificate", "TensionProblem", "TensionSolution", "methods", "solve", "solve_batch"),
-    "distribution": ("tensions",),
+    "statics.distribution": ("tensions",),
     "ocp": ("Plan", "Planner", "Sweep", "Task", "Timing", "plan", "read_task", "sweep", "time_along"),
     "workspace": ("sample",),
-    "calibration": ("Calibration", "Measurements", "calibrate", "read_measurements"),
+    "estimation.calibration": ("Calibration", "Measurements", "calibrate", "read_measurements"),
     "control": ("Controller",),
     "simulation": ("Flight", "simulate"),
-    "embedded": ("export_step",),
-    "errors": ("InputError", "SolverError", "TowlineError"),
+    "export.step": ("export_step",),
+    "base.errors": ("InputError", "SolverError", "TowlineError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
+# Reached as attributes. The last two are short names, the rest of the former ones are imported by their paths.
+_PACKAGES = {
+    *("base", "control", "estimation", "export", "figures", "models", "ocp", "plant", "simulation", "solvers"),
+    *("statics", "workspace", "calibration", "errors"),
+}
 
 __all__ = [
     "Calibration",
@@ -81,11 +89,11 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(f".{_HOME[name]}", __name__), name)
         globals()[name] = value
         return value
-    if name in _HOMES:
+    if name in _PACKAGES:
         return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
-    return sorted({*globals(), *_HOME, *_HOMES})
+    return sorted({*globals(), *_HOME, *_PACKAGES})

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import InputError
 from ..control import Controller
-from ..errors import InputError
 from ..models import Robot
 from ..simulation import simulate
 from .control_contenders import CONTENDERS, REFERENCE, TOWLINE

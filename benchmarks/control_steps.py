@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from ..control import ANSWERS, Command, ComputedTorque, Reference, State
 from ..models import Robot, available, load
-from ..models.plant import Plant
-from ..models.plant.periods import Periods
+from ..plant import Plant
+from ..plant.periods import Periods
 from .machine import machine
 
 __all__ = ["KINDS", "Steps", "random_steps"]

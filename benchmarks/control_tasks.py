@@ -8,8 +8,8 @@ from typing import Any
 
 from typing_extensions import override
 
+from ..base.errors import InputError
 from ..control import ComputedTorque, Controller, OpenLoop, Predictive
-from ..errors import InputError
 from ..models import Robot, load
 from ..simulation import simulate
 from ..solvers import Horizon

@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolverError
+from ..base.errors import InputError, SolverError
 from ..solvers import TensionProblem, compiled, solve, solve_batch
 from ..solvers.core import CABLES
 from ..solvers.status import STATUSES

@@ -15,9 +15,9 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..estimation.pose import machine as code
 from ..models import Robot, batch, load, points, pose_from_lengths
 from ..models.dynamics import Dynamics
-from ..models.forward_kinematics import machine as code
 from .batch import timed
 from .machine import machine
 

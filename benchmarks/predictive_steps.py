@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
+from ..base.errors import InputError
 from ..control import ANSWERS, Command, Controller, Predictive, Reference, State
-from ..errors import InputError
 from ..models import Robot, load
 from ..simulation import simulate
 from .control_steps import read_options

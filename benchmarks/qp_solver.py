@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..solvers import TensionProblem, solve
 from ..solvers.box_least_squares import box_least_squares
 

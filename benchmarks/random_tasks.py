@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..distribution import wrench_problem
-from ..errors import TowlineError
+from ..base.errors import TowlineError
 from ..models import load
 from ..ocp import MotionStatus, Plan, plan
+from ..statics.distribution import wrench_problem
 from .machine import machine
 from .random_families import FAMILIES, random_task
 from .recheck import rechecked

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..embedded.export import step_files
-from ..embedded.mechanics import moving_carriers
-from ..errors import InputError
+from ..base.errors import InputError
+from ..export.step.export import step_files
+from ..export.step.mechanics import moving_carriers
 from ..models import Dynamics, Robot
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..embedded.export import step_files
-from ..errors import InputError
+from ..base.errors import InputError
+from ..export.step.export import step_files
 from ..models import Robot, load
 from .step_code import FLAGS
 

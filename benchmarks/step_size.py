@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..embedded.export import step_files
-from ..errors import InputError
+from ..base.errors import InputError
+from ..export.step.export import step_files
 from ..models import Robot
 
 CORTEX_M7 = ("arm-none-eabi-gcc", "-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-d16", "-mfloat-abi=hard")

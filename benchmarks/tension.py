@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..base.errors import InputError
+from ..base.writing import check_writable, whole_file
 from ..figures import style
 from ..solvers import TensionProblem
-from ..writing import check_writable, whole_file
 from .machine import machine
 from .tension_contenders import REFERENCE, Contender, contenders
 from .tension_tasks import KINDS, Task, make_task

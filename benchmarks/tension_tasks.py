@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverError
+from ..base.errors import SolverError
 from ..solvers import TensionProblem
 from .qp_solver import as_qp, multipliers
 

@@ -48,9 +48,9 @@ def tension(
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed, accuracy and failures of every installed solver."""
+    from ..base.errors import InputError
+    from ..base.writing import check_writable
     from ..benchmarks import tension as benchmark
-    from ..errors import InputError
-    from ..writing import check_writable
 
     try:
         cables = [int(word) for word in m.replace(",", " ").split()]

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import InputError
-from ..inputs import check_ending, one_of
+from ..base.errors import InputError
+from ..base.inputs import check_ending, one_of
 from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
 from .outputs import check_outputs
 
@@ -68,8 +68,8 @@ def calibrate(
     if the log seems to have a slip (cables in another order, other units or angles), the values did not converge, or
     samples left out fit worse than with the robot's file.
     """
-    from ..calibration import calibrate as find
-    from ..calibration import read_measurements
+    from ..estimation.calibration import calibrate as find
+    from ..estimation.calibration import read_measurements
     from ..figures.style import FORMATS
     from ..models import load
 

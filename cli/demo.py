@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..inputs import one_of
+from ..base.inputs import one_of
 from .options import FormatOption, JsonOption, print_json, print_written
 from .watching import COMPILING, watching
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..inputs import check_ending
+from ..base.inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json
 from .outputs import check_outputs
 
@@ -36,9 +36,9 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Export a robot as a MuJoCo model (--mjcf), its dynamics as C code (--c), or a control step as C code (--step)."""
-    from ..errors import InputError
+    from ..base.errors import InputError
+    from ..base.writing import whole_file
     from ..models import load
-    from ..writing import whole_file
 
     if mjcf + c_code + (step is not None) != 1:
         raise InputError("export requires exactly one of --mjcf, --c and --step")
@@ -48,7 +48,7 @@ def export(
         raise InputError("--out must be left out with --step, which names the folder")
     loaded = load(robot)
     if step is not None:
-        from ..embedded import export_step
+        from ..export.step import export_step
 
         folder = export_step(loaded, step, "float" if single else "double")
         if as_json:
@@ -60,7 +60,7 @@ def export(
     path = out if out is not None else Path(f"{loaded.name}{ending}")
     check_outputs({"--out": check_ending("--out", path, ending)})
     if mjcf:
-        from ..models.mjcf import to_mjcf
+        from ..export.mjcf import to_mjcf
 
         text = to_mjcf(loaded)
     else:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..inputs import check_ending
+from ..base.inputs import check_ending
 from .options import PLAIN, Command, JsonOption, print_json
 from .outputs import check_outputs
 
@@ -31,9 +31,9 @@ def caspr(
     as_json: JsonOption = False,
 ) -> None:
     """Convert a CASPR robot to a robot file, and report what a robot file cannot express."""
+    from ..base.writing import whole_file
     from ..models.caspr import read_caspr
     from ..models.parsing import to_yaml
-    from ..writing import whole_file
 
     if out is not None:
         check_ending("--out", out, ".yaml", ".yml")

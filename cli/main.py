@@ -18,8 +18,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from .. import __version__
-from ..errors import InputError, TowlineError
+from ..base.errors import InputError, TowlineError
+from ..base.version import __version__
 from .options import PLAIN, Command
 from .stopping import end, requested
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,7 +23,7 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; `check_outputs` looks at the files that it reads."""
-        reading = sys.modules.get("towline.reading")  # nothing has been read where it was never loaded
+        reading = sys.modules.get("towline.base.reading")  # nothing has been read where it was never loaded
         if reading is not None:
             reading.files_read.clear()
         return super().invoke(ctx)
@@ -121,7 +121,7 @@ def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.n
     """
     import numpy as np
 
-    from ..inputs import shown
+    from ..base.inputs import shown
 
     accepted = f"{count} finite number{'s' if count > 1 else ''}" + (
         f" for each of {rows} carriers, separated by ';'" if rows else ""

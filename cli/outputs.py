@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 __all__ = ["check_outputs"]
 
@@ -27,9 +27,9 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
     InputError
         If one cannot be written, or is one of the other files.
     """
-    from ..inputs import printable
-    from ..reading import files_read
-    from ..writing import check_writable
+    from ..base.inputs import printable
+    from ..base.reading import files_read
+    from ..base.writing import check_writable
 
     taken = [(what, file.resolve()) for what, file in (inputs or {}).items() if file is not None]
     taken += [(f"{printable(str(file))}, which is read", file.resolve()) for file in dict.fromkeys(files_read)]

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
-from ..inputs import check_ending, one_of, shown
+from ..base.errors import InputError
+from ..base.inputs import check_ending, one_of, shown
 from .options import (
     FPS,
     SPEED,

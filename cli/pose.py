@@ -63,7 +63,7 @@ def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
 def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
     import numpy as np
 
-    from ..text import quantity, quantity_row
+    from ..base.text import quantity, quantity_row
 
     verdict = "a pose fits the lengths," if estimate.consistent else "NO POSE FITS THE LENGTHS, the nearest one has"
     if estimate.by_gravity and not estimate.converged:

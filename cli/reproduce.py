@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import InputError
-from ..inputs import one_of
+from ..base.errors import InputError
+from ..base.inputs import one_of
 from .options import FormatOption, JsonOption, print_json, print_written
 from .watching import progress_bar
 
@@ -27,10 +27,10 @@ def reproduce(
     as_json: JsonOption = False,
 ) -> None:
     """Recompute the equations, tables and figures of a paper, and report for each claim whether it is reproduced."""
+    from ..base.writing import check_writable
     from ..figures.style import FORMATS
     from ..studies.accounts.files import write
     from ..studies.papers import PAPERS
-    from ..writing import check_writable
 
     if paper not in PAPERS:
         raise InputError(f"PAPER must be one of {', '.join(PAPERS)}, got {paper!r}")

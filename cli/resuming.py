@@ -9,7 +9,7 @@ from typing import Any
 
 import typer
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .stopping import add_to_message
 
 __all__ = ["checkpoint_of", "checkpoint_option", "resumable", "resume_option", "scheduler_option"]

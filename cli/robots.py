@@ -47,10 +47,10 @@ def robots(
 
         _list(contents(), as_json)
     else:
-        from ..distribution import pose_problem
         from ..models import Dynamics, load
         from ..models.diagnosis import diagnose
         from ..solvers import solve
+        from ..statics.distribution import pose_problem
 
         robot = load(name)
         check_outputs({"--figure": figure})
@@ -66,7 +66,7 @@ def robots(
 
 
 def _list(library: list[dict[str, Any]], as_json: bool) -> None:
-    from ..text import quantity
+    from ..base.text import quantity
 
     rows = [{**robot, "carriers": _count(robot["carriers"])} for robot in library]
     if as_json:
@@ -109,7 +109,7 @@ def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> di
 
 
 def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> None:
-    from ..text import quantity, quantity_range, quantity_row
+    from ..base.text import quantity, quantity_range, quantity_row
 
     of = f"of {len(robot.platform.dof)}"
     highest = f"{result['rank_level']} with the platform level, {result['rank_tilted']} tilted"
@@ -136,7 +136,7 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
 
 def _rest(at_home: TensionSolution) -> list[str]:
     """Return the tensions that hold the robot at home, or the proof that there are none."""
-    from ..text import quantity_range
+    from ..base.text import quantity_range
 
     if at_home.tensions is not None:
         return [

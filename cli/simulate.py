@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import InputError
-from ..inputs import check_ending, one_of, printable, shown
-from ..processors import one_thread_each
+from ..base.errors import InputError
+from ..base.inputs import check_ending, one_of, printable, shown
+from ..base.processors import one_thread_each
 from .options import (
     FPS,
     SPEED,

@@ -80,7 +80,7 @@ def end() -> NoReturn:
     """End the process with one line and the exit code of the signal; threads that still compute end with it."""
     while not _once.acquire(timeout=GRACE):  # never released: one line, whoever comes first
         pass
-    execution = sys.modules.get("towline.execution")  # no process was started where it was never loaded
+    execution = sys.modules.get("towline.base.execution")  # no process was started where it was never loaded
     if execution is not None:
         execution.end_processes()
     with suppress(OSError, ValueError):
@@ -88,7 +88,7 @@ def end() -> NoReturn:
             sys.stderr.write(SHOW_CURSOR)
         sys.stderr.write(f"{_message}\n")
         sys.stderr.flush()
-    writing = sys.modules.get("towline.writing")  # nothing is being written where it was never loaded
+    writing = sys.modules.get("towline.base.writing")  # nothing is being written where it was never loaded
     if writing is not None:
         writing.remove_unfinished()
     os._exit(128 + _arrived)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import typer
 
-from ..errors import InputError
-from ..inputs import check_ending
-from ..processors import one_thread_each
+from ..base.errors import InputError
+from ..base.inputs import check_ending
+from ..base.processors import one_thread_each
 from .options import print_json
 from .outputs import check_outputs
 from .resuming import checkpoint_of, resumable

@@ -87,8 +87,8 @@ def _problem(
     """Return the problem of the instant, and its pose and wrench as lists."""
     import numpy as np
 
-    from ..distribution import pose_problem
     from ..models import Dynamics
+    from ..statics.distribution import pose_problem
 
     at = robot.home if pose is None else numbers("--pose", pose, 6)
     rate = np.zeros(6) if velocity is None else numbers("--velocity", velocity, 6)
@@ -101,7 +101,7 @@ def _problem(
 
 
 def _show(robot: Robot, at: dict[str, Any], solutions: dict[str, TensionSolution], method: str) -> None:
-    from ..text import column, quantity, quantity_row
+    from ..base.text import column, quantity, quantity_row
 
     solution = solutions[method]
     # One row for each method: there are more of them than cables.

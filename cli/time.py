@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..inputs import check_ending
+from ..base.inputs import check_ending
 from .options import JsonOption, RobotArgument, print_json, print_written
 from .outputs import check_outputs
 

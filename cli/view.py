@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
-from ..inputs import check_ending
+from ..base.errors import InputError
+from ..base.inputs import check_ending
 from .options import JsonOption, print_json, robot_names
 from .outputs import check_outputs
 from .stopping import end_at_once, requested, unlisten

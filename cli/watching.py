@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ..text import quantity
+from ..base.text import quantity
 
 if TYPE_CHECKING:
     from rich.console import Console

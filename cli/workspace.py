@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import InputError
-from ..inputs import check_ending
+from ..base.errors import InputError
+from ..base.inputs import check_ending
 from .options import JsonOption, RobotArgument, numbers, print_json, print_written
 from .outputs import check_outputs
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
@@ -181,7 +181,7 @@ def _import(file: Path) -> None:
     import sys
     from importlib import import_module
 
-    from ..inputs import check_ending, printable
+    from ..base.inputs import check_ending, printable
 
     check_ending("--define", file, ".py")
     try:
@@ -267,7 +267,7 @@ def _summary(result: xr.Dataset) -> dict[str, Any]:
 def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
     import math
 
-    from ..text import quantity
+    from ..base.text import quantity
 
     accepted, samples = summary["accepted"], summary["samples"]
     typer.echo(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..distribution import tensions
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
+from ..statics.distribution import tensions
 
 __all__ = ["uncontrolled"]
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..display import record
+from ..base.display import record
 
 __all__ = ["ANSWERS", "HOLD", "OTHERWISE", "PLANNED", "SHIFTED", "SOFT", "Command"]
 

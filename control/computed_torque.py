@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from ..errors import InputError
-from ..inputs import number, shown
+from ..base.errors import InputError
+from ..base.inputs import number, shown
 from ..models.batch import as_array
 from ..models.files import as_robot
-from ..models.plant import layout
-from ..models.plant.packing import bodies_of, cables_of, settings_of
 from ..models.robot import Robot
+from ..plant import layout
+from ..plant.packing import bodies_of, cables_of, settings_of
 from ..solvers.in_place import InPlace
 from ..solvers.kernels.codes import OPTIMAL
 from .actuators import actuators

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from ..kernel import Kernel, compile_function
-from ..models.plant import machine
-from ..models.plant.machine import joined
+from ..base.machine_code.kernel import Kernel, compile_function
+from ..plant import machine
+from ..plant.machine import joined
 
 __all__ = ["aim", "carriers_of", "directions", "mechanics", "stages", "thrusts"]
 

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from ..models.plant.bodies import place_bodies, set_quaternion
-from ..models.plant.layout import (
+from ..plant.bodies import place_bodies, set_quaternion
+from ..plant.layout import (
     ARM,
     BODY,
     BODY_WORK,
@@ -30,7 +30,7 @@ from ..models.plant.layout import (
     VELOCITY,
     U,
 )
-from ..models.plant.lines import run_cables
+from ..plant.lines import run_cables
 from .reaction import CORRECTS, add_offsets, react
 
 # Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has what `reaction` reads,

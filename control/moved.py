@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from typing_extensions import override
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 from .machine import carriers_of, directions

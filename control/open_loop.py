@@ -7,7 +7,7 @@ import os
 import numpy as np
 from typing_extensions import override
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..models.files import as_robot
 from ..models.robot import Robot
 from .command import HOLD, PLANNED, Command

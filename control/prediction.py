@@ -12,9 +12,9 @@ A(x) t - w(x, dx, ddx) with ddx as it is, which are quotients of differences.
 
 import numpy as np
 
-from ..models.plant.bodies import place_bodies
-from ..models.plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
-from ..models.plant.lines import run_cables
+from ..plant.bodies import place_bodies
+from ..plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
+from ..plant.lines import run_cables
 from .mechanics import move_to_com, put_body, write_wrench, write_wrench_matrix
 from .tethers import coordinates_of, put_tethered
 

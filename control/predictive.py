@@ -11,14 +11,14 @@ from warnings import warn
 import numpy as np
 from typing_extensions import override
 
-from ..distribution import tensions as tensions_at
-from ..errors import InputError
-from ..inputs import number, whole_number
+from ..base.errors import InputError
+from ..base.inputs import number, whole_number
 from ..models.files import as_robot
 from ..models.robot import Robot
 from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
+from ..statics.distribution import tensions as tensions_at
 from .command import HOLD, OTHERWISE, SHIFTED, Command
 from .computed_torque import ComputedTorque, positive, reach_of
 from .machine import aim

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import number, shown
+from ..base.errors import InputError
+from ..base.inputs import number, shown
 from .moved import Moved
 from .reference import Reference
 

@@ -14,15 +14,7 @@ dp adds to the offset that they have.
 
 import math
 
-from ..models.plant.layout import (
-    ARM,
-    CARRIER_ARM,
-    FORCE_SCALE,
-    LENGTH_SCALE,
-    OWNER,
-    L,
-    U,
-)
+from ..plant.layout import ARM, CARRIER_ARM, FORCE_SCALE, LENGTH_SCALE, OWNER, L, U
 
 SHARE = 0.05  # of the weight: the change of a tension that costs as much as a carrier at the end of its reach
 DAMPED = 1e-4  # of the largest entry of the gram matrix

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..models.plant import Plant
 from ..models.robot import Robot
+from ..plant import Plant
 from .command import OTHERWISE
 from .controller import Controller
 from .reference import Reference

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from ..errors import InputError
-from ..inputs import number, shown
+from ..base.errors import InputError
+from ..base.inputs import number, shown
 from ..models.parsing import validate
 from ..models.part import Part
 from ..models.points import placed

@@ -11,16 +11,8 @@ import math
 
 import numpy as np
 
-from ..models.plant.bodies import place_bodies
-from ..models.plant.layout import (
-    ANCHOR,
-    ATTACHMENT,
-    BODY,
-    BODY_WORK,
-    CABLE_BLOCKS,
-    CARRIER,
-    COMMANDS,
-)
+from ..plant.bodies import place_bodies
+from ..plant.layout import ANCHOR, ATTACHMENT, BODY, BODY_WORK, CABLE_BLOCKS, CARRIER, COMMANDS
 from .mechanics import move_to_com, put_body
 
 # Columns of `tethers`: number of the carrier, how many cables it has, which ones, their lengths, y at home, how far

@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from ..models.plant.bodies import place_bodies
-from ..models.plant.layout import (
+from ..plant.bodies import place_bodies
+from ..plant.layout import (
     BODY,
     BODY_WORK,
     CABLE_BLOCKS,
@@ -32,7 +32,7 @@ from ..models.plant.layout import (
     RATE,
     U,
 )
-from ..models.plant.lines import run_cables
+from ..plant.lines import run_cables
 from .mechanics import KNOWN, is_measured, move_to_com, put_body
 
 # Rows of `memory`: the estimated force, momentum less what the estimate explains, and, in the carrier's axes, the

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import number
+from ..base.errors import InputError
+from ..base.inputs import number
 from . import film, style
 from .cut_cables import drawn_ends
 from .hull import faces

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, TowlineError
-from ..inputs import number, shown
-from ..writing import whole_file
+from ..base.errors import InputError, TowlineError
+from ..base.inputs import number, shown
+from ..base.writing import whole_file
 
 SUFFIXES = (".gif", ".mp4")
 TICK = 0.01  # [s]: GIF counts its delays in hundredths

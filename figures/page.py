@@ -89,7 +89,7 @@ def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str])
     parts
         Results of the other functions of this module, in order.
     """
-    from .. import __version__
+    from ..base.version import __version__
 
     return PAGE.substitute(
         title=_safe(title),

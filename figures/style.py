@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import file_path, one_of, printable
-from ..writing import whole_file
+from ..base.errors import InputError
+from ..base.inputs import file_path, one_of, printable
+from ..base.writing import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..text import quantity
+from ..base.text import quantity
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable

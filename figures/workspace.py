@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..text import quantity
+from ..base.text import quantity
 from . import style
 from .projection import ABOVE, FRONT, SIDE, views_of
 

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 
 def constant(times: np.ndarray, velocity: Sequence[float]) -> np.ndarray:

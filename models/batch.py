@@ -16,10 +16,10 @@ from weakref import WeakKeyDictionary
 import casadi as ca
 import numpy as np
 
-from .. import processors
-from ..errors import InputError, SolverError
-from ..inputs import shown
-from ..kernel import Kernel, compile_kernel
+from ..base import processors
+from ..base.errors import InputError, SolverError
+from ..base.inputs import shown
+from ..base.machine_code.kernel import Kernel, compile_kernel
 from .tape import dense, translate
 
 ROWS_WORTH_A_KERNEL = 200_000

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic_core import CoreSchema, core_schema
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .carrier_answers import Actuator, Drawing, Effort, MotionLimits, RigidBody
 from .part import (
     AT_ORIGIN,

@@ -30,10 +30,10 @@ import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser, ParseError
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import shown
-from ..reading import read_bytes
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import shown
+from ..base.reading import read_bytes
 from . import points
 from .parsing import validate
 from .part import COORDINATES, LARGEST, Coordinate, inertia_matrix

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..display import Displayed
-from ..text import quantity, quantity_row
+from ..base.display import Displayed
+from ..base.text import quantity, quantity_row
 from .dynamics import Dynamics
 from .robot import Robot
 

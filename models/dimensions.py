@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..netcdf import Variable
+from ..base.netcdf import Variable
 from .part import COORDINATES
 from .robot import Robot
 

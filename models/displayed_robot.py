@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..display import BLUE, ORANGE, Curve, Fact, picture
-from ..inputs import printable
-from ..text import quantity, quantity_range, quantity_row
+from ..base.display import BLUE, ORANGE, Curve, Fact, picture
+from ..base.inputs import printable
+from ..base.text import quantity, quantity_range, quantity_row
 from .part import Part
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import flag, required
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import flag, required
 from . import elasticity, points
 from .arrays import Array, one_array, several_arrays
 from .batch import arrays, call, is_symbolic

@@ -6,8 +6,8 @@ import difflib
 import os
 from pathlib import Path
 
-from ..errors import InputError
-from ..inputs import file_path, shown
+from ..base.errors import InputError
+from ..base.inputs import file_path, shown
 from .library import FOLDER, available
 from .parsing import read_yaml
 from .robot import Robot

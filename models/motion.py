@@ -7,7 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..display import record
+from ..base.display import record
 from .arrays import Array
 
 __all__ = ["Motion"]

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import number, required, shown
+from ..base.errors import InputError
+from ..base.inputs import number, required, shown
 from .part import LARGEST
 
 if TYPE_CHECKING:

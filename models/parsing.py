@@ -17,10 +17,10 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.scanner import Scanner, ScannerError
 
-from ..errors import InputError
-from ..inputs import LONGEST_TEXT, check_ending, file_path, printable, shown
-from ..reading import read_bytes
-from ..writing import whole_file
+from ..base.errors import InputError
+from ..base.inputs import LONGEST_TEXT, check_ending, file_path, printable, shown
+from ..base.reading import read_bytes
+from ..base.writing import whole_file
 from .schema import json_schema
 
 ENDINGS = (".yaml", ".yml")

@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 from typing_extensions import override
 
-from ..display import Displayed, Fact, brief
-from ..errors import InputError
+from ..base.display import Displayed, Fact, brief
+from ..base.errors import InputError
 
 LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
 

@@ -8,8 +8,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ..display import Displayed
-from ..errors import InputError
+from ..base.display import Displayed
+from ..base.errors import InputError
 from . import kinematics, relative, wind
 from .arrays import Array, one_array, several_arrays
 from .batch import call

@@ -8,8 +8,8 @@ from typing import Any, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
-from ..errors import InputError
-from ..inputs import shown
+from ..base.errors import InputError
+from ..base.inputs import shown
 from .part import AT_ORIGIN, Part, Pose, Positive, Vector3
 from .points import placed, rotations
 from .polyhedron import Polyhedron, convex_hull, polyhedron

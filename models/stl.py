@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import printable
-from ..reading import read_bytes
+from ..base.errors import InputError
+from ..base.inputs import printable
+from ..base.reading import read_bytes
 from .part import LARGEST
 
 __all__ = ["read_stl"]

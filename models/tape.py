@@ -13,7 +13,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 LONGEST = 15_000  # instructions; compiling takes about 1 ms for each, and more beyond
 

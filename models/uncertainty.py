@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Self
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from ..errors import InputError
-from ..inputs import whole_number
+from ..base.errors import InputError
+from ..base.inputs import whole_number
 from .parameters import locate
 from .part import Finite, Part
 

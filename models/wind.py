@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .rigid_body import com_velocity
 from .robot import Robot
 from .rotation import Matrix

@@ -2,9 +2,9 @@
 
 from .planner import Planner, plan
 from .result import Plan
-from .status import MotionStatus
 from .sweeps.result import Sweep
 from .sweeps.run import sweep
+from .tasks.status import MotionStatus
 from .tasks.task import Task, read_task
 from .timing.fastest_law import time_along
 from .timing.timing import Timing

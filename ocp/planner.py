@@ -21,30 +21,31 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import number
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import number
+from ..base.text import quantity
 from ..models import Robot
 from ..models.files import as_robot
-from ..text import quantity
 from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
-from .blocked import blocked
-from .cost import cost
-from .durations import Durations, durations
+from .audits.cost import cost
+from .audits.violation import relative_violation
 from .global_path.space import Space
 from .global_path.start import motion_past
-from .homotopy import from_easier
 from .nlp.interrupts import heeding
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
-from .refinement import refine
-from .relaxations import near_fixed_motion, near_motion
-from .replanning import Replanner
+from .proofs.blocked import blocked
+from .proofs.durations import Durations, durations
 from .result import Plan
-from .robots import for_robots, judged
-from .search import Search
-from .start import deviation_from
-from .status import MotionStatus
+from .search.homotopy import from_easier
+from .search.refinement import refine
+from .search.relaxations import near_fixed_motion, near_motion
+from .search.replanning import Replanner
+from .search.search import Search
+from .search.start import deviation_from
+from .search.time_law import BOUND, fastest
+from .search.uncertain_robots import for_robots, judged
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
 from .tasks.initial import Initial
@@ -52,10 +53,9 @@ from .tasks.lay_out import lay_out
 from .tasks.measured import Measured, initial_of
 from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
+from .tasks.status import MotionStatus
 from .tasks.task import Task, read_task
-from .time_law import BOUND, fastest
 from .timing.timing import Timing
-from .violation import relative_violation
 
 LEAST_SHARE = 1e-9  # of robots that must keep their limits, or that need not
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try

@@ -11,31 +11,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..display import Displayed, Fact, tensions_over_time
-from ..inputs import check_ending, file_path
-from ..netcdf import save_netcdf
+from ..base.display import Displayed, Fact, tensions_over_time
+from ..base.inputs import check_ending, file_path
+from ..base.netcdf import save_netcdf
+from ..base.writing import whole_file
 from ..solvers import Certificate
-from ..writing import whole_file
 from .audits.audit import Audit
 from .audits.infeasible_spans import infeasible_spans
-from .phase_summary import PhaseSummary, summaries
-from .stage import Stage
-from .status import MotionStatus
+from .audits.phase_summary import PhaseSummary, summaries
+from .audits.waypoint_distance import WaypointDistance, waypoint_distance
+from .search.stage import Stage
 from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
+from .tasks.status import MotionStatus
 from .warnings.inside_bodies import into_places
 from .warnings.instants import Instants
 from .warnings.leaves_its_points import leaves_its_points
 from .warnings.warnings import warnings
-from .waypoint_distance import WaypointDistance, waypoint_distance
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from ..robust import RobotShare
-    from .robots import RobustMargin
+    from ..statics.robust import RobotShare
+    from .search.uncertain_robots import RobustMargin
 
 __all__ = ["Plan", "Relaxed"]
 
@@ -221,7 +221,7 @@ class Plan(Displayed):
         InputError
             If an argument is wrong, or the robot has no uncertainty.
         """
-        from ..robust import share_of_robots
+        from ..statics.robust import share_of_robots
 
         audit, scenario = self.audit, self.scenario
         rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.inputs import shown
 from ..control import ANSWERS, Command
-from ..errors import InputError
-from ..inputs import shown
 from ..models.robot import Robot
 
 __all__ = ["check_command"]

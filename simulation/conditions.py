@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..base.display import record
 from ..control import Reference
-from ..display import record
 from .faults import Fault
 from .noise import Noise
 

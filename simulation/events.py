@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..text import quantity
+from ..base.text import quantity
 
 if TYPE_CHECKING:
     from .flight import Flight

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..errors import InputError
-from ..inputs import shown
+from ..base.errors import InputError
+from ..base.inputs import shown
 from ..models.robot import Robot
 
 __all__ = ["Fault", "read_faults"]

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.display import Displayed, Fact, tensions_over_time
+from ..base.inputs import check_ending, file_path
+from ..base.netcdf import Contents, Variable, save_netcdf
+from ..base.text import quantity
 from ..control import ANSWERS, Reference
 from ..control.command import OTHERWISE
-from ..display import Displayed, Fact, tensions_over_time
-from ..inputs import check_ending, file_path
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
-from ..netcdf import Contents, Variable, save_netcdf
-from ..text import quantity
 from .conditions import Conditions
 from .events import events, sentence
 from .record import Record

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.inputs import check_ending, file_path
+from ..base.netcdf import Contents, Variable, save_netcdf
+from ..base.text import quantity
 from ..control import ANSWERS, Controller
-from ..errors import InputError
-from ..inputs import check_ending, file_path
 from ..models.parsing import parse_yaml, to_yaml
-from ..models.plant import Plant
 from ..models.robot import Robot
-from ..netcdf import Contents, Variable, save_netcdf
-from ..text import quantity
+from ..plant import Plant
 from .conditions import Conditions
 from .extremes import Extremes
 from .flight import TENSION_TOLERANCE

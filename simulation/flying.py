@@ -11,8 +11,8 @@ import numpy as np
 
 from ..control import Command, Controller, Reference, State
 from ..control.command import HOLD
-from ..models.plant import Plant
-from ..models.plant.periods import Periods
+from ..plant import Plant
+from ..plant.periods import Periods
 from .checking import check_command
 from .conditions import Conditions
 from .machine import sense_rows

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from ..base.machine_code.kernel import GIVEN, Kernel, compile_function
 from ..control.machine import mechanics
-from ..kernel import GIVEN, Kernel, compile_function
-from ..models.plant import machine
-from ..models.plant.machine import joined, run_rows
+from ..plant import machine
+from ..plant.machine import joined, run_rows
 
 __all__ = ["prepare", "sense_rows", "write_lengths"]
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.errors import InputError
 from ..control import Command
-from ..errors import InputError
-from ..models.plant import Plant, layout
+from ..plant import Plant, layout
 from .conditions import Conditions, Wind
 from .machine import write_lengths
 

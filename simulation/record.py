@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.display import Displayed
 from ..control import ANSWERS
-from ..display import Displayed
 from ..models.robot import Robot
 from .recorder import Period
 

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import __version__
-from ..checkpoint import ACCEPTED, Checkpoint, Kind, open_checkpoint
+from ..base.checkpoint import ACCEPTED, Checkpoint, Kind, open_checkpoint
+from ..base.errors import InputError
+from ..base.execution import start_workers
+from ..base.version import __version__
 from ..control import Controller
-from ..errors import InputError
-from ..execution import start_workers
-from ..models.plant import Plant
+from ..plant import Plant
 from .conditions import Conditions, Wind
 from .flights import FIGURES, copies, fly_block, passed
 from .identity import identity

@@ -4,20 +4,9 @@ import math
 
 import numpy as np
 
-from ..models.plant.bodies import place_bodies
-from ..models.plant.layout import (
-    BODY,
-    BODY_WORK,
-    CABLE_WORK,
-    CARRIER,
-    COMMANDS,
-    L_RATE,
-    OMEGA,
-    RATE,
-    VELOCITY,
-    L,
-)
-from ..models.plant.lines import run_cables
+from ..plant.bodies import place_bodies
+from ..plant.layout import BODY, BODY_WORK, CABLE_WORK, CARRIER, COMMANDS, L_RATE, OMEGA, RATE, VELOCITY, L
+from ..plant.lines import run_cables
 
 
 def sense_rows(bodies, cables, com, states, motions, lengths):

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.execution import check_workers
+from ..base.inputs import file_path, finite_array, flag, number, shown, whole_number
 from ..control import ComputedTorque, Controller, Reference
-from ..errors import InputError
-from ..execution import check_workers
-from ..inputs import file_path, finite_array, flag, number, shown, whole_number
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
 from ..models.parsing import validate
-from ..models.plant import Plant
 from ..models.robot import Robot
+from ..plant import Plant
 from ..solvers import solve_batch
 from .conditions import Conditions
 from .faults import read_faults

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..models.dynamics import dynamics_of
 from ..models.part import inertia_matrix
-from ..models.plant import Plant, layout
+from ..plant import Plant, layout
 
 __all__ = ["steps_in"]
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..inputs import file_path, number, real_array, shown
+from ..base.errors import InputError
+from ..base.inputs import file_path, number, real_array, shown
+from ..base.netcdf import check_units, load_netcdf
 from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
-from ..netcdf import check_units, load_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from ..errors import InputError
-from ..inputs import shown
+from ..base.errors import InputError
+from ..base.inputs import shown
 from ..models import air
 from ..models.robot import Robot
 from .conditions import Wind

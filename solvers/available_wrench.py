@@ -13,7 +13,7 @@ from math import comb
 
 import numpy as np
 
-from ..display import Displayed
+from ..base.display import Displayed
 
 RANK = 1e-9  # relative: directions that the cables hardly reach are none; twelve-digit geometry makes such
 

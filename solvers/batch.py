@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import processors
-from ..display import Displayed, Fact
-from ..errors import InputError
-from ..inputs import number, real_array, shown, whole_number
-from ..text import quantity
+from ..base import processors
+from ..base.display import Displayed, Fact
+from ..base.errors import InputError
+from ..base.inputs import number, real_array, shown, whole_number
+from ..base.text import quantity
 from . import compiled
 from .core import CABLES, ROWS, solve_rows
 from .kernels.codes import INACCURATE, INVALID, OPTIMAL, UNSURE

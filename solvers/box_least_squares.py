@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import RANK
+from ..base.tolerances import RANK
 from .problem import Array, TensionProblem
 
 # Rounding of a gradient entry, relative to the sum of the absolute terms in it.

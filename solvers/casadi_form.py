@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from ..inputs import shown, whole_number
+from ..base.errors import InputError
+from ..base.inputs import shown, whole_number
 from .derivatives import derivatives
 from .problem import TensionProblem
 from .solve import solve

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..display import Displayed, Fact
-from ..inputs import finite_array, required
-from ..text import quantity
-from ..tolerances import NEGLIGIBLE, ORTHOGONAL, RANK
+from ..base.display import Displayed, Fact
+from ..base.inputs import finite_array, required
+from ..base.text import quantity
+from ..base.tolerances import NEGLIGIBLE, ORTHOGONAL, RANK
 from .box_least_squares import Projection, project
 from .exact_arithmetic import exact_optimum
 from .problem import Array, TensionProblem, accepted_error

@@ -21,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import simd, tolerances
-from ..display import Displayed
-from ..writing import whole_file
+from ..base import tolerances
+from ..base.display import Displayed
+from ..base.machine_code import simd
+from ..base.writing import whole_file
 from .kernels import rows
 
 COMPILED, INTERPRETED = "compiled", "interpreted"  # what `solution.backend` reports
@@ -109,7 +110,7 @@ def _lose(seconds: float) -> None:
 
 def _compile() -> Kernels:
     """Hand copies of the marked functions to Numba; the plain ones stay as they are."""
-    from .. import simd_llvm
+    from ..base.machine_code import simd_llvm
 
     spaces = [dict(vars(import_module(f"{__package__}.kernels.{name}"))) for name in _MODULES]
     machine: dict[Any, Any] = {

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..inputs import required
+from ..base.errors import InputError
+from ..base.inputs import required
 from .problem import TensionProblem
 from .solution import TensionSolution
 

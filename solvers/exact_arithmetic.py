@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..tolerances import FEASIBILITY
+from ..base.tolerances import FEASIBILITY
 from .problem import Array, TensionProblem, accepted_error
 
 # Relative error of the wrench at an optimum where the cost is proportional to the wrench: 1e-22, far below rounding.

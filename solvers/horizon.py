@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..display import Displayed, record
-from ..errors import InputError
-from ..inputs import number, shown, whole_number
+from ..base.display import Displayed, record
+from ..base.errors import InputError
+from ..base.inputs import number, shown, whole_number
 from .stage_problem import Array, StageProblem
 from .stages import layout, machine
 from .stages.sizes import padded, places

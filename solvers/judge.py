@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..tolerances import AT_LIMIT, RANK
+from ..base.tolerances import AT_LIMIT, RANK
 from .box_least_squares import Projection, project
 from .certificate import Certificate, sharpest
 from .exact_arithmetic import exact_optimum

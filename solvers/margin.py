@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..display import record
-from ..inputs import required
-from ..tolerances import NEGLIGIBLE, OPTIMALITY, RANK
+from ..base.display import record
+from ..base.inputs import required
+from ..base.tolerances import NEGLIGIBLE, OPTIMALITY, RANK
 from .box_least_squares import Projection, project
 from .certificate import certificate_along
 from .exact_arithmetic import exact_optimum

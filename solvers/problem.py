@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import real_array
-from ..tolerances import CANCELLED, DOUBTFUL, FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import real_array
+from ..base.tolerances import CANCELLED, DOUBTFUL, FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 __all__ = ["Array", "TensionProblem", "accepted_error"]
 

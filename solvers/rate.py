@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from ..inputs import real_array, required, shown
+from ..base.errors import InputError
+from ..base.inputs import real_array, required, shown
 from .problem import TensionProblem
 
 __all__ = ["limit_rate"]

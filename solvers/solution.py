@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..display import BLUE, GREY, ORANGE, Curve, Displayed, Fact, picture
-from ..errors import SolverError
-from ..text import quantity, quantity_range, quantity_row
+from ..base.display import BLUE, GREY, ORANGE, Curve, Displayed, Fact, picture
+from ..base.errors import SolverError
+from ..base.text import quantity, quantity_range, quantity_row
 from .certificate import Certificate
 from .problem import Array, TensionProblem
 from .status import Status

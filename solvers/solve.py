@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import shown
+from ..base.errors import InputError
+from ..base.inputs import shown
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
 from .core import CABLES, ROWS, solve_packed

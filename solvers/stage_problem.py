@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import finite_array, real_array
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import finite_array, real_array
 
 __all__ = ["Array", "StageProblem"]
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..display import record
-from ..tolerances import AT_LIMIT, DOUBTFUL, OPTIMALITY, RANK
+from ..base.display import record
+from ..base.tolerances import AT_LIMIT, DOUBTFUL, OPTIMALITY, RANK
 from .box_least_squares import box_least_squares
 from .kernels.codes import DECISIVE, SLACK
 from .problem import Array, TensionProblem

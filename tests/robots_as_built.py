@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from towline.calibration import Measurements
+from towline.estimation.calibration import Measurements
 from towline.models import Dynamics, Robot, load
 
 ANCHORS, OFFSETS, NOISE = 0.02, 0.05, 1e-3  # [m], standard deviations

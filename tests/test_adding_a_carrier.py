@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from towline import Task, load, plan
-from towline.errors import InputError
+from towline.base.errors import InputError
+from towline.export.mjcf import to_mjcf
 from towline.models import carriers
 from towline.models.carriers import Carrier, GroundCarrier
-from towline.models.mjcf import to_mjcf
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.models.robot import Robot
 from towline.models.schema import json_schema

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from towline import Task
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp.audits.audit import audit

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline.calibration.geometry import runs
 from towline.control import ComputedTorque, Reference, State
-from towline.embedded.mechanics import mechanics
+from towline.estimation.calibration.geometry import runs
+from towline.export.step.mechanics import mechanics
 from towline.models import Dynamics, Robot, load, points, pose_from_lengths, rotation
 from towline.models.batch import compiled
 from towline.models.part import inertia_matrix
-from towline.models.plant import Plant, layout
 from towline.models.sensitivity import wrench_matrices
 from towline.ocp.tasks.scenario import _pose_in
+from towline.plant import Plant, layout
 from towline.simulation import sensors
 from towline.simulation.machine import sense_rows
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from towline.base.errors import InputError
 from towline.benchmarks import planning, tension
 from towline.benchmarks.qp_solver import multipliers, register, solve_problem
 from towline.benchmarks.tension_contenders import REFERENCE, Contender, contenders
 from towline.benchmarks.tension_tasks import KINDS, make_task
 from towline.cli.bench import results_alone
-from towline.errors import InputError
 from towline.solvers import certify
 
 from . import warm

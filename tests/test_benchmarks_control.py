@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from towline.base.errors import InputError
 from towline.benchmarks.control import run
 from towline.benchmarks.control_contenders import (
     CONTENDERS,
@@ -21,7 +22,6 @@ from towline.benchmarks.control_tasks import TASKS, Task, record
 from towline.benchmarks.predictive_steps import Checked, fly_random
 from towline.cli.bench import app
 from towline.control import Predictive
-from towline.errors import InputError
 from towline.models import load
 from towline.simulation import simulate
 from towline.solvers import StageProblem

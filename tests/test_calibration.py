@@ -9,18 +9,18 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 
-from towline.calibration import Measurements, calibrate, next_poses
-from towline.calibration.clock import begin_with_clock
-from towline.calibration.model import Model, State
-from towline.calibration.normal_equations import metric
-from towline.calibration.parameters import OF_CABLE, Parameters
-from towline.calibration.pose_track import PoseTrack
-from towline.calibration.rotations import from_vectors
-from towline.calibration.run import length_of, model_of
-from towline.errors import InputError
+from towline.base.errors import InputError
+from towline.estimation.calibration import Measurements, calibrate, next_poses
+from towline.estimation.calibration.clock import begin_with_clock
+from towline.estimation.calibration.model import Model, State
+from towline.estimation.calibration.normal_equations import metric
+from towline.estimation.calibration.parameters import OF_CABLE, Parameters
+from towline.estimation.calibration.pose_track import PoseTrack
+from towline.estimation.calibration.rotations import from_vectors
+from towline.estimation.calibration.run import length_of, model_of
+from towline.estimation.pose import machine
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
-from towline.models.forward_kinematics import machine
 from towline.models.rotation import rotation
 
 from .robots_as_built import NOISE, as_built, random_poses, rigidly_aligned
@@ -553,7 +553,7 @@ def test_too_few_samples_are_refused():
 def test_rotations_and_points_agree():
     angles = np.random.default_rng(0).uniform(-1.5, 1.5, (50, 3))
     R = points.rotations(angles)
-    from towline.calibration.rotations import from_quaternions, quaternions_of, vectors_of
+    from towline.estimation.calibration.rotations import from_quaternions, quaternions_of, vectors_of
 
     np.testing.assert_allclose(points.angles(R), angles, atol=1e-12)
     np.testing.assert_allclose(from_quaternions(quaternions_of(R)), R, atol=1e-12)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from towline.calibration import Measurements, calibrate, starts
-from towline.calibration.curvature import curvature
-from towline.calibration.fit import fit
-from towline.calibration.parameters import OF_CABLE
-from towline.calibration.run import length_of, model_of
+from towline.estimation.calibration import Measurements, calibrate, starts
+from towline.estimation.calibration.curvature import curvature
+from towline.estimation.calibration.fit import fit
+from towline.estimation.calibration.parameters import OF_CABLE
+from towline.estimation.calibration.run import length_of, model_of
 from towline.models import Dynamics, load
 
 from .robots_as_built import as_built, moved_anchors

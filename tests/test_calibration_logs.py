@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from towline import load
-from towline.calibration import Measurements, read_measurements
-from towline.errors import InputError
+from towline.base.errors import InputError
+from towline.estimation.calibration import Measurements, read_measurements
 from towline.models import points
 from towline.ocp.tasks.paths.point_file import read_points
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline.calibration import Measurements, calibrate, plausibility
-from towline.calibration.plausibility import doubt
-from towline.errors import InputError
+from towline.base.errors import InputError
+from towline.estimation.calibration import Measurements, calibrate, plausibility
+from towline.estimation.calibration.plausibility import doubt
 from towline.models import Dynamics, load, points
 
 from .robots_as_built import as_built, moved_anchors, random_poses

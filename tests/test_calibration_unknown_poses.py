@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline import load
-from towline.calibration import Measurements, calibrate, read_measurements
+from towline.estimation.calibration import Measurements, calibrate, read_measurements
 from towline.models import Dynamics
 
 from .robots_as_built import NOISE, moved_anchors

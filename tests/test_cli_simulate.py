@@ -9,10 +9,10 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from towline import plan
+from towline.base.errors import InputError
 from towline.cli import stopping
 from towline.cli.main import app
 from towline.cli.resuming import resumable
-from towline.errors import InputError
 from towline.simulation.flights import report
 
 from .warm import towline as run

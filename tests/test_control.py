@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from towline.base.errors import InputError
 from towline.benchmarks.control_steps import random_steps
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State, mechanics
 from towline.control.computed_torque import reach_of
 from towline.control.reaction import write_columns
 from towline.control.tension_loop import TensionLoop
-from towline.distribution import tensions as distribute
-from towline.errors import InputError
 from towline.models import Dynamics, load
-from towline.models.plant import Plant, layout
-from towline.models.plant.bodies import place_bodies
-from towline.models.plant.lines import run_cables
+from towline.plant import Plant, layout
+from towline.plant.bodies import place_bodies
+from towline.plant.lines import run_cables
 from towline.simulation import simulate
 from towline.solvers import TensionProblem, solve
+from towline.statics.distribution import tensions as distribute
 
 ROBOTS = ["cogiro", "wang-flying", "caroca-pulleys", "planar-4", "wang-ctmrts-6", "multi-quadrotor-4", "flycrane"]
 

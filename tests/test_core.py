@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from towline import Dynamics, load, tolerances
+from towline import Dynamics, load
+from towline.base import tolerances
 from towline.benchmarks.exactness import awkward_problem, optimality_error
 from towline.solvers import TensionProblem, certify, solve
 from towline.solvers import core as extension

@@ -12,8 +12,8 @@ import pytest
 import xarray as xr
 
 from towline import InputError, load, read_measurements, simulate
-from towline.declared import check_hdf5
-from towline.netcdf import load_netcdf
+from towline.base.declared import check_hdf5
+from towline.base.netcdf import load_netcdf
 from towline.viewer import read
 from towline.workspace import StaticEquilibrium, sample, save
 

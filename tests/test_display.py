@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import towline
-from towline import Dynamics, Planner, TensionProblem, display, load, plan, simulate, solve, solve_batch, tensions
-from towline.display import picture
+from towline import Dynamics, Planner, TensionProblem, load, plan, simulate, solve, solve_batch, tensions
+from towline.base import display
+from towline.base.display import picture
 from towline.models import pose_from_lengths
 
 from .robots_as_built import as_built

@@ -13,9 +13,9 @@ from towline.benchmarks import step as benchmark
 from towline.benchmarks import step_size
 from towline.benchmarks.step_code import FLAGS, States, StepCode
 from towline.benchmarks.step_states import random_states
-from towline.embedded.costs import costs
-from towline.embedded.export import step_files
-from towline.embedded.mechanics import mechanics, moving_carriers
+from towline.export.step.costs import costs
+from towline.export.step.export import step_files
+from towline.export.step.mechanics import mechanics, moving_carriers
 from towline.models import Dynamics
 from towline.models.tape_c import operations
 from towline.solvers.status import STATUSES

@@ -7,9 +7,9 @@ import pytest
 
 import towline
 from towline import TensionProblem, load, solve, tensions
+from towline.base.errors import InputError
 from towline.benchmarks.step_code import FLAGS
 from towline.benchmarks.step_states import random_states
-from towline.errors import InputError
 from towline.models import Dynamics
 from towline.solvers import limit_rate
 

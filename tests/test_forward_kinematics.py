@@ -11,12 +11,13 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, ncx2
 
 from towline import InputError, Robot, load, solve_batch
-from towline.models import PoseTracker, branches, points, pose_from_lengths, statics
+from towline.estimation.pose import descent, machine
+from towline.estimation.pose.estimate import gradient, moved
+from towline.estimation.pose.trigonometry import angle, cosine_and_sine
+from towline.models import PoseTracker, branches, points, pose_from_lengths
 from towline.models.dynamics import dynamics_of
-from towline.models.forward_kinematics import descent, machine
-from towline.models.forward_kinematics.estimate import gradient, moved
-from towline.models.forward_kinematics.trigonometry import angle, cosine_and_sine
-from towline.models.statics import equilibria
+from towline.statics import equilibria as statics
+from towline.statics.equilibria import equilibria
 
 FIVE = ["ipanema-1", "cogiro", "wang-flying", "caroca-pulleys", "nist-robocrane"]
 
@@ -154,7 +155,7 @@ def test_numpy_and_machine_code_agree():
     robot = load("caroca-pulleys")
     poses = poses_of_workspace(robot, 50, seed=8)
     lengths = dynamics_of(robot).cable_lengths(poses).ravel()
-    from towline.models.forward_kinematics.problem import problem_of
+    from towline.estimation.pose.problem import problem_of
 
     problem = problem_of(robot)
     results = []
@@ -441,8 +442,8 @@ def test_wrong_input_is_one_line(change, message):
 @pytest.mark.parametrize("name", ["caroca-pulleys", "cogiro", "planar-4"])
 def test_the_curvature_is_that_of_the_lengths(name):
     """The kernel's second derivative, against differences of the gradient over small turns and displacements."""
-    from towline.models.forward_kinematics import curvature, lengths
-    from towline.models.forward_kinematics.problem import problem_of
+    from towline.estimation.pose import curvature, lengths
+    from towline.estimation.pose.problem import problem_of
 
     robot, rng = load(name), np.random.default_rng(12)
     pose = robot.home + 0.1 * rng.uniform(-1, 1, 6) * robot.dof_mask
@@ -497,7 +498,7 @@ def test_rests_take_a_few_newton_steps(monkeypatch):
 @pytest.mark.parametrize(("name", "most"), [("cogiro", 3.3), ("ipanema-1", 6.0)])
 def test_noise_costs_few_steps(name, most):
     """About the home of ipanema-1 the matrix of Gauss and Newton alone takes ten steps."""
-    from towline.models.forward_kinematics.problem import problem_of
+    from towline.estimation.pose.problem import problem_of
 
     robot, rng = load(name), np.random.default_rng(13)
     problem, m, count = problem_of(robot), robot.m, 400

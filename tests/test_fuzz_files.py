@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Robot, load
 from towline.models.caspr import read_caspr
 from towline.models.diagnosis import diagnose

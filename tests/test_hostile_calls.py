@@ -21,13 +21,13 @@ from pydantic import BaseModel
 
 import towline
 from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along, viewer
-from towline.calibration import Calibration, Measurements, calibrate
+from towline.base.inputs import printable
 from towline.control import ComputedTorque, Predictive, Reference, State
-from towline.inputs import printable
+from towline.estimation.calibration import Calibration, Measurements, calibrate
 from towline.models import RelativeDynamics
 from towline.models.uncertainty import Uncertainty
-from towline.robust import Spread
 from towline.solvers import Horizon, StageProblem, solve_horizon
+from towline.statics.robust import Spread
 from towline.workspace import Places, Region, StaticEquilibrium, sample
 
 PACKAGES = (
@@ -35,12 +35,12 @@ PACKAGES = (
     "towline.models",
     "towline.solvers",
     "towline.workspace",
-    "towline.calibration",
+    "towline.estimation.calibration",
     "towline.ocp",
     "towline.control",
     "towline.simulation",
     "towline.viewer",
-    "towline.robust",
+    "towline.statics.robust",
 )
 EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long

@@ -159,7 +159,7 @@ def test_an_interrupt_that_a_library_swallows_ends_the_command_all_the_same(tmp_
     code = (
         "import time, pathlib\n"
         "from towline.cli import stopping\n"
-        "from towline.writing import whole_file\n"
+        "from towline.base.writing import whole_file\n"
         "stopping.listen()\n"
         "with whole_file(pathlib.Path('half')) as temporary:\n"
         "    temporary.write_text('half')\n"
@@ -279,7 +279,7 @@ def test_sigterm_leaves_nothing_half_written(tmp_path):
     code = (
         "import time, pathlib\n"
         "from towline.cli import stopping\n"
-        "from towline.writing import whole_file\n"
+        "from towline.base.writing import whole_file\n"
         "stopping.listen()\n"
         "with whole_file(pathlib.Path('new/half')) as temporary:\n"
         "    temporary.write_text('half')\n"

@@ -16,7 +16,7 @@ from towline.control import (
     thrusts,
 )
 from towline.models import load
-from towline.models.plant import periods, plant, rows
+from towline.plant import periods, plant, rows
 from towline.simulation import flying, orders, sensors, simulate, winding
 
 PLAIN = [

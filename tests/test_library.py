@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from towline.distribution import pose_problem
 from towline.models import Dynamics, Robot, available, load
 from towline.models.caspr import read_caspr
 from towline.models.diagnosis import diagnose
 from towline.models.library import FOLDER
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.solvers import TensionProblem, solve
+from towline.statics.distribution import pose_problem
 
 from .caspr_xml import REAL
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.solvers import TensionProblem, capacity_margin, casadi_function, sensitivity, solve
 from towline.solvers.derivatives import derivatives
 

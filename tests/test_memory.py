@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import towline
-from towline.calibration import Measurements
+from towline.estimation.calibration import Measurements
 from towline.viewer import read
 from towline.workspace import StaticEquilibrium
 

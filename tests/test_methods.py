@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from towline.base.errors import InputError
 from towline.benchmarks.continuity import JUMP, KINDS, SMOOTH, Motion, continuity, leaving, smoothness
 from towline.benchmarks.exactness import awkward_problem
-from towline.errors import InputError
 from towline.solvers import TensionProblem, capacity_margin, certify, limit_rate, methods, solve
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import null_space
 
 import towline
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, load
 from towline.solvers import TensionProblem, solve
 

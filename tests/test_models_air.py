@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import air
 
 TIMES = np.linspace(0, 10, 1001)

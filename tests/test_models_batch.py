@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import mutually_broadcastable_shapes
 
-from towline import kernel
-from towline.errors import InputError, SolverError
+from towline.base.errors import InputError, SolverError
+from towline.base.machine_code import kernel
 from towline.models import Dynamics, available, batch, load, tape
 
 from . import warm

@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.cables import ElementChain, elastic
 from towline.models.cables.driving_force import driving_force

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models.batch import call
 from towline.models.cables import LumpedChain, exit_points, hang, pulley_motion
 

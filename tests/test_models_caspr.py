@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.caspr import read_caspr
 from towline.models.parsing import parse_yaml, to_yaml

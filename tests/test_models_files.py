@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Robot, available, load
 from towline.models.diagnosis import diagnose
 from towline.models.library import FOLDER, contents

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
-from towline.models.statics import equilibria
+from towline.statics.equilibria import equilibria
 
 GRAVITY = 9.81
 

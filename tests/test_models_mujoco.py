@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline.errors import InputError
+from towline.base.errors import InputError
+from towline.export.mjcf import to_mjcf
 from towline.models import Dynamics, Robot, available, load
-from towline.models.mjcf import to_mjcf
 from towline.models.part import COORDINATES
 from towline.models.robot import Pulley
 

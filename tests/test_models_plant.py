@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, Robot, SolverError, load
-from towline.errors import InputError
-from towline.models.plant import Plant, layout
-from towline.models.plant.bodies import place_bodies
-from towline.models.plant.lines import run_cables
+from towline.base.errors import InputError
 from towline.models.points import rotations
+from towline.plant import Plant, layout
+from towline.plant.bodies import place_bodies
+from towline.plant.lines import run_cables
 
 G = 9.81
 

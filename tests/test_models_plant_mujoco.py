@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline import Dynamics, load
-from towline.models.mjcf import to_mjcf
-from towline.models.plant import Plant
+from towline.export.mjcf import to_mjcf
+from towline.plant import Plant
 
 mujoco = pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from towline import Robot, load
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Uncertainty
 
 NAMES = ["cables[0].anchor.x", "cables[3].attachment.z", "cables[1].pulley.radius"]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, Robot, load, tensions
-from towline.calibration import next_poses
-from towline.calibration.run import length_of
 from towline.control import Predictive
-from towline.distribution import pose_problem
+from towline.estimation.calibration import next_poses
+from towline.estimation.calibration.run import length_of
 from towline.models import points
 from towline.models.diagnosis import diagnose
 from towline.solvers import capacity_margin
+from towline.statics.distribution import pose_problem
 
 AWAY = np.array([120.0, -40.0, 65.0])
 

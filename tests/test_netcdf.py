@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from towline.errors import InputError
-from towline.netcdf import Contents, Variable, load_netcdf, save_netcdf
+from towline.base.errors import InputError
+from towline.base.netcdf import Contents, Variable, load_netcdf, save_netcdf
 
 CONTENTS = Contents(
     {
@@ -58,7 +58,7 @@ def test_saving_loads_no_ecosystem(tmp_path):
     """Xarray, pandas and dask cost a second each, and more than the file does."""
     code = f"""
 import sys, numpy, pathlib
-from towline.netcdf import Contents, Variable, save_netcdf
+from towline.base.netcdf import Contents, Variable, save_netcdf
 save_netcdf(Contents({{"x": Variable(("row",), numpy.ones(3))}}, {{}}, {{}}), pathlib.Path({str(tmp_path / "x.nc")!r}))
 print(*sys.modules)
 """

@@ -8,17 +8,18 @@ import pytest
 import xarray as xr
 from scipy.optimize import linprog, lsq_linear
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
-from towline.models.statics import equilibria
-from towline.ocp import MotionStatus, Task, plan, read_task, search
+from towline.ocp import MotionStatus, Task, plan, read_task
 from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
+from towline.ocp.audits.violation import relative_violation
+from towline.ocp.search.search import search
 from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.paths import CirclePath, LinePath, RestPath, SamplePath, WaypointPath
-from towline.ocp.violation import relative_violation
+from towline.statics.equilibria import equilibria
 
 GRAVITY = 9.81
 HOVER = [50, 50, 100, 0, 0, 0]

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag
 from scipy.optimize import linprog
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.audit import audit

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import load
 from towline.ocp import Planner, plan
 from towline.ocp.nlp.program import build

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import load
 from towline.ocp import MotionStatus, plan
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from towline.distribution import pose_problem
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan, time_along
-from towline.ocp.cost import cost
-from towline.ocp.durations import durations
-from towline.ocp.start import deviation_from
+from towline.ocp.audits.cost import cost
+from towline.ocp.proofs.durations import durations
+from towline.ocp.search.search.start import deviation_from
+from towline.ocp.search.search.time_law import fastest
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
-from towline.ocp.time_law import fastest
 from towline.solvers import capacity_margin
+from towline.statics.distribution import pose_problem
 
 GRAVITY = 9.81
 LINE = {"kind": "line", "start": [0, 0, 2], "end": [1, 1, 2.5]}

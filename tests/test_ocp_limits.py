@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import plan, read_task

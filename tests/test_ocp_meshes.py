@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import load
 from towline.models.parsing import to_yaml
 from towline.ocp import plan, read_task

@@ -2,7 +2,7 @@
 
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.ocp import read_task
 
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}

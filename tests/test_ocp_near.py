@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from towline import load, plan
-from towline.ocp import search
 from towline.ocp.nlp.guess import initial_guess, usual_guess
 from towline.ocp.nlp.linear import LinearDistances
 from towline.ocp.nlp.near import Near, is_local
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.planner import Planner
+from towline.ocp.search.search import search
 
 PLATFORM = {"platform": 0.05, "cables": None, "carriers": None}
 BALL = {"kind": "sphere", "name": "ball", "centre": [0.32, 0.12, 1.2], "radius": 0.25, **PLATFORM}

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline import load
-from towline.ocp.blocked import blocked
 from towline.ocp.planner import Planner
+from towline.ocp.proofs.blocked import blocked
 
 TURN = 0.3
 ROBOTS = ("cogiro", "caroca", "wang-flying")

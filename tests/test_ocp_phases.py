@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from towline import time_along
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.figures.plan import tensions
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from towline.base.errors import InputError
 from towline.benchmarks.replanning import CIRCLE, RATE, fly
 from towline.control import State
-from towline.errors import InputError
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, Planner, Task, plan
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Robot, load
 from towline.ocp import plan
 from towline.ocp.audits.audit import audit

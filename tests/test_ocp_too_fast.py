@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
+from towline.ocp.proofs.too_fast import too_fast
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
-from towline.ocp.too_fast import too_fast
 
 ROBOT = load("ipanema-1")
 TIMES = np.linspace(0.0, 2.0, 41)

@@ -4,7 +4,7 @@ import pytest
 
 from towline.models import Robot, load
 from towline.ocp import MotionStatus, plan
-from towline.ocp.blocked import blocked
+from towline.ocp.proofs.blocked import blocked
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 

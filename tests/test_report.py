@@ -13,8 +13,8 @@ from matplotlib.colors import to_hex
 from PIL import Image
 from rich.console import Console
 
+from towline.base.errors import InputError, TowlineError
 from towline.cli.watching import watching
-from towline.errors import InputError, TowlineError
 from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
 from towline.figures.style import typeset

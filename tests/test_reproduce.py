@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline.errors import SolverError
+from towline.base.errors import SolverError
 from towline.figures import style
 from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load

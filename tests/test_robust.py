@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, Planner, Robot, load, plan, time_along
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Uncertainty
 from towline.models.sensitivity import derivatives, wrench_matrices
-from towline.robust import _inverse, ellipsoid_factor, motion_factor, share_of_robots, spread
+from towline.statics.robust import _inverse, ellipsoid_factor, motion_factor, share_of_robots, spread
 
 from .warm import towline
 

@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import linprog
 
 from towline import load, plan
+from towline.base.errors import InputError
 from towline.control import Command, ComputedTorque, Controller, State
-from towline.errors import InputError
 from towline.models import Dynamics, Robot
-from towline.models.plant import Plant
-from towline.models.plant.periods import Periods
 from towline.ocp import Task
+from towline.plant import Plant
+from towline.plant.periods import Periods
 from towline.simulation import simulate
 from towline.simulation.machine import sense_rows, write_lengths
 from towline.simulation.steps import steps_in

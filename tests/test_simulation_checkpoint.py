@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from towline import load, simulate
+from towline.base.errors import InputError
 from towline.control import ComputedTorque
-from towline.errors import InputError
 from towline.simulation import runs as simulation_runs
 from towline.simulation.flights import save
 

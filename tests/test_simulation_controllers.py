@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from towline import load, simulate
+from towline.base.errors import InputError
 from towline.control import ANSWERS, Command, ComputedTorque, Controller, Predictive
-from towline.errors import InputError
 from towline.simulation.flights import save
 
 ROBOT = load("wang-flying")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.solvers import Status, TensionProblem, certify, methods, solve, solve_batch
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible, random_tensions

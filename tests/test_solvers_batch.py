@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from towline.base.errors import InputError, SolverError
 from towline.benchmarks.exactness import awkward_problem, check
-from towline.errors import InputError, SolverError
 from towline.solvers import Status, TensionProblem, certify, solve, solve_batch
 from towline.solvers.core import CABLES
 

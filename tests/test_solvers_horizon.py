@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.solvers import Horizon, HorizonSolution, StageProblem, solve_horizon
 
 TOLERANCE = 1e-8

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.solvers import (
     TensionProblem,
     capacity_margin,

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline import tolerances
-from towline.errors import InputError
+from towline.base import tolerances
+from towline.base.errors import InputError
 from towline.solvers import Status, TensionProblem, compiled, solve
 from towline.solvers import solve_batch as solve_by_core_or_lanes
 
@@ -30,7 +30,7 @@ def arithmetic():
     """Return what computes everything that `simd_llvm` can do with two vectors and a number."""
     import numba
 
-    from towline.simd_llvm import load, magnitude, maximum, minimum, splat, sqrt, store, where
+    from towline.base.machine_code.simd_llvm import load, magnitude, maximum, minimum, splat, sqrt, store, where
 
     @numba.njit
     def compute(x, y, a, result):

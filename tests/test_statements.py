@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from towline import load, plan, solve, tensions
 from towline.cli.main import app
-from towline.distribution import pose_problem
 from towline.models import Dynamics
 from towline.solvers import methods
+from towline.statics.distribution import pose_problem
 
 ROOT = Path(__file__).parents[1]
 LINE = {"kind": "line", "start": [0, 0, -1], "end": [0.1, 0, -1]}

@@ -16,9 +16,9 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from towline import Robot, Task, load, plan, sweep
-from towline.checkpoint import open_checkpoint
+from towline.base.checkpoint import open_checkpoint
+from towline.base.errors import InputError
 from towline.cli.main import app
-from towline.errors import InputError
 from towline.models.parsing import to_yaml
 from towline.ocp.sweeps import row as row_module
 from towline.ocp.sweeps.axis import read_axes, read_option

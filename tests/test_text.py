@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from towline.text import column, quantity, quantity_range, quantity_row
+from towline.base.text import column, quantity, quantity_range, quantity_row
 
 WRITTEN = [
     (10337.2, "10 340"),

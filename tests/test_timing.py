@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from towline.errors import InputError, SolverError
+from towline.base.errors import InputError, SolverError
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import MotionStatus, Task, plan, time_along

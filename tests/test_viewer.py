@@ -19,7 +19,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 from websockets.datastructures import Headers
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.figures.tension_colours import place, rgb, shades
 from towline.models import Dynamics, load
 from towline.ocp import plan

@@ -16,12 +16,12 @@ import pytest
 import xarray as xr
 from PIL import Image
 
-from towline.distribution import pose_problem
 from towline.figures.tension_colours import place, shades
 from towline.models import Dynamics, load
 from towline.ocp import plan
 from towline.simulation import simulate
 from towline.solvers import solve
+from towline.statics.distribution import pose_problem
 from towline.viewer import read, save_page, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import at_rest

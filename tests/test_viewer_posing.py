@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline.distribution import pose_problem, tensions
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.figures import style
 from towline.models import Dynamics, load
 from towline.solvers import capacity_margin
+from towline.statics.distribution import pose_problem, tensions
 from towline.viewer import read, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest

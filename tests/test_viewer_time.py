@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from PIL import Image
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.figures.animation import timing
 from towline.models import load
 from towline.ocp import plan

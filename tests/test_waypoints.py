@@ -9,7 +9,7 @@ from scipy.interpolate import PPoly, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from towline import load, plan, read_task
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.ocp.tasks.paths import LinePath, WaypointPath
 
 LISTS = 500

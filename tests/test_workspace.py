@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from towline.distribution import pose_problem
 from towline.models import Dynamics, Robot, load
 from towline.solvers import solve
+from towline.statics.distribution import pose_problem
 from towline.workspace import hints
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from towline.checkpoint import begin, open_checkpoint
-from towline.errors import InputError
+from towline.base.checkpoint import begin, open_checkpoint
+from towline.base.errors import InputError
 from towline.models import load
 from towline.solvers import compiled
 from towline.workspace import Condition, StaticEquilibrium, sample, save

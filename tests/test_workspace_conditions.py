@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import linprog, lsq_linear
 from scipy.spatial.transform import Rotation
 
-from towline.distribution import pose_problem
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
-from towline.models.statics import equilibria
 from towline.solvers import capacity_margin, solve
+from towline.statics.distribution import pose_problem
+from towline.statics.equilibria import equilibria
 from towline.workspace import (
     Dynamic,
     EquilibriumPosture,

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from towline import execution
-from towline.errors import InputError
+from towline.base import execution
+from towline.base.errors import InputError
 from towline.models import load
 from towline.workspace import StaticEquilibrium, sample, save
 

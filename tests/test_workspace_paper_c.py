@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from towline.models import Dynamics, Robot
-from towline.models.statics import equilibria
+from towline.statics.equilibria import equilibria
 from towline.studies.towing import workspace as study
 from towline.studies.towing.plans import DRIVES, robot
 from towline.workspace import EquilibriumPosture, ExistsPlacement, ForceBalance, Places

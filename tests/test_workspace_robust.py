@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, load, sample
-from towline.errors import InputError
-from towline.robust import ellipsoid_factor, share_of_robots
+from towline.base.errors import InputError
+from towline.statics.robust import ellipsoid_factor, share_of_robots
 from towline.workspace import (
     Dynamic,
     ExistsPlacement,

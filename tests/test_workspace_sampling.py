@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 from scipy.stats import qmc
 
-from towline import processors
-from towline.errors import InputError
+from towline.base import processors
+from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.workspace import Places, Region, StaticEquilibrium, sample, save
 from towline.workspace.domain import Domain

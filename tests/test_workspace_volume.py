@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from towline.errors import InputError
+from towline.base.errors import InputError
 from towline.figures import workspace as figures
 from towline.models import Robot, load
 from towline.workspace import Places, StaticEquilibrium, WrenchClosure

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from towline.errors import InputError
-from towline.writing import check_writable, remove_unfinished, whole_file, whole_folder
+from towline.base.errors import InputError
+from towline.base.writing import check_writable, remove_unfinished, whole_file, whole_folder
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from ..display import Displayed
-from ..errors import InputError
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.text import quantity
 from ..figures import style
 from ..figures.tension_colours import rgb
-from ..text import quantity
 from .geometry import FARTHEST
 
 MOST_POINTS = 10_000  # more hide the robot among them

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..display import Displayed
+from ..base.display import Displayed
 
 if TYPE_CHECKING:
     from .replay import Replay

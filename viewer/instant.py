@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..display import Displayed
-from ..distribution import pose_problem
+from ..base.display import Displayed
 from ..models import Dynamics
 from ..solvers import Certificate, capacity_margin, solve
+from ..statics.distribution import pose_problem
 from .geometry import Geometry, Points
 
 ARROW = 0.3  # of the robot's size, for a certificate that is all force, and a large shortfall

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError, TowlineError
+from ..base.errors import InputError, TowlineError
 from ..workspace.surface import Surface
 from ..workspace.surface import surface as surface_of
 from . import words

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..errors import InputError, TowlineError
+from ..base.errors import InputError, TowlineError
 from ..models import Dynamics, points
-from ..models.statics import rest_near
+from ..statics.equilibria import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
 from .geometry import Geometry

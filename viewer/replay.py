@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError
-from ..inputs import printable
+from ..base.errors import InputError
+from ..base.inputs import printable
+from ..base.netcdf import check_units
 from ..models import Robot
 from ..models.parsing import parse_yaml
-from ..netcdf import check_units
 from ..ocp import Task
 from ..ocp.audits.by_phase import certified
 from ..ocp.reports.scene import outline

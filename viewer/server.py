@@ -12,11 +12,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
-from ..inputs import file_path, required, shown, whole_number
+from ..base.errors import InputError
+from ..base.inputs import file_path, required, shown, whole_number
+from ..base.quiet import quiet
+from ..base.writing import whole_file
 from ..models import Dynamics
-from ..quiet import quiet
-from ..writing import whole_file
 from .access import guarded
 from .geometry import Geometry
 from .instant import at_rest

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..base.text import quantity
 from ..figures import style
 from ..figures.cut_cables import drawn_ends
 from ..figures.hull import faces
 from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
-from ..text import quantity
 from . import words
 from .geometry import Extent, Geometry
 from .instant import Instant, arrow

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..declared import check_zarr
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import file_path, printable, required, shown
+from ..base.declared import check_zarr
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import file_path, printable, required, shown
+from ..base.netcdf import load_netcdf
 from ..models import Robot, available, load
-from ..netcdf import load_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

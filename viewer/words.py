@@ -9,11 +9,11 @@ from html import escape
 
 import numpy as np
 
+from ..base.text import quantity, quantity_range
 from ..figures import style
 from ..figures.tension_colours import NO_TENSION, place, shades
 from ..models import Robot
 from ..models.part import COORDINATES
-from ..text import quantity, quantity_range
 from .instant import Instant, arrow
 from .subject import Subject
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import finite_array, required, whole_number
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import finite_array, required, whole_number
+from ..base.writing import whole_file
 from ..models import Robot
-from ..writing import whole_file
 from .condition import Condition
 from .places import Places
 

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..checkpoint import ACCEPTED, Checkpoint, Kind, open_checkpoint
-from ..errors import InputError
+from ..base.checkpoint import ACCEPTED, Checkpoint, Kind, open_checkpoint
+from ..base.errors import InputError
 from .sampling import CHUNK
 
 _HEAD = struct.Struct("<QI")

@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import BeforeValidator, Field, SerializeAsAny
 
-from ..errors import InputError
-from ..inputs import number, required, shown
+from ..base.errors import InputError
+from ..base.inputs import number, required, shown
 from ..models import Robot
 from ..models.part import Part, Share
 from .feasibility import too_few_cables

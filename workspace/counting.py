@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import processors
-from ..display import Displayed
+from ..base import processors
+from ..base.display import Displayed
 from ..solvers import compiled
 from .condition import Condition
 from .counts import Counts

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import check_ending, file_path, required
-from ..netcdf import Contents, save_netcdf
-from ..writing import whole_folder
+from ..base.errors import InputError
+from ..base.inputs import check_ending, file_path, required
+from ..base.netcdf import Contents, save_netcdf
+from ..base.writing import whole_folder
 from .counts import Counts
 from .domain import Domain
 from .refinement import Refinement

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import shown
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import shown
 from ..models import Robot
 from ..models.part import COORDINATES, Box
 from .places import Places

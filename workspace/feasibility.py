@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..inputs import required
+from ..base.inputs import required
 from ..models import Robot
 from ..models.batch import compiled
 from ..models.dynamics import dynamics_of

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..distribution import pose_problem
-from ..inputs import required, whole_number
+from ..base.inputs import required, whole_number
 from ..models import Dynamics
 from ..solvers import solve
+from ..statics.distribution import pose_problem
 from .region import surrounding_box
 
 MOST = 1_000_000  # positions

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..display import Displayed
-from ..errors import InputError
-from ..inputs import real_array, required, shown
+from ..base.display import Displayed
+from ..base.errors import InputError
+from ..base.inputs import real_array, required, shown
 from ..models import Robot
 
 __all__ = ["Places", "check_places"]

@@ -11,8 +11,8 @@ from itertools import product
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs import number, whole_number
+from ..base.errors import InputError
+from ..base.inputs import number, whole_number
 from .domain import Domain
 from .sampling import cells_of
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import __version__
-from ..errors import InputError
-from ..execution import Workers, check_workers, start_workers
-from ..inputs import file_path, flag, one_of, required, shown, whole_number
+from ..base.errors import InputError
+from ..base.execution import Workers, check_workers, start_workers
+from ..base.inputs import file_path, flag, one_of, required, shown, whole_number
+from ..base.version import __version__
 from ..models import Robot
 from .checkpoint import ChunkCheckpoint, open_chunks
 from .condition import Condition, condition_from, for_robots

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..display import Displayed
-from ..inputs import one_of, whole_number
+from ..base.display import Displayed
+from ..base.inputs import one_of, whole_number
 
 CHUNK = 16_384  # a power of two, as Sobol's sequence likes; about 15 ms of work
 METHODS = ("random", "sobol", "grid", "adaptive")

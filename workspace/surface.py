@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..display import Displayed
-from ..errors import InputError
+from ..base.display import Displayed
+from ..base.errors import InputError
 from ..models import Robot
 from .boundary_mesh import Mesh, boundary_of_values
 from .conditions.margin import Margin

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..models import Robot
-from ..robust import Spread, check_share, ellipsoid_factor, uncertainty_of
 from ..solvers import solve_batch
+from ..statics.robust import Spread, check_share, ellipsoid_factor, uncertainty_of
 from .places import Places
 
 __all__ = ["Tightened"]

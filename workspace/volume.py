@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..display import Displayed
-from ..inputs import number, whole_number
+from ..base.display import Displayed
+from ..base.inputs import number, whole_number
 
 __all__ = ["LEVEL", "Volume", "share_interval", "volume"]
 

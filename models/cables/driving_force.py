@@ -15,9 +15,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...display import Displayed
-from ...errors import InputError
-from ...inputs import one_of, whole_number
+from ...base.display import Displayed
+from ...base.errors import InputError
+from ...base.inputs import one_of, whole_number
 from ..batch import as_array
 from ..dynamics import Dynamics
 from ..points import rotations

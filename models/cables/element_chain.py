@@ -32,8 +32,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...display import Displayed
-from ...inputs import whole_number
+from ...base.display import Displayed
+from ...base.inputs import whole_number
 from ..batch import as_array
 from . import checks
 

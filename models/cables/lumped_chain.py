@@ -25,8 +25,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
-from ...inputs import whole_number
+from ...base.display import Displayed
+from ...base.inputs import whole_number
 from ..batch import as_array
 from . import checks, elastic
 

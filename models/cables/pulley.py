@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ..batch import as_array
 from ..rotation import Matrix
 from . import checks

@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from ...display import Displayed
-from ...errors import InputError, SolverError
+from ...base.display import Displayed
+from ...base.errors import InputError, SolverError
 from ..batch import arrays, as_array
 from . import checks
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion

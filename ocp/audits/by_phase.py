@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...distribution import wrench_problem
 from ...solvers import Certificate, certify
+from ...statics.distribution import wrench_problem
 from ..tasks.phases import LaidPhase
 from ..tasks.resting import end_tensions, largest_support, support_forces
 from ..tasks.scenario import Scenario

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ...models.part import COORDINATES
 from ..limits.distance import Distance
 from ..tasks.deviation import Deviation

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...tolerances import ORTHOGONAL
+from ...base.tolerances import ORTHOGONAL
 
 __all__ = ["Distances", "distances"]
 

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...display import Displayed
-from ...text import quantity
+from ...base.display import Displayed
+from ...base.text import quantity
 
 __all__ = ["Excess"]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...solvers import Certificate
 from ..limits import Rate
 from ..tasks.deviation import Deviation

@@ -13,8 +13,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ...distribution import wrench_problem
 from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
+from ...statics.distribution import wrench_problem
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds

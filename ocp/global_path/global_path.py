@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...display import Displayed
-from ...text import quantity
+from ...base.display import Displayed
+from ...base.text import quantity
 from ..nlp.guess import guess_through
 from ..tasks.deviation import Deviation
 from ..tasks.paths.rest_to_rest import rest_to_rest

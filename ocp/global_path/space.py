@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.random import Generator
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths.rest_to_rest import rest_to_rest
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..nlp.guess import formation_guess, usual_guess
-from ..search import Search
+from ..search.search import Search
 from ..tasks.deviation import Deviation
 from .global_path import find_global_path
 from .need import guess_exceeds, is_open

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, TypeAlias
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
-from ...errors import InputError
+from ...base.display import Displayed
+from ...base.errors import InputError
 from ...models import Robot
 from .distance import Distance, Pair
 from .limit import Limit

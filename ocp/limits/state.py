@@ -9,7 +9,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ...models import Robot, kinematics
 from ...models.cables.pulley import Exit
 from ...models.carriers import Effort

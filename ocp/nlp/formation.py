@@ -15,7 +15,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..tasks.scenario import Scenario
 
 __all__ = ["Grid"]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..limits import Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values

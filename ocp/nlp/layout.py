@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks.scenario import Scenario
 

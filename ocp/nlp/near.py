@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario

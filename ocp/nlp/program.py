@@ -25,7 +25,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario

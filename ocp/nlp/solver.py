@@ -12,9 +12,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...display import Displayed
-from ...errors import InputError, SolverError
-from ...inputs import shown
+from ...base.display import Displayed
+from ...base.errors import InputError, SolverError
+from ...base.inputs import shown
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from .guess import initial_guess

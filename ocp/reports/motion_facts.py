@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.text import quantity, quantity_row
 from ...models.part import Vector3
-from ...text import quantity, quantity_row
 from ..result import Plan
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.text import quantity, quantity_row
 from ...solvers import Certificate
-from ...text import quantity, quantity_row
 from ..result import Plan, Relaxed
 from ..tasks.phases import SAME_TIME
 from .motion_facts import Fact, millimetres, motion_facts, wind

@@ -6,9 +6,9 @@ import json
 
 import numpy as np
 
+from ...base.netcdf import Contents, Variable
 from ...models.dimensions import dimensions
 from ...models.parsing import to_yaml
-from ...netcdf import Contents, Variable
 from ..result import Plan
 
 __all__ = ["output_rows", "trajectory"]

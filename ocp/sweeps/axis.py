@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ...display import Displayed
-from ...errors import InputError
-from ...inputs import shown
+from ...base.display import Displayed
+from ...base.errors import InputError
+from ...base.inputs import shown
 from ...models.parsing import parse_yaml
 from ...models.part import Part
 from .field import Field

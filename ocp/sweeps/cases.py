@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.parsing import validate
 from ..tasks.lay_out import lay_out

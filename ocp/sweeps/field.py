@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ...display import Displayed
-from ...errors import InputError
-from ...inputs import shown
+from ...base.display import Displayed
+from ...base.errors import InputError
+from ...base.inputs import shown
 
 __all__ = ["Field"]
 

@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ... import __version__
-from ...display import Displayed, Fact
-from ...errors import InputError
-from ...inputs import file_path, printable, whole_number
+from ...base.display import Displayed, Fact
+from ...base.errors import InputError
+from ...base.inputs import file_path, printable, whole_number
+from ...base.netcdf import Contents, Variable, save_netcdf
+from ...base.text import column, quantity
+from ...base.version import __version__
+from ...base.writing import check_writable, whole_file
 from ...models.parsing import to_yaml
-from ...netcdf import Contents, Variable, save_netcdf
-from ...text import column, quantity
-from ...writing import check_writable, whole_file
 from ..planner import plan
 from ..result import Plan
-from ..status import MotionStatus
+from ..tasks.status import MotionStatus
 from .axis import check_figure
 from .cases import Cases
 from .row import FAILED, Row

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-from ... import processors
-from ...errors import TowlineError
-from ...inputs import printable
+from ...base import processors
+from ...base.errors import TowlineError
+from ...base.inputs import printable
 from ...models import Robot
-from ..cost import cost
+from ..audits.cost import cost
 from ..planner import plan
 from ..reports.report import decisive
 from ..result import Plan

@@ -13,14 +13,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ... import __version__
-from ...checkpoint import Kind, open_checkpoint
-from ...errors import InputError
-from ...inputs import file_path, flag, shown
+from ...base.checkpoint import Kind, open_checkpoint
+from ...base.errors import InputError
+from ...base.inputs import file_path, flag, shown
+from ...base.version import __version__
+from ...base.writing import check_writable
 from ...models import Robot
 from ...models.files import as_robot
-from ...writing import check_writable
-from ..status import MotionStatus
+from ..tasks.status import MotionStatus
 from ..tasks.task import Task, read_task
 from .axis import read_axes
 from .cases import Cases
@@ -93,7 +93,7 @@ def sweep(
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
-    from ...execution import check_workers, start_workers  # imports as long as a short plan takes
+    from ...base.execution import check_workers, start_workers  # imports as long as a short plan takes
 
     check_workers(workers, scheduler)
     file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from .paths import AnyPath, RestPath
 from .task import GivenBase, HoldBase, Task

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from .scheme import LINEAR, Scheme
 
 __all__ = ["Deviation"]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import Finite, Part, Pose
 

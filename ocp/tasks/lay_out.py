@@ -8,7 +8,7 @@ from math import remainder
 import casadi as ca
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES

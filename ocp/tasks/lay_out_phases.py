@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.points import rotations
 from .paths import SequencePath

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...errors import InputError
-from ...inputs import finite_array, shown
+from ...base.errors import InputError
+from ...base.inputs import finite_array, shown
 from ...models.parsing import validate
 from ...models.part import COORDINATES
 from .initial import Initial

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 
 __all__ = ["SAME_TIME", "LaidPhase", "PhaseRows", "Phases"]
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...distribution import wrench_problem
 from ...solvers import TensionProblem, solve
+from ...statics.distribution import wrench_problem
 from .phases import LaidPhase
 from .scenario import Scenario
 

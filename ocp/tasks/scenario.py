@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
 from ...models.part import Vector3
 from ...models.ranges import PositiveRange

@@ -23,7 +23,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...display import Displayed
+from ...base.display import Displayed
 from . import bernstein
 from .bernstein import Values
 

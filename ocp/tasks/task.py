@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from typing_extensions import override
 
-from ...errors import InputError
-from ...inputs import file_path
+from ...base.errors import InputError
+from ...base.inputs import file_path
 from ...models.parsing import read_yaml, validate
 from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3, Whole
 from ...models.ranges import PositiveRange

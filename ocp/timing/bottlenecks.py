@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...distribution import wrench_problem
 from ...solvers import TensionProblem, capacity_margin
+from ...statics.distribution import wrench_problem
 from ..tasks.paths import TimedPath
 from .parametrised_path import ParametrisedPath, PathLimits, relative
 

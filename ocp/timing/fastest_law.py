@@ -15,19 +15,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...distribution import wrench_problem
-from ...errors import InputError, SolverError
-from ...inputs import whole_number
+from ...base.errors import InputError, SolverError
+from ...base.inputs import whole_number
 from ...models import Robot
 from ...models.files import as_robot
 from ...solvers import certify, solve_batch
+from ...statics.distribution import wrench_problem
 from ..limits.limits import Limits
-from ..status import MotionStatus
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.lay_out import check_margin
 from ..tasks.limit_list import limit_list
 from ..tasks.paths import CirclePath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
+from ..tasks.status import MotionStatus
 from ..tasks.task import FreeBase, Task, read_task
 from ..tasks.wind_set import WindBox
 from .geometry import geometry

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ..tasks.paths import AnyPath, Curve, LinePath, ReturnPath, SamplePath, SequencePath, TimedPath, WaypointPath
 
 __all__ = ["geometry"]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...display import Displayed
-from ...distribution import wrench_problem
-from ...errors import InputError, SolverError
+from ...base.display import Displayed
+from ...base.errors import InputError, SolverError
 from ...solvers import Certificate, TensionProblem, certify
 from ...solvers.available_wrench import Facets, facets
 from ...solvers.certificate import certificate_along
+from ...statics.distribution import wrench_problem
 from .parametrised_path import ParametrisedPath, PathLimits, Wrench
 
 FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables lies in it

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ...display import BLUE, Displayed, Fact, picture
-from ...errors import InputError
-from ...inputs import file_path, real_array, required, shown
+from ...base.display import BLUE, Displayed, Fact, picture
+from ...base.errors import InputError
+from ...base.inputs import file_path, real_array, required, shown
+from ...base.text import quantity
+from ...base.writing import whole_file
 from ...models.parsing import to_yaml
 from ...solvers import Certificate, TensionProblem
-from ...text import quantity
-from ...writing import whole_file
-from ..status import MotionStatus
+from ..audits.waypoint_distance import WaypointDistance, waypoint_distance
 from ..tasks.paths import (
     AnyPath,
     Curve,
@@ -26,11 +26,11 @@ from ..tasks.paths import (
     PathBase,
     TimedPath,
 )
+from ..tasks.status import MotionStatus
 from ..tasks.task import GivenBase, HoldBase, Task
 from ..warnings.instants import Instants
 from ..warnings.leaves_its_points import leaves_its_points
 from ..warnings.warnings import warnings
-from ..waypoint_distance import WaypointDistance, waypoint_distance
 from .bottlenecks import Bottleneck, bottlenecks
 from .parametrised_path import ParametrisedPath, PathLimits
 

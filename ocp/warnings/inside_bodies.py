@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...text import quantity
+from ...base.text import quantity
 from ..limits.limit import Limit
 from ..limits.places import CarriersOutside
 from .instants import Instants

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...text import quantity
+from ...base.text import quantity
 from ..tasks.paths import PathBase, WaypointPath
 
 __all__ = ["leaves_its_points"]

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.text import quantity, quantity_row
 from ...models import Robot
-from ...text import quantity, quantity_row
 from .instants import Instants
 
 __all__ = ["outside_frame"]

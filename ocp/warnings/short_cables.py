@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...text import quantity
+from ...base.text import quantity
 from .instants import Instants
 
 __all__ = ["short_cables"]

@@ -10,8 +10,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...simd import WIDTH, any_of, gather, load, magnitude, maximum, minimum, places, splat, sqrt, store, where
-from ...tolerances import CANCELLED, FEASIBILITY, ROUNDING, WEIGHTS_APART
+from ...base.machine_code.simd import (
+    WIDTH,
+    any_of,
+    gather,
+    load,
+    magnitude,
+    maximum,
+    minimum,
+    places,
+    splat,
+    sqrt,
+    store,
+    where,
+)
+from ...base.tolerances import CANCELLED, FEASIBILITY, ROUNDING, WEIGHTS_APART
 from .codes import INACCURATE, OPTIMAL, SLACK, UNSURE
 from .jit import compilable
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, store, where
+from ...base.machine_code.simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, store, where
 from .jit import compilable
 from .lanes import B_, GOOD, HIGH, LOW, NORM, REQUIRED, S_, UNIT, Y, cable, matrix, wrench
 from .lanes_proof import prove_in_lanes

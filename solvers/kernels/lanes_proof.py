@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
-from ...tolerances import FEASIBILITY, NEGLIGIBLE, ORTHOGONAL, ROUNDING
+from ...base.machine_code.simd import load, magnitude, maximum, minimum, splat, sqrt, store, where
+from ...base.tolerances import FEASIBILITY, NEGLIGIBLE, ORTHOGONAL, ROUNDING
 from .codes import CLEAR, REACH_OF_PULL, REACH_OF_TERMS
 from .jit import compilable
 from .lanes import (

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, sqrt, store, where
+from ...base.machine_code.simd import WIDTH, any_of, load, magnitude, maximum, minimum, splat, sqrt, store, where
 from .codes import DECISIVE, PARALLEL, SLACK, STATIONARY
 from .jit import compilable
 from .lanes import (

@@ -8,7 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...simd import TOGETHER, WIDTH, any_of, gather, load, places, scatter, splat, store, vectors, where
+from ...base.machine_code.simd import (
+    TOGETHER,
+    WIDTH,
+    any_of,
+    gather,
+    load,
+    places,
+    scatter,
+    splat,
+    store,
+    vectors,
+    where,
+)
 from .codes import INFEASIBLE, OPTIMAL, STEPS, TURNS, UNSURE
 from .jit import GIVEN, VECTOR, compilable
 from .lanes import GOOD, PROVEN, ROUNDED, S_, SHORTFALL, SUPPORT, D, cable, judge, lane_size, prepare, wrench

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...tolerances import RANK
+from ...base.tolerances import RANK
 from .log_barrier import start_in_form
 from .method import Method, Proposal, StandardForm
 from .numerics.barrier_newton import barrier_point

@@ -14,8 +14,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...inputs import whole_number
-from ...tolerances import RANK
+from ...base.inputs import whole_number
+from ...base.tolerances import RANK
 from .method import Array, Method, Proposal, StandardForm
 
 # Stop when the projection on the equations moves s, of order one, by no more than this: then x is in both sets, and

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ...tolerances import FEASIBILITY, RANK, ROUNDING
+from ...base.tolerances import FEASIBILITY, RANK, ROUNDING
 from .closed_form import middle, outside
 from .method import Method, Proposal, StandardForm
 

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...errors import InputError
-from ...inputs import number, shown
+from ...base.errors import InputError
+from ...base.inputs import number, shown
 from .method import Method, Proposal, StandardForm
 from .numerics.barrier_newton import barrier_point
 

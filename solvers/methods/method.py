@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, NamedTuple
 
-from ...display import record
+from ...base.display import record
 from ..problem import Array, TensionProblem
 from ..standard_form import StandardForm
 

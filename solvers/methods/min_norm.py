@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...errors import InputError
-from ...inputs import real_array, shown
-from ...tolerances import DOUBTFUL
+from ...base.errors import InputError
+from ...base.inputs import real_array, shown
+from ...base.tolerances import DOUBTFUL
 from ..problem import TensionProblem
 from .method import Array, Method, Proposal, StandardForm
 from .numerics.least_norm import least_norm_in_null_space

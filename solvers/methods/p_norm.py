@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...inputs import number
+from ...base.inputs import number
 from .method import Array, Method, Proposal, StandardForm
 from .numerics.least_norm import bounded_least_norm, least_norm
 

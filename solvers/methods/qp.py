@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...base.errors import InputError
 from .method import Method, Proposal, StandardForm
 
 # As tight as each can go: their defaults leave wrench errors of newtons, and the standard form has condition one. Every

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...inputs import number
+from ...base.inputs import number
 from ..box_least_squares import box_least_squares
 from .method import Method, Proposal, StandardForm
 from .numerics.least_norm import least_norm

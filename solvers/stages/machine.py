@@ -6,7 +6,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-from ...kernel import Kernel, compile_function, joined
+from ...base.machine_code.kernel import Kernel, compile_function, joined
 
 __all__ = ["solve_stages"]
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
-from ...errors import SolverError
+from ...base.errors import SolverError
 from ...figures.drawing import Drawing
 from .claim import Claim, Verdict
 

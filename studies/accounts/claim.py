@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...text import quantity, quantity_row
+from ...base.text import quantity, quantity_row
 
 __all__ = ["Claim", "Value", "Verdict", "compared", "repaired", "stated", "undetermined", "value_text"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from ...base.writing import whole_file
 from ...figures import style
-from ...writing import whole_file
 from . import page, text
 from .account import Account
 

@@ -20,7 +20,7 @@ READ = (
 
 def report(account: Account, form: str = "png") -> str:
     """Return the report: for each chapter a table of its claims, and its figures, files of the format `form`."""
-    from ... import __version__
+    from ...base.version import __version__
 
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
     for title, chapter in account.chapters.items():

@@ -20,7 +20,7 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.air import trapezoid
 from ...models.cables.driving_force import DrivingForce, driving_force
-from ...models.plant import Plant
+from ...plant import Plant
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, compared, stated, undetermined
 from .motion import FEASIBLE, circle

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import Dynamics, Robot
-from ...models.plant import Plant
-from ...models.plant.reading import Reading
 from ...ocp.tasks.paths import Motion
+from ...plant import Plant
+from ...plant.reading import Reading
 
 PERIOD = 1e-3  # of the commanded lengths [s]
 FLIGHT = PERIOD * np.arange(10_001)  # [s]

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from ...figures.drawing import Drawing
 from ...figures.robot import RobotSketch, draw
 from ...models import Dynamics, Robot, load
-from ...models.statics import Equilibrium, equilibria
+from ...statics.equilibria import Equilibrium, equilibria
 from ...workspace import ForceBalance, Places
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, compared, stated, undetermined

@@ -15,10 +15,10 @@ import numpy as np
 
 from ...models import Robot, load
 from ...models.ranges import PositiveRange
-from ...models.statics import equilibria
 from ...ocp import Plan, Task, plan
 from ...ocp.tasks.paths import AnyPath, LinePath
 from ...ocp.tasks.task import AnyBase, FreeBase, HoldBase, Objective, Tube
+from ...statics.equilibria import equilibria
 
 Drive = Literal["fixed-length", "variable-length", "both"]
 DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from ...figures import workspace as figures
 from ...figures.drawing import Drawing
-from ...models.statics import equilibria
+from ...statics.equilibria import equilibria
 from ...workspace import ExistsPlacement, ForceBalance, Places
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict, stated, undetermined, value_text

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.batch import call
 from ...models.dynamics import dynamics_of

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import NonNegative
 from ...models.points import anchors, attachments

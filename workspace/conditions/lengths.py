@@ -7,7 +7,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import NonNegative, Positive

@@ -18,9 +18,9 @@ import qpbenchmark
 from qpbenchmark.problem_list import ProblemList
 
 from towline.benchmarks.qp_solver import as_qp
-from towline.distribution import pose_problem, wrench_problem
 from towline.models import Dynamics, available, load
 from towline.solvers import TensionProblem, certify, solve
+from towline.statics.distribution import pose_problem, wrench_problem
 
 DATA = Path(__file__).resolve().parent.parent / "data"
 

@@ -6,8 +6,8 @@ import math
 import re
 from typing import Any
 
-from ....errors import InputError
-from ....inputs import printable, shown
+from ....base.errors import InputError
+from ....base.inputs import printable, shown
 
 __all__ = ["read_gcode"]
 

@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ....display import Displayed
+from ....base.display import Displayed
 from .attitudes import Attitudes, nearest_turn
 from .leg_law import leg_law
 from .motion import Motion

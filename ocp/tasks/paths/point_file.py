@@ -8,9 +8,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-from ....errors import InputError
-from ....inputs import printable, shown
-from ....reading import read_bytes
+from ....base.errors import InputError
+from ....base.inputs import printable, shown
+from ....base.reading import read_bytes
 from .gcode import read_gcode
 
 __all__ = ["read_csv", "read_points"]

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ....tolerances import AT_LIMIT
+from ....base.tolerances import AT_LIMIT
 from ..method import Array, StandardForm
 
 # How far a corner may lie beyond a limit, relative to the size of s.

@@ -1,0 +1,84 @@
+"""Former names of modules, which can be imported for one more release: `install`, `renamed`, `moved_name`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+from warnings import warn
+
+__all__ = ["install", "moved_name", "renamed"]
+
+PACKAGE = __name__.split(".")[0]
+NOW = {
+    "calibration": "estimation.calibration",
+    "distribution": "statics.distribution",
+    "embedded": "export.step",
+    "errors": "base.errors",
+    "models.forward_kinematics": "estimation.pose",
+    "models.mjcf": "export.mjcf",
+    "models.plant": "plant",
+    "models.statics": "statics.equilibria",
+    "robust": "statics.robust",
+}
+MOVED = {  # names that packages are still asked for
+    ("models", "PoseEstimate"): "estimation.pose",
+    ("models", "PoseTracker"): "estimation.pose",
+    ("models", "branches"): "estimation.pose",
+    ("models", "pose_from_lengths"): "estimation.pose",
+}
+SHORT = {"calibration", "errors"}  # these two remain, as short names
+
+
+def renamed(name: str) -> str | None:
+    """Return what a module of towline is called today, without `towline.`, or None if it has no former name."""
+    for old, new in NOW.items():
+        if name == old or name.startswith(f"{old}."):
+            return new + name[len(old) :]
+    return None
+
+
+def moved_name(package: str, name: str) -> Any:
+    """Return what a package once exported under a name, or raise AttributeError."""
+    if (package, name) not in MOVED:
+        raise AttributeError(f"module '{PACKAGE}.{package}' has no attribute {name!r}")
+    return getattr(import_module(f"{PACKAGE}.{MOVED[package, name]}"), name)
+
+
+def install() -> None:
+    """Let former names be imported."""
+    if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
+        sys.meta_path.append(_Finder())
+
+
+class _Finder(MetaPathFinder):
+    """Find modules of towline by their former names."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        package, _, name = fullname.partition(".")
+        new = renamed(name) if package == PACKAGE else None
+        return ModuleSpec(fullname, _Loader(name, new)) if new else None
+
+
+class _Loader(Loader):
+    """Load the module of today, which remains the only one."""
+
+    def __init__(self, old: str, new: str) -> None:
+        self.old, self.new = old, new
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        if self.old.split(".")[0] not in SHORT:
+            old, new = f"{PACKAGE}.{self.old}", f"{PACKAGE}.{self.new}"
+            warn(f"{old} is called {new} now; the former name goes with the next release", DeprecationWarning, 2)
+        module = import_module(f"{PACKAGE}.{self.new}")
+        self.spec: Any = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        module.__spec__ = self.spec  # the import system has put that of the former name there

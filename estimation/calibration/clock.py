@@ -1,0 +1,130 @@
+"""A first value of the clock offset: the sum of squares has valleys where motions repeat, so many values are tried."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...models.robot import Robot
+from .fit import held
+from .measurements import Measurements, measured_poses
+from .model import Model, State
+from .normal_equations import NormalEquations, metric
+from .pose_track import PoseTrack
+
+__all__ = ["CLOCK_RANGE", "begin_with_clock", "moves_smoothly"]
+
+CLOCK_RANGE = 1.0  # [s] to each side
+SHARE = 0.25  # of the record, to which the range is limited
+MOST_SAMPLES = 400
+TRIED = 81
+MOST_CORRELATED = 20_000  # samples
+FEWEST = 0.4  # of the samples that must have a pose
+SMOOTH = 0.1  # error of a pose between others, as a share of how far poses are apart
+
+
+def begin_with_clock(model: Model, length: float) -> State:
+    """Return the state to begin with: at each clock offset tried, the other parameters are fitted in one step.
+
+    Tried are offsets within a second, and about the one with which cable speeds correlate best if that is larger. The
+    length is that of the cables [m].
+    """
+    few = _thinned(model)
+    without = _without_clock(few)
+    times = model.measurements.times
+    assert times is not None
+    most = min(CLOCK_RANGE, SHARE * float(times[-1] - times[0]))
+    tried = np.linspace(-most, most, TRIED)
+    far = _by_cable_speeds(model)
+    if abs(far) > most:
+        tried = np.concatenate([tried, far + tried])
+    costs = [_cost_at(without, clock, length) for clock in tried]
+    best = tried[int(np.argmin(costs))]
+    finer = best + np.linspace(-1, 1, 17) * (tried[1] - tried[0])
+    state = model.begin()
+    state.x[model.parameters.clock] = finer[int(np.argmin([_cost_at(without, clock, length) for clock in finer]))]
+    return state
+
+
+def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
+    """Return whether every other pose follows from its neighbours: poses of a motion have a meaning between samples.
+
+    They do not if the platform was moved from pose to pose, or stood still.
+    """
+    assert measurements.times is not None
+    position, rotation, known = measured_poses(robot, measurements)
+    rows = np.flatnonzero(known[:, robot.dof_mask > 0].all(axis=1))
+    used = np.zeros(len(measurements), dtype=bool)
+    used[rows[::2]] = True
+    if used.sum() < 4:
+        return False
+    track = PoseTrack(measurements.times, position, rotation, used)
+    left = rows[1::2][track.inside(0.0)[rows[1::2]]]
+    apart, spread = track.at(0.0)[0][left] - position[left], position[left] - position[left].mean(axis=0)
+    return bool(left.size) and float(np.vdot(apart, apart)) < SMOOTH**2 * float(np.vdot(spread, spread))
+
+
+def _without_clock(model: Model) -> Model:
+    """Return the model whose clock offset does not vary."""
+    groups = tuple(group for group in model.parameters.groups if group != "clock")
+    return replace(model, parameters=replace(model.parameters, groups=groups))
+
+
+def _by_cable_speeds(model: Model) -> float:
+    """Return the clock offset [s], up to half the record, with which cable speeds correlate best."""
+    given, track = model.measurements, model.track
+    assert given.times is not None
+    assert track is not None
+    grid = np.linspace(given.times[0], given.times[-1], min(len(given), MOST_CORRELATED))
+    begin = model.begin()
+    # The residuals at the clock offset 0 are lengths less readings, up to their scales and offsets.
+    readings = model.lengths(begin)
+    lengths = readings + (model.residuals(begin).readings * given.sigma.lengths).T
+    known, times = track.inside(0.0), given.times
+    if known.sum() < 4:
+        return 0.0
+
+    def speeds(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        on_grid = [np.interp(grid, times[rows], column) for column in values[rows].T]
+        rates = np.diff(on_grid, axis=1)
+        rates -= rates.mean(axis=1, keepdims=True)
+        return rates / np.maximum(np.sqrt((rates**2).mean(axis=1, keepdims=True)), 1e-12)
+
+    of_poses, of_readings = speeds(lengths, known), speeds(readings, np.ones_like(known))
+    count = of_poses.shape[1]
+    spectra = np.fft.rfft(of_poses, 2 * count) * np.conj(np.fft.rfft(of_readings, 2 * count))
+    together = np.fft.irfft(spectra.sum(axis=0), 2 * count)
+    lags = np.arange(-(count // 2), count // 2 + 1)
+    # Fewer samples are together at a larger lag.
+    best = lags[int(np.argmax(together[lags] / (count - np.abs(lags)) * (1 - np.abs(lags) / (2 * count))))]
+    return float(best * (grid[1] - grid[0]))
+
+
+def _cost_at(model: Model, clock: float, length: float) -> float:
+    """Return the mean square of the readings' residuals after one step of the parameters; inf with few poses left."""
+    state = model.begin()
+    state.x[model.parameters.clock] = clock
+    residuals, derivatives = model.linearised(state)
+    inside = int(model.inside(state).sum())
+    if inside < FEWEST * len(model.measurements):
+        return np.inf
+    equations = NormalEquations.at(model, residuals, derivatives, metric(model))
+    of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
+    gained = 0.0
+    if equations.b.size:
+        gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
+    return (residuals.cost - of_poses - gained) / max(inside, 1)
+
+
+def _thinned(model: Model) -> Model:
+    """Return the model of few enough samples, whose poses are still those of the whole track."""
+    count = len(model.measurements)
+    rows = np.unique(np.linspace(0, count - 1, MOST_SAMPLES).astype(int)) if count > MOST_SAMPLES else np.arange(count)
+    assert model.track is not None
+    return replace(
+        model,
+        measurements=model.measurements.only(rows),
+        weights=model.weights[:, rows],
+        track=model.track.at_samples(rows),
+    )

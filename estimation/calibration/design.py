@@ -1,0 +1,162 @@
+"""`next_poses`: which poses to measure next, so that the parameters become certain soonest (D-optimal design)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.errors import InputError
+from ...base.inputs import flag, real_array, shown, whole_number
+from ...models.files import as_robot
+from ...models.robot import Robot
+from .measurements import Measurements
+from .model import Model, State
+from .normal_equations import NormalEquations, metric
+from .parameters import OF_CABLE, Parameters, check_free
+from .result import Calibration
+
+if TYPE_CHECKING:
+    import os
+
+__all__ = ["next_poses"]
+
+DRAWN = 8192  # random poses, of which those at which the robot can rest are candidates
+KEPT = 600
+TILT = 0.3  # [rad], of random poses
+MOST = 1000  # poses to choose
+LARGEST = 100_000  # candidates
+
+
+def next_poses(
+    robot: Robot | str | os.PathLike[str] | Calibration,
+    candidates: ArrayLike | None = None,
+    count: int = 10,
+    free: str | Sequence[str] = ("anchors", "offsets"),
+    measured: bool = True,
+) -> np.ndarray:
+    """Choose the poses to measure next, (count, 6) [m, rad], one after the other; one may come twice.
+
+    Each is the one after which the ellipsoid of the parameters' errors has the smallest volume.
+
+    Parameters
+    ----------
+    robot
+        A robot, its name or its file: nothing was measured so far. Or a `Calibration`, whose measurements count.
+    candidates
+        Poses to choose from, (k, 6) [m, rad]. Default: random ones with angles up to 0.3 rad at which tensions inside
+        their limits hold the platform at rest.
+    count
+        How many to choose.
+    free
+        The parameters to find, as in `calibrate`; those of a `Calibration` are its own. A clock offset is left out.
+    measured
+        Whether poses will be measured, or only the lengths.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong, or there are no candidates.
+    """
+    if isinstance(robot, Calibration):
+        calibration, chosen, groups = robot, robot.robot, robot.free
+    else:
+        calibration, chosen = None, as_robot(robot)
+        groups = check_free(chosen, free)
+    groups = tuple(group for group in groups if group != "clock")
+    if not groups:
+        raise InputError(f"free must have parameters other than clock, got {shown(free)}")
+    flag("measured", measured)
+    whole_number("count", count, 1, MOST)
+    poses = _reachable(chosen) if candidates is None else _given(candidates)
+    rows = _rows(chosen, groups, poses, measured)
+    information = _so_far(calibration, chosen, groups)
+    picked = []
+    for _ in range(count):
+        spread = np.linalg.inv(information)
+        inside = np.eye(rows.shape[1]) + rows @ spread @ np.swapaxes(rows, 1, 2)
+        best = int(np.argmax(np.linalg.slogdet(inside)[1]))
+        picked.append(best)
+        information = information + rows[best].T @ rows[best]
+    return poses[picked]
+
+
+def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bool) -> np.ndarray:
+    """Return the derivatives of the lengths by the parameters, less what unknown poses absorb, (k, m, p) [1/m]."""
+    lengths = np.ones((len(poses), robot.m))
+    model = Model(Parameters(robot, groups), Measurements(lengths, poses), {}, np.ones((robot.m, len(poses))))
+    state = model.begin()
+    # Of scales: the readings of these poses.
+    readings = -model.residuals(state).readings.T * model.measurements.sigma.lengths
+    table = model.parameters.table(state.x)
+    readings = lengths - readings / table[:, 7]
+    if not np.isfinite(readings).all():
+        raise InputError("candidates must be poses at which every cable has a length, got one inside a pulley")
+    model = replace(model, measurements=Measurements(readings, poses if measured else None), start=poses)
+    return _projected(model, state)
+
+
+def _projected(model: Model, state: State) -> np.ndarray:
+    residuals, derivatives = model.linearised(state)
+    scale, varies = metric(model), model.parameters.varies
+    m, count, _ = derivatives.cables.shape
+    rows = np.zeros((count, m, model.parameters.count))
+    for i in range(m):
+        rows[:, i, i * OF_CABLE : (i + 1) * OF_CABLE] = derivatives.cables[i]
+    rows = (rows / scale)[..., varies]
+    equations = NormalEquations.at(model, residuals, derivatives, scale)
+    if equations.inverse_root is None or equations.Y is None:
+        return rows
+    G = np.swapaxes(derivatives.poses, 0, 1) * model.poses_vary[:, None]
+    return rows - G @ np.swapaxes(equations.inverse_root, 1, 2) @ equations.Y
+
+
+def _so_far(calibration: Calibration | None, robot: Robot, groups: tuple[str, ...]) -> np.ndarray:
+    """Return the information so far [1/m^2], (p, p), and a little of all parameters, so that it has an inverse."""
+    reach = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+    size = int(Parameters(robot, groups).varies.sum())
+    start = np.eye(size) / reach**2
+    if calibration is None:
+        return start
+    return start + calibration.information[:size, :size]
+
+
+def _given(candidates: ArrayLike) -> np.ndarray:
+    poses = np.array(real_array("candidates", candidates), dtype=float)
+    if poses.ndim != 2 or poses.shape[1] != 6 or not 1 <= len(poses) <= LARGEST or not np.isfinite(poses).all():
+        raise InputError(f"candidates must be 1 to {LARGEST} finite poses, (k, 6), got {shown(poses)}")
+    return poses
+
+
+def _reachable(robot: Robot) -> np.ndarray:
+    """Return random poses at which the robot can rest, (k, 6) [m, rad]."""
+    from ...models.dynamics import dynamics_of
+    from ...solvers import solve_batch
+
+    draw = np.random.default_rng(0)
+    points = np.vstack([robot.home_anchors, robot.home[None, :3]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = np.where(high - low > 0, (high - low) / 2, np.abs(robot.home[:3] - points.mean(axis=0)).max())
+    poses = np.tile(robot.home, (DRAWN, 1))
+    free = robot.dof_mask > 0
+    random = np.hstack(
+        [(low + high) / 2 + half * draw.uniform(-1, 1, (DRAWN, 3)), draw.uniform(-TILT, TILT, (DRAWN, 3))]
+    )
+    poses[:, free] = random[:, free]
+    poses[0] = robot.home
+    dynamics, rest = dynamics_of(robot), np.zeros(6)
+    rows, scale = np.flatnonzero(free), robot.wrench_scale
+    A = dynamics.wrench_matrix(poses)
+    exists = np.isfinite(A).all(axis=(1, 2))
+    poses, A = poses[exists], A[exists]
+    w = dynamics.required_wrench(poses, rest, rest)
+    scaled = A[:, rows] * scale[rows, None]
+    holds = solve_batch(scaled, w[:, rows] * scale[rows], robot.t_min, robot.t_max).feasible
+    if not holds.any():
+        raise InputError(
+            f"candidates must be given for robot {robot.name}, which can rest at none of {DRAWN} random poses, got none"
+        )
+    return poses[holds][:KEPT]

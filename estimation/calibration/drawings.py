@@ -1,0 +1,52 @@
+"""The figures of a calibration, by name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...figures import calibration as pictures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .result import Calibration
+
+__all__ = ["drawings"]
+
+KINDS = {  # of the parameters of a cable that are lengths, by the end of their names
+    "anchor.x": "anchor x",
+    "anchor.y": "anchor y",
+    "anchor.z": "anchor z",
+    "attachment.x": "attachment x",
+    "attachment.y": "attachment y",
+    "attachment.z": "attachment z",
+    "offset": "offset",
+    "pulley.radius": "pulley radius",
+}
+
+
+def drawings(result: Calibration) -> dict[str, Figure]:
+    """Draw residuals before and after, anchors with their ellipsoids, and how well each parameter is known.
+
+    Ellipsoids are drawn if the measurements determine all anchors.
+    """
+    times = result.measurements.times
+    drawn = {"residuals": pictures.residuals(result.residuals_before, result.residuals, times)}
+    robot, file = result.robot, result.file
+    names = [parameter.name for parameter in result.parameters]
+    known = set(result.identifiable)
+    each = [[f"cables[{cable}].anchor.{axis}" for axis in "xyz"] for cable in range(robot.m)]
+    if all(name in known for cable in each for name in cable):
+        at = np.array([[names.index(name) for name in cable] for cable in each])  # (m, 3)
+        covariances = result.covariance[at[:, :, None], at[:, None, :]]
+        drawn["anchors"] = pictures.anchors(file.anchors, robot.anchors, covariances)
+    sigmas: dict[str, np.ndarray] = {}
+    for parameter in result.parameters:
+        cable, _, end = parameter.name.removeprefix("cables[").partition("].")
+        if end in KINDS:
+            sigmas.setdefault(KINDS[end], np.full(robot.m, np.nan))[int(cable)] = parameter.sigma
+    if sigmas:
+        drawn["observability"] = pictures.observability(sigmas)
+    return drawn

@@ -1,0 +1,226 @@
+"""Measurements left out decide whether more parameters help: a small residual of those that were fitted proves nothing.
+
+The record is cut into blocks in time, every other one is fitted, and the lengths of the rest are predicted, with poses
+estimated again where they were not measured; then the halves change places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...base.display import Displayed
+from ...models.robot import Robot
+from .measurements import Measurements
+from .model import Model, State
+from .parameters import Parameters
+from .starts import fit_from
+
+if TYPE_CHECKING:
+    from .run import Solved
+
+__all__ = ["Compared", "HeldOut", "compare", "poses_fitted", "select"]
+
+BLOCKS = 10  # of the record
+SHORTEST = 4  # samples of a block; of fewer, every other sample is left out
+WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
+CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
+CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
+NESTED: tuple[tuple[str, ...], ...] = (
+    (),
+    ("offsets",),
+    ("anchors",),
+    ("anchors", "offsets"),
+    ("anchors", "attachments", "offsets"),
+    ("anchors", "offsets", "scales"),
+    ("anchors", "attachments", "offsets", "scales"),
+    ("anchors", "attachments", "offsets", "radii"),
+    ("anchors", "attachments", "offsets", "scales", "radii"),
+)
+
+
+class Compared(NamedTuple):
+    """A set of parameters, and the root mean square of its residuals fitted and left out [m].
+
+    With poses that were not measured both are divided by the share of the lengths' errors that shows in residuals. Inf
+    if half of the samples do not determine the parameters, or a fit did not converge.
+    """
+
+    free: tuple[str, ...]
+    fitted: float
+    left_out: float
+
+
+@dataclass(frozen=True)
+class HeldOut(Displayed):
+    """The errors with which parameters predict measurements that were left out.
+
+    Attributes
+    ----------
+    before
+        Root mean square of the residuals left out with the file's parameters [m].
+    after
+        The same with the parameters found from the other half [m].
+    sets
+        The smaller sets of parameters, none at first: the file. The set itself is the last.
+    best
+        The smallest set whose error left out is at most 2 % above the smallest error of all.
+    """
+
+    before: float
+    after: float
+    sets: tuple[Compared, ...]
+    best: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the numbers as plain data."""
+        sets = [{**one._asdict(), "free": list(one.free)} for one in self.sets]
+        return {"before": self.before, "after": self.after, "sets": sets, "best": list(self.best)}
+
+
+def halves(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
+    """Return the samples of the two halves: blocks in time, or every other sample of a short record."""
+    count = len(measurements)
+    blocks = BLOCKS if count >= BLOCKS * SHORTEST else count
+    block = np.arange(count) * blocks // count
+    if measurements.times is None and count < 1000:
+        block = np.arange(count)
+    return np.flatnonzero(block % 2 == 0), np.flatnonzero(block % 2 == 1)
+
+
+def compare(
+    robot: Robot,
+    measurements: Measurements,
+    weights: np.ndarray,
+    free: tuple[str, ...],
+    prior: dict[str, float],
+    clock: float = 0.0,
+) -> HeldOut:
+    """Return how well sets of parameters within `free` predict what was left out; arguments are checked.
+
+    Measurements are without slips, weights (m, N) are 0 for wrong readings, and a clock offset is near `clock` [s].
+    """
+    sets = [one for one in NESTED if set(one) < set(free) - {"clock"}]
+    sets = [(*one, "clock") if one and "clock" in free else one for one in sets]
+    if free == ("clock",):
+        sets = [()]
+    return _compare(robot, measurements, weights, [*sets, free], prior, clock)
+
+
+def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
+    """Return the smallest set of parameters that predicts measurements left out nearly as well as any set.
+
+    The sets are none (the file), offsets alone, anchors, both, and these with attachments, scales and pulley radii;
+    with a clock offset where times and poses of a motion were measured. With `outliers`, slips and wrong readings are
+    removed first.
+
+    Raises
+    ------
+    InputError
+        If the measurements are too few even for the offsets.
+    """
+    from .run import check_enough, cleaned, is_enough, solve, usual
+
+    sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
+    check_enough(robot, measurements, ("offsets",), {})
+    if "clock" in usual(robot, measurements):
+        sets = [(*one, "clock") if one else one for one in sets]
+    first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, one)][-1]
+    solved = solve(robot, measurements, first, {}, outliers)
+    clock = float(solved.fit.state.x[solved.model.parameters.clock])
+    if "clock" in first and not CERTAIN * _clock_sigma(solved) < abs(clock):
+        # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
+        sets, clock = [tuple(name for name in one if name != "clock") for one in sets], 0.0
+    return _compare(robot, *cleaned(solved), sets, {}, clock).best
+
+
+def _clock_sigma(solved: Solved) -> float:
+    """Return the standard deviation of the clock offset [s]."""
+    from .result import Calibration
+
+    parameters = Calibration(solved, solved.model.parameters.groups, {}).parameters
+    return next(one.sigma for one in parameters if one.name == "clock")
+
+
+def _compare(
+    robot: Robot,
+    measurements: Measurements,
+    weights: np.ndarray,
+    sets: list[tuple[str, ...]],
+    prior: dict[str, float],
+    clock: float,
+) -> HeldOut:
+    from .run import model_of
+
+    whole = replace(model_of(robot, measurements, (), {}), weights=weights)
+    parts = halves(measurements)
+    compared = []
+    before = float(np.sqrt(_mean_square(*poses_fitted(whole, robot))))
+    for free in sets:
+        if not free:
+            compared.append(Compared((), before, before))
+            continue
+        own = {name: value for name, value in prior.items() if name in free}
+        results = [_predict(whole, free, own, clock, parts[i], parts[1 - i]) for i in range(2)]
+        known = [result for result in results if result is not None]
+        fitted, left_out = (
+            np.sqrt(np.mean([result[i] for result in known])) if len(known) == 2 else np.inf for i in range(2)
+        )
+        compared.append(Compared(free, float(fitted), float(left_out)))
+    best = min(compared, key=lambda one: one.left_out)
+    good = [one for one in compared if one.left_out <= WORSE * best.left_out]
+    chosen = min(good, key=lambda one: Parameters(robot, one.free).varies.sum(), default=best)
+    return HeldOut(before, compared[-1].left_out, tuple(compared), chosen.free)
+
+
+def _predict(
+    whole: Model, free: tuple[str, ...], prior: dict[str, float], clock: float, fitted: np.ndarray, left: np.ndarray
+) -> tuple[float, float] | None:
+    """Return the mean squares [m^2] fitted and left out; None with too few samples, or if no fit converged."""
+    from ...base.errors import InputError
+    from .run import check_enough, length_of, model_of
+
+    if not (len(fitted) and len(left)):
+        return None
+
+    def part(rows: np.ndarray, groups: tuple[str, ...], own: dict[str, float]) -> Model:
+        start = None if whole.start is None else whole.start[rows]
+        of = model_of(whole.robot, whole.measurements.only(rows), groups, own, start)
+        return replace(of, weights=whole.weights[:, rows])
+
+    try:
+        check_enough(whole.robot, whole.measurements.only(fitted), free, prior)
+    except InputError:
+        return None
+    model = part(fitted, free, prior)
+    length = length_of(whole.robot)
+    begin = model.begin()
+    begin.x[model.parameters.clock] = clock if "clock" in free else 0.0
+    found = fit_from(model, begin, length)[0]
+    if not found.converged:
+        return None
+    other = part(left, free, {})
+    nothing = replace(other, parameters=replace(other.parameters, groups=()))
+    state = nothing.begin()._replace(x=found.state.x)
+    state = fit_from(nothing, state, length)[0].state
+    return _mean_square(model, found.state), _mean_square(nothing, state)
+
+
+def _mean_square(model: Model, state: State) -> float:
+    """Return the mean square of the lengths' residuals [m^2], corrected for what unknown poses absorb."""
+    from .run import lengths_of
+
+    used = model.weights * model.inside(state) > 0
+    squares = float((lengths_of(model, state).T[used] ** 2).sum())
+    unknown = int(np.isinf(model.pose_sigmas).sum())
+    return squares / max(int(used.sum()) - unknown, 1)
+
+
+def poses_fitted(model: Model, robot: Robot) -> tuple[Model, State]:
+    """Return the model without parameters that vary, and the poses that fit the lengths best with a robot's file."""
+    from .run import length_of
+
+    nothing = replace(model, parameters=Parameters(robot, ()), prior={})
+    return nothing, fit_from(nothing, nothing.begin(), length_of(robot))[0].state

@@ -1,0 +1,289 @@
+"""Logs: measurements from CSV or NetCDF, with a unit for every column, and to NetCDF.
+
+Columns: l0, l1, ... (readings of the lengths); x, y, z (position); roll, pitch, yaw, or qx, qy, qz, qw (orientation);
+t (time); tension0, tension1, ... CSV: the first line has "name [unit]" for each. NetCDF: variables of one dimension
+with these names and the attribute `units`, or, as towline writes them, cable_lengths, pose, tensions and time.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base.declared import check_hdf5
+from ...base.errors import InputError
+from ...base.inputs import file_path, printable, shown
+from ...base.netcdf import check_units
+from ...base.reading import read_bytes
+from ...models.part import COORDINATES
+from .measurements import Measurements, Sigma
+
+__all__ = ["read_measurements", "save_measurements"]
+
+LARGEST_LOG = 1_000_000_000  # [bytes]
+ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
+LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "km": 1e3}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180, "°": np.pi / 180}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
+NUMBERS = {"1": 1.0, "-": 1.0}
+POSITION, ANGLE_NAMES, QUATERNION = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("qx", "qy", "qz", "qw")
+UNITS = {
+    **dict.fromkeys(POSITION, LENGTHS),
+    **dict.fromkeys(ANGLE_NAMES, ANGLES),
+    **dict.fromkeys(QUATERNION, NUMBERS),
+    "t": TIMES,
+}
+NUMBERED = re.compile(r"(l|tension)(0|[1-9]\d{0,2})")
+HEADING = re.compile(r"\s*([^\[\]]*?)\s*\[\s*([^\[\]]*?)\s*\]\s*")
+WRITTEN = ("cable_lengths", "pose", "tensions", "time")  # by towline
+ACCEPTED = "l0, l1, ..., x, y, z, roll, pitch, yaw, qx, qy, qz, qw, t, tension0, tension1, ..."
+MISSING = ("", "nan", "NaN", "NAN")
+
+
+class _Column(NamedTuple):
+    values: np.ndarray  # (N,), in SI units
+    where: str
+
+
+def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, float] | None = None) -> Measurements:
+    """Read measurements from a CSV or NetCDF file with units.
+
+    Parameters
+    ----------
+    path
+        CSV with a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], ..., tension0 [N]`; or
+        NetCDF, as from `Measurements.save`, a flight of `simulate`, or with variables named like these columns. Empty
+        fields and nan of a pose are poses that were not measured.
+    sigma
+        Standard deviations as for `Measurements`; default: those that `Measurements.save` has written, or else its own.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column has no or an unknown unit, a length, tension or time is missing, or times
+        do not rise: one line that names the file.
+    """
+    file = file_path("log", path, "the path of a CSV or NetCDF file")
+    where = printable(str(file))
+    content = read_bytes(file, "a CSV or NetCDF file", LARGEST_LOG)
+    if not content.strip():
+        raise InputError(f"{where} must be a CSV or NetCDF file, got an empty file")
+    binary = content.startswith((b"\x89HDF\r\n\x1a\n", b"CDF"))
+    try:
+        arguments = _from_netcdf(content) if binary else _from_columns(_csv_columns(content))
+        if sigma is not None:
+            arguments["sigma"] = sigma
+        return Measurements(**arguments)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except csv.Error as error:  # a field of more than 131 072 characters
+        raise InputError(f"{where} must be CSV that can be read, got {error}") from None
+
+
+def _csv_columns(content: bytes) -> dict[str, _Column]:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"must be a CSV file in UTF-8, or NetCDF, got other bytes (byte {error.start})") from None
+    if "\0" in text:
+        raise InputError("must be a CSV file in UTF-8, or NetCDF, got binary data")
+    lines = text.splitlines()
+    header, body = lines[0], [line for line in lines[1:] if line.strip()]
+    delimiter = ";" if ";" in header else "\t" if "\t" in header and "," not in header else ","
+    headings = [_heading(cell) for cell in next(csv.reader([header], delimiter=delimiter))]
+    names = [name for name, _ in headings]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"must have each column once, got {name} twice")
+    if not body:
+        raise InputError("must have a line for each sample below its header, got none")
+    table = _numbers(body, delimiter, names)
+    return {name: _Column(table[:, i] * factor, f"column {name}") for i, (name, factor) in enumerate(headings)}
+
+
+def _heading(cell: str) -> tuple[str, float]:
+    """Return the name of a column and the factor to SI units."""
+    match = HEADING.fullmatch(cell)
+    if match is None:
+        raise InputError(f"the header must have a name and a unit for each column, as 'l0 [m]', got {shown(cell)}")
+    return match[1], _factor(match[1], match[2])
+
+
+def _factor(name: str, unit: str) -> float:
+    numbered = NUMBERED.fullmatch(name)
+    units = (LENGTHS if numbered[1] == "l" else FORCES) if numbered else UNITS.get(name)
+    if units is None:
+        raise InputError(f"columns must be among {ACCEPTED}, got {shown(name)}")
+    if unit not in units:
+        raise InputError(f"the unit of {name} must be one of {', '.join(units)}, got {shown(unit)}")
+    return units[unit]
+
+
+def _numbers(lines: list[str], delimiter: str, names: list[str]) -> np.ndarray:
+    """Return the numbers of the lines, (N, columns); empty fields are nan."""
+    try:
+        table = np.loadtxt(io.StringIO("\n".join(lines)), delimiter=delimiter, ndmin=2, comments=None)
+        if table.shape == (len(lines), len(names)):
+            return table
+    except ValueError:
+        pass
+    table = np.empty((len(lines), len(names)))
+    for row, cells in enumerate(csv.reader(lines, delimiter=delimiter)):
+        if len(cells) != len(names):
+            raise InputError(f"sample {row} must have {len(names)} fields, as the header has, got {len(cells)}")
+        for column, cell in enumerate(cells):
+            try:
+                table[row, column] = np.nan if cell.strip() in MISSING else float(cell)
+            except ValueError:
+                raise InputError(f"{names[column]} must be a number at sample {row}, got {shown(cell)}") from None
+    return table
+
+
+def _from_columns(columns: Mapping[str, _Column]) -> dict[str, Any]:
+    """Return the arguments of `Measurements`."""
+    lengths = _numbered(columns, "l")
+    if lengths is None:
+        raise InputError(f"must have columns l0, l1, ... of lengths, got {', '.join(columns) or 'none'}")
+    result: dict[str, Any] = {"lengths": lengths, "tensions": _numbered(columns, "tension")}
+    result["times"] = columns["t"].values if "t" in columns else None
+    groups = {names: [name for name in names if name in columns] for names in (POSITION, ANGLE_NAMES, QUATERNION)}
+    for names, there in groups.items():
+        if there and len(there) < len(names):
+            raise InputError(f"must have all columns {', '.join(names)} or none of them, got {', '.join(there)}")
+    if groups[ANGLE_NAMES] and groups[QUATERNION]:
+        raise InputError("must have an orientation as roll, pitch, yaw or as qx, qy, qz, qw, got both")
+    orientation = groups[ANGLE_NAMES] or groups[QUATERNION]
+    if groups[POSITION]:
+        result["poses"] = np.column_stack([columns[name].values for name in POSITION])
+    if orientation:
+        result["orientations"] = np.column_stack([columns[name].values for name in orientation])
+    return result
+
+
+def _numbered(columns: Mapping[str, _Column], prefix: str) -> np.ndarray | None:
+    """Return the columns prefix0, prefix1, ... side by side, (N, m), or None if there are none."""
+    count = sum(1 for name in columns if (match := NUMBERED.fullmatch(name)) and match[1] == prefix)
+    if not count:
+        return None
+    for i in range(count):
+        if f"{prefix}{i}" not in columns:
+            raise InputError(f"must have columns {prefix}0 to {prefix}{count - 1} without a gap, got no {prefix}{i}")
+    table = np.column_stack([columns[f"{prefix}{i}"].values for i in range(count)])
+    wrong = np.argwhere(~np.isfinite(table))
+    if wrong.size:
+        row, column = (int(i) for i in wrong[0])
+        raise InputError(f"{prefix}{column} must be a finite number at sample {row}, got {table[row, column]:g}")
+    return table
+
+
+def _from_netcdf(content: bytes) -> dict[str, Any]:
+    import h5py
+
+    try:
+        # NetCDF 4 is HDF5. Of a damaged file, h5netcdf would complain once more on standard error when it is forgotten.
+        with h5py.File(io.BytesIO(content), "r") as file:
+            arrays = {
+                name: (np.asarray(variable[...]), _attributes(variable))
+                for name, variable in check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED).items()
+                if variable.dtype.kind in "fiu"
+            }
+            known = _attributes(file)
+            stated = {name: known[f"sigma_{name}"] for name in Sigma._fields if f"sigma_{name}" in known}
+    except InputError:
+        raise
+    except Exception as error:  # h5py raises of any kind for damaged files
+        raise InputError(
+            f"must be a NetCDF 4 file, got one that cannot be read ({printable(str(error), 80)})"
+        ) from None
+    if "cable_lengths" in arrays:
+        return _as_towline_writes(arrays, stated)
+    columns = {}
+    for name, (values, attributes) in arrays.items():
+        if values.ndim != 1 or name in WRITTEN:
+            continue
+        if "units" not in attributes:
+            raise InputError(f"variable {name} must have the attribute units, got none")
+        columns[name] = _Column(_floats(values) * _factor(name, str(attributes["units"])), f"variable {name}")
+    sizes = {column.values.size for column in columns.values()}
+    if len(sizes) > 1:
+        raise InputError(f"variables must have one size, got {', '.join(str(size) for size in sorted(sizes))}")
+    return _from_columns(columns)
+
+
+def _is_read(name: str) -> bool:
+    return bool(NUMBERED.fullmatch(name)) or name in UNITS or name in WRITTEN
+
+
+def _attributes(of: Any) -> dict[str, Any]:
+    """Return the texts and single numbers among the attributes of a file or a variable."""
+    result: dict[str, Any] = {}
+    for name in of.attrs:
+        if name == "units" or name.startswith("sigma_"):
+            value = np.asarray(of.attrs[name]).ravel()
+            text = value[0] if value.size == 1 else ""
+            result[name] = text.decode("utf-8") if isinstance(text, bytes) else text
+    return result
+
+
+def _floats(values: np.ndarray) -> np.ndarray:
+    """Return values as they can be computed with: a damaged file may hold nan that raise a signal."""
+    with np.errstate(invalid="ignore"):
+        numbers = values.astype(float, copy=False)
+        return np.add(numbers, 0.0, out=numbers)
+
+
+def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], stated: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `Measurements` from a file of it or of a flight, which has no standard deviations.
+
+    Lengths of a flight are those under tension, so its tensions are left out.
+    """
+    known = {"cable_lengths": ("lengths", LENGTHS), "tensions": ("tensions", FORCES), "time": ("times", TIMES)}
+    result: dict[str, Any] = {"sigma": dict(stated)} if stated else {}
+    for name, (argument, units) in known.items():
+        if name not in arrays or (name == "tensions" and not stated):
+            continue
+        values, attributes = arrays[name]
+        unit = str(attributes.get("units", ""))
+        if unit not in units:
+            raise InputError(f"the units of {name} must be one of {', '.join(units)}, got {shown(unit)}")
+        result[argument] = _floats(values) * units[unit]
+    if "pose" in arrays:
+        values, attributes = arrays["pose"]
+        check_units("pose", attributes)
+        result["poses"] = _floats(values)
+    return result
+
+
+def save_measurements(measurements: Measurements, path: str | os.PathLike[str]) -> Path:
+    """Save measurements as NetCDF, whole or not at all; `read_measurements` reads them.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    from ...base.netcdf import Contents, Variable, save_netcdf
+
+    first = "sample" if measurements.times is None else "time"
+    cable = (first, "cable")
+    about = {"units": "m", "long_name": "readings: lengths from anchor to attachment up to offset and scale"}
+    variables = {"cable_lengths": Variable(cable, measurements.lengths, about)}
+    coordinates = {"cable": Variable(("cable",), np.arange(1, measurements.m + 1))}
+    if measurements.tensions is not None:
+        variables["tensions"] = Variable(cable, measurements.tensions, {"units": "N"})
+    if measurements.poses is not None:
+        about = {"units": "m, rad", "long_name": "of the platform in {G}; nan: not measured"}
+        variables["pose"] = Variable((first, "coordinate"), measurements.poses, about)
+        coordinates["coordinate"] = Variable(("coordinate",), np.array(COORDINATES))
+    if measurements.times is not None:
+        coordinates["time"] = Variable(("time",), measurements.times, {"units": "s"})
+    attributes = {f"sigma_{name}": value for name, value in measurements.sigma._asdict().items()}
+    return save_netcdf(Contents(variables, coordinates, attributes), file_path("path", path))

@@ -1,0 +1,268 @@
+"""`Measurements`: what was measured beside a robot: cable lengths, and poses, tensions and times where known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.display import Displayed
+from ...base.errors import InputError
+from ...base.inputs import number, real_array, required, shown
+from ...models import points
+from ...models.part import LARGEST
+from ...models.robot import Robot
+from .rotations import from_quaternions
+
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
+__all__ = ["Measurements", "Sigma"]
+
+SIGMA = 1e-3  # [m] of lengths
+LARGEST_SIGMA = 100.0  # [m] or [rad]
+MOST = 10_000_000  # samples
+
+
+class Sigma(NamedTuple):
+    """Standard deviations of measurements.
+
+    Attributes
+    ----------
+    lengths
+        Of each reading, after its scale [m].
+    position
+        Of measured positions, along each axis [m]; 0: exact.
+    rotation
+        Of measured orientations, about each axis [rad]; 0: exact.
+    """
+
+    lengths: float = SIGMA
+    position: float = 0.0
+    rotation: float = 0.0
+
+
+class Measurements(Displayed):
+    """Hold N samples of a robot's cable lengths, with poses, tensions and times where they were measured.
+
+    Parameters
+    ----------
+    lengths
+        Readings of the lengths [m], (N, m): each is the length from anchor to attachment up to offset and scale.
+    poses
+        (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (N, 6), or positions alone, (N, 3). Rows of
+        nan were not measured. Default: no pose was measured.
+    orientations
+        Of the platform where `poses` are positions, or None as beside an inertial sensor: (roll, pitch, yaw) [rad],
+        (N, 3), or quaternions in the order (x, y, z, w), (N, 4). Rows of nan were not measured.
+    tensions
+        Of the cables [N], (N, m): cables with a stiffness are longer under them than their readings. Default: not
+        measured, no cable stretches.
+    times
+        Of the samples [s], (N,), rising; a clock offset requires them.
+    sigma
+        Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m] and `rotation` [rad].
+        Default: 1 mm, and poses that are exact.
+
+    Attributes
+    ----------
+    lengths
+        (N, m) [m].
+    poses
+        (N, 6) [m, rad], nan where not measured, or None.
+    tensions, times
+        As given, or None.
+    sigma
+        `Sigma`: of lengths, positions and rotations.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value; nan in lengths, tensions or times is refused.
+    """
+
+    def __init__(
+        self,
+        lengths: ArrayLike,
+        poses: ArrayLike | None = None,
+        orientations: ArrayLike | None = None,
+        tensions: ArrayLike | None = None,
+        times: ArrayLike | None = None,
+        sigma: float | Mapping[str, float] = SIGMA,
+    ):
+        self.lengths = _table("lengths", lengths, None)  # (N, m)
+        count = len(self.lengths)
+        if not 1 <= count <= MOST:
+            raise InputError(f"lengths must have 1 to {MOST} rows, got {count}")
+        if poses is None and orientations is not None:
+            poses = np.full((count, 3), np.nan)
+        self.poses = None if poses is None else _poses(poses, orientations, count)  # (N, 6)
+        self.tensions = None if tensions is None else _table("tensions", tensions, self.lengths.shape)  # (N, m)
+        self.times = None if times is None else _rising(times, count)  # (N,)
+        self.sigma = _sigma(sigma)
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    @property
+    def m(self) -> int:
+        """Return the number of cables."""
+        return self.lengths.shape[1]
+
+    def only(self, rows: np.ndarray | slice) -> Measurements:
+        """Return the measurements of some samples: indices, flags (N,) of bool or a slice.
+
+        Raises
+        ------
+        InputError
+            If `rows` are none of these.
+        """
+        arrays = {"poses": self.poses, "tensions": self.tensions, "times": self.times}
+        try:
+            chosen = {name: None if array is None else array[rows] for name, array in arrays.items()}
+            return Measurements(self.lengths[rows], **chosen, sigma=self.sigma._asdict())
+        except (IndexError, TypeError, ValueError):
+            accepted = f"indices below {len(self)} that rise, flags ({len(self)},) or a slice"
+            raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
+
+    def with_sigma(self, sigma: float | Mapping[str, float]) -> Measurements:
+        """Return the measurements with other standard deviations, as for the class.
+
+        Raises
+        ------
+        InputError
+            If they have a wrong value.
+        """
+        return Measurements(self.lengths, self.poses, None, self.tensions, self.times, sigma)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Save as NetCDF, whole or not at all, and return the path; `read_measurements` reads the file.
+
+        Parameters
+        ----------
+        path
+            Of the file; one of the same name is replaced.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from .log import save_measurements
+
+        return save_measurements(self, path)
+
+
+def check_measurements(robot: Robot, measurements: object) -> Measurements:
+    """Return measurements of a robot, or raise InputError if they are none, or of another number of cables."""
+    given = required("measurements", measurements, Measurements)
+    if given.m != robot.m:
+        raise InputError(
+            f"measurements.lengths must have a column for each of the {robot.m} cables of {robot.name}, got {given.m}"
+        )
+    return given
+
+
+def measured_poses(robot: Robot, measurements: Measurements) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the positions (N, 3), rotations (N, 3, 3) and which coordinates were measured, (N, 6) of bool.
+
+    Coordinates that were not measured are those of home.
+    """
+    count, home = len(measurements), robot.home
+    poses = np.full((count, 6), np.nan) if measurements.poses is None else measurements.poses.copy()
+    known = np.isfinite(poses)
+    poses[~known] = np.broadcast_to(home, poses.shape)[~known]
+    return poses[:, :3], points.rotations(poses[:, 3:]), known
+
+
+def _table(name: str, value: Any, shape: tuple[int, ...] | None) -> np.ndarray:
+    array = np.array(real_array(name, value), dtype=float)
+    if array.ndim != 2 or (shape is not None and array.shape != shape) or (array.ndim == 2 and array.shape[1] == 0):
+        accepted = "(N, m)" if shape is None else str(shape)
+        raise InputError(f"{name} must have the shape {accepted}, got {array.shape}")
+    _check_finite(name, array)
+    return array
+
+
+def _check_finite(name: str, array: np.ndarray) -> None:
+    with np.errstate(invalid="ignore"):
+        wrong = ~(np.abs(array) <= LARGEST)
+    if wrong.any():
+        at = tuple(int(i) for i in np.argwhere(wrong)[0])
+        where = ", ".join(f"{word} {i}" for word, i in zip(("sample", "column"), at, strict=False))
+        raise InputError(f"{name} must be finite numbers up to {LARGEST:g}, got {array[at]:g} at {where}")
+
+
+def _poses(poses: Any, orientations: Any, count: int) -> np.ndarray:
+    array = np.array(real_array("poses", poses), dtype=float)
+    if array.shape not in ((count, 3), (count, 6)):
+        raise InputError(f"poses must have the shape ({count}, 6), or ({count}, 3) of positions, got {array.shape}")
+    result = np.full((count, 6), np.nan)
+    result[:, : array.shape[1]] = array
+    if orientations is not None:
+        if array.shape[1] == 6:
+            raise InputError(f"orientations must be None if poses have six columns, got {shown(orientations)}")
+        result[:, 3:] = _angles(orientations, count)
+    for part in (result[:, :3], result[:, 3:]):
+        some = np.isfinite(part).any(axis=1) & ~np.isfinite(part).all(axis=1)
+        if some.any():
+            row = int(np.argmax(some))
+            raise InputError(f"poses must have rows that are finite or nan as a whole, got both at sample {row}")
+    _check_finite("poses", np.nan_to_num(result, nan=0.0))
+    return result
+
+
+def _angles(orientations: Any, count: int) -> np.ndarray:
+    array = np.array(real_array("orientations", orientations), dtype=float)
+    if array.shape == (count, 3):
+        return array
+    if array.shape != (count, 4):
+        raise InputError(
+            f"orientations must have the shape ({count}, 3) of angles or ({count}, 4) of quaternions, got {array.shape}"
+        )
+    known = np.all(np.isfinite(array), axis=1)
+    short = known & ~(np.abs(np.linalg.norm(np.where(known[:, None], array, 1.0), axis=1) - 1) < 0.1)
+    if short.any():
+        row = int(np.argmax(short))
+        raise InputError(
+            f"orientations must be quaternions of length 1, got {shown(array[row].tolist())} at sample {row}"
+        )
+    result = np.full((count, 3), np.nan)
+    result[known] = points.angles(from_quaternions(array[known]))
+    return result
+
+
+def _rising(times: Any, count: int) -> np.ndarray:
+    array = np.array(real_array("times", times), dtype=float)
+    if array.shape != (count,):
+        raise InputError(f"times must have the shape ({count},), got {array.shape}")
+    _check_finite("times", array)
+    falling = np.flatnonzero(np.diff(array) <= 0)
+    if falling.size:
+        row = int(falling[0])
+        raise InputError(
+            f"times must rise from sample to sample, got {array[row]:.9g} s and then {array[row + 1]:.9g} s at sample "
+            f"{row + 1}"
+        )
+    return array
+
+
+def _sigma(sigma: Any) -> Sigma:
+    given = sigma if isinstance(sigma, Mapping) else {"lengths": sigma}
+    for name in given:
+        if name not in Sigma._fields:
+            raise InputError(f"sigma must have the keys {', '.join(Sigma._fields)}, got {shown(name)}")
+    values = {
+        f"{name}": number(
+            f"sigma.{name}" if isinstance(sigma, Mapping) else "sigma",
+            value,
+            1e-9 if name == "lengths" else 0.0,
+            LARGEST_SIGMA,
+            "" if isinstance(sigma, Mapping) else ", or a mapping of lengths, position and rotation",
+        )
+        for name, value in given.items()
+    }
+    return Sigma(**values)

@@ -1,0 +1,269 @@
+"""`Model`: residuals of measurements and their derivatives, by parameters and by poses.
+
+With the reading y of a cable, its length l at the pose, offset o, scale s and the file's scale s0,
+
+    e = (f l - o - s y) / sigma                      if all poses were measured
+    e = (s0 / s (f l - o) - s0 y) / sigma            if any pose is unknown
+
+The second is in the units of the reading: the first would shrink with the robot, and a robot without size would fit
+best. With poses that are known the first is a linear regression, which readings that hardly change leave open. f is 1
+unless tensions were measured: 1 / (1 + t / (E A)), since readings are of the cable without strain.
+
+The pose of sample k is that measured at t_k + clock, or one to start from, changed by a shift and a small turn in {G},
+which vary where the pose was measured with an error, and where it was not measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.display import Displayed
+from ...models import points
+from ...models.robot import Robot
+from . import rotations
+from .geometry import runs
+from .measurements import Measurements, measured_poses
+from .parameters import OF_CABLE, Parameters, prior_sigmas
+from .pose_track import PoseTrack
+
+__all__ = ["Derivatives", "Model", "State"]
+
+
+class State(NamedTuple):
+    """Parameters and poses.
+
+    Attributes
+    ----------
+    x
+        Parameters, (P,).
+    shift, turn
+        By which poses differ from those to begin with, in {G}: (N, 3) [m], (N, 3, 3).
+    """
+
+    x: np.ndarray
+    shift: np.ndarray
+    turn: np.ndarray
+
+
+class Residuals(NamedTuple):
+    """Differences in their standard deviations: of readings (m, N), poses (N, 6) and parameters (P,)."""
+
+    readings: np.ndarray
+    poses: np.ndarray
+    parameters: np.ndarray
+
+    @property
+    def cost(self) -> float:
+        """Return the sum of squares, inf where a cable has no length."""
+        total = sum(float(np.vdot(part, part)) for part in self)
+        return total if np.isfinite(total) else np.inf
+
+    @property
+    def of_samples(self) -> np.ndarray:
+        """Return the sum of squares of each sample's readings and pose, (N,), inf where a cable has no length."""
+        total = (self.readings**2).sum(axis=0) + (self.poses**2).sum(axis=1)
+        return np.where(np.isfinite(total), total, np.inf)
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of the residuals of readings.
+
+    Attributes
+    ----------
+    cables
+        By the nine parameters of the own cable, (m, N, 9).
+    others
+        By clock offset and slips, (m, N, 1 + slips).
+    poses
+        By shift and turn of the own sample, (m, N, 6).
+    arms, lengths
+        R b of each cable (m, N, 3) [m], and its length (m, N) [m].
+    """
+
+    cables: np.ndarray
+    others: np.ndarray
+    poses: np.ndarray
+    arms: np.ndarray
+    lengths: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Model(Displayed):
+    """Measurements of a robot, and what varies to explain them.
+
+    Attributes
+    ----------
+    weights
+        1 for each reading that counts, 0 for one that is left out, (m, N).
+    start
+        Poses to begin with where none was measured, (N, 6) [m, rad]; default: home.
+    track
+        Of measured poses over time; default: the clock offset is 0.
+    upright
+        Standard deviation of orientations that were not measured about those to begin with [rad]; inf: anything.
+    """
+
+    parameters: Parameters
+    measurements: Measurements
+    prior: dict[str, float]
+    weights: np.ndarray
+    start: np.ndarray | None = None
+    track: PoseTrack | None = None
+    upright: float = np.inf
+
+    @property
+    def robot(self) -> Robot:
+        """Return the robot of the file."""
+        return self.parameters.robot
+
+    def with_parameters(self, parameters: Parameters) -> Model:
+        """Return the model with other parameters that vary."""
+        return replace(self, parameters=parameters)
+
+    @cached_property
+    def _given(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return measured_poses(self.robot, self.measurements)
+
+    @cached_property
+    def pose_sigmas(self) -> np.ndarray:
+        """Return the standard deviation of each coordinate of each pose, (N, 6) [m, rad].
+
+        Inf: not measured; 0: exact, or locked by `platform.dof`.
+        """
+        sigma = self.measurements.sigma
+        known = self._given[2] | (self.track is not None)
+        unknown = np.repeat([np.inf, self.upright], 3)
+        result = np.where(known, np.repeat([sigma.position, sigma.rotation], 3), unknown)
+        result[:, self.robot.dof_mask == 0] = 0.0
+        return result
+
+    @cached_property
+    def poses_vary(self) -> np.ndarray:
+        """Return which coordinates of poses vary, (N, 6) of bool."""
+        return self.pose_sigmas > 0
+
+    @cached_property
+    def prior_sigmas(self) -> np.ndarray:
+        """Return the standard deviations of the parameters about those of the file, (P,); inf: none."""
+        return prior_sigmas(self.parameters, self.prior)
+
+    @cached_property
+    def _stretch(self) -> np.ndarray:
+        """Return the length without strain for each metre of length, (m, N)."""
+        tensions, stiffness = self.measurements.tensions, [cable.stiffness for cable in self.robot.cables]
+        if tensions is None:
+            return np.ones((self.robot.m, 1))
+        by = [1 / value if value else 0.0 for value in stiffness]
+        return 1 / (1 + np.maximum(tensions.T, 0.0) * np.array(by)[:, None])
+
+    def begin(self) -> State:
+        """Return the parameters of the file, at the poses to begin with."""
+        count = len(self.measurements)
+        return State(self.parameters.first.copy(), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)))
+
+    def poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (N, 3) [m] and rotations (N, 3, 3) of the platform."""
+        position, rotation, _, _ = self._base(state.x[self.parameters.clock])
+        return position + state.shift, state.turn @ rotation
+
+    def inside(self, state: State) -> np.ndarray:
+        """Return which samples have a pose at their time, (N,) of bool: a clock offset may leave the record."""
+        if self.track is None:
+            return np.ones(len(self.measurements), dtype=bool)
+        return self.track.inside(state.x[self.parameters.clock])
+
+    def _base(self, clock: float) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+        if self.track is not None:
+            return self.track.at(clock)
+        return (*self._begun, None, None)
+
+    @cached_property
+    def _begun(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (N, 3) [m] and rotations (N, 3, 3) as measured, or to begin with where they were not."""
+        position, rotation, known = self._given
+        if self.start is not None and not known.all():
+            place, turned = ~known[:, 0], ~known[:, 3]
+            position, rotation = position.copy(), rotation.copy()
+            position[place] = self.start[place, :3]
+            rotation[turned] = points.rotations(self.start[turned, 3:])
+        return position, rotation
+
+    def residuals(self, state: State) -> Residuals:
+        """Return the residuals of readings, poses and parameters."""
+        return self._evaluate(state, False)[0]
+
+    def linearised(self, state: State) -> tuple[Residuals, Derivatives]:
+        """Return the residuals and their derivatives."""
+        residuals, derivatives = self._evaluate(state, True)
+        assert derivatives is not None
+        return residuals, derivatives
+
+    def _evaluate(self, state: State, derive: bool) -> tuple[Residuals, Derivatives | None]:
+        robot, parameters = self.robot, self.parameters
+        table, m = parameters.table(state.x), robot.m
+        turned, placed = parameters.carriers
+        anchors = placed + np.einsum("mij,mj->mi", turned, table[:, :3])
+        axes = np.einsum("mij,mj->mi", turned, robot.pulley_axes)
+        base_position, base_rotation, velocity, rate = self._base(state.x[parameters.clock])
+        position, rotation = base_position + state.shift, state.turn @ base_rotation
+        arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
+        run = runs(anchors, axes, table[:, 8], position + arms)
+        slip = self._slips(state.x)
+        scale0 = parameters.table(parameters.first)[:, 7:8]
+        size_is_open = bool(np.isinf(self.pose_sigmas).any())
+        scale = table[:, 7:8]
+        ratio, own = (scale0 / scale, scale0) if size_is_open else (np.ones_like(scale), scale)
+        inside = self.inside(state)
+        weights = self.weights * inside / self.measurements.sigma.lengths
+        excess = self._stretch * run.lengths - table[:, 6:7] - slip  # scale times reading, without noise
+        readings = weights * (ratio * excess - own * self.measurements.lengths.T)
+        sigmas = self.pose_sigmas
+        poses = np.zeros((len(position), 6))
+        held = (sigmas > 0) & np.isfinite(sigmas)
+        if held.any():
+            moved = np.concatenate([state.shift, rotations.vectors_of(state.turn)], axis=1)
+            poses[held] = moved[held] / sigmas[held]
+        residuals = Residuals(readings, poses, (state.x - parameters.first) / self.prior_sigmas)
+        if not derive:
+            return residuals, None
+        gain = weights * ratio
+        along = (gain * self._stretch)[..., None] * run.directions  # by the attachment in {G}
+        cables = np.empty((m, len(position), OF_CABLE))
+        cables[..., :3] = -np.matmul(along, turned)
+        cables[..., 3:6] = np.einsum("mni,nij->mnj", along, rotation)
+        cables[..., 6] = -gain
+        cables[..., 7] = -gain * (excess / scale if size_is_open else self.measurements.lengths.T)
+        cables[..., 8] = gain * self._stretch * run.d_radius
+        by_pose = np.concatenate([along, np.cross(arms, along)], axis=2)
+        others = np.zeros((m, len(position), 1 + len(parameters.slips)))
+        if velocity is not None and rate is not None:
+            others[..., 0] = np.einsum("mni,ni->mn", by_pose, np.concatenate([velocity, rate], axis=1))
+        for column, (cable, first) in enumerate(parameters.slips, start=1):
+            others[cable, first:, column] = -gain[cable, first:]
+        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths)
+
+    def _slips(self, x: np.ndarray) -> np.ndarray:
+        """Return the sum of each cable's slips so far, (m, N) [m]; (m, 1) without slips."""
+        parameters = self.parameters
+        if not parameters.slips:
+            return np.zeros((self.robot.m, 1))
+        result = np.zeros((self.robot.m, len(self.measurements)))
+        for (cable, first), size in zip(parameters.slips, x[parameters.clock + 1 :], strict=True):
+            result[cable, first:] += size
+        return result
+
+    def lengths(self, state: State) -> np.ndarray:
+        """Return the lengths of the cables that the readings mean, (N, m) [m]."""
+        table = self.parameters.table(state.x)
+        unstrained = table[:, 6:7] + self._slips(state.x) + table[:, 7:8] * self.measurements.lengths.T
+        return (unstrained / self._stretch).T
+
+    def moved(self, state: State, dx: np.ndarray, dq: np.ndarray | None) -> State:
+        """Return the state after changes of parameters (P,) and of poses (N, 6), or None if no pose varies."""
+        if dq is None:
+            return state._replace(x=state.x + dx)
+        return State(state.x + dx, state.shift + dq[:, :3], rotations.from_vectors(dq[:, 3:]) @ state.turn)

@@ -1,0 +1,193 @@
+"""`Observability`: what the measurements determine of the parameters, and by name what they leave open.
+
+A direction of the parameters is open where poses can move along without any length changing (a gauge, as that of {G}
+itself if no pose was measured), or where the measured poses differ too little. Gauges are known by their generators:
+each is tried on the normal equations, since pulleys with given axes, locked coordinates and parameters that do not vary
+exclude some. What is left is named by the parameters that it changes most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.display import Displayed
+from .fit import unobservable_below
+from .model import State
+from .parameters import OF_CABLE, WORDS, Parameters
+
+__all__ = ["Observability", "observability"]
+
+INSIDE = 0.999  # of a generator's length that must lie in the open directions
+SAME = 1e-6  # of a direction's length, left after others are taken away: it is one of theirs
+OPEN = 1e-4  # of the square of a parameter's unit vector that lies in open directions: it is not determined
+NOTABLE = 0.3  # of the largest change along a direction: such parameters name it
+MOST_NAMED = 4
+AXES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class Observability(Displayed):
+    """The directions that measurements determine.
+
+    Attributes
+    ----------
+    covariance
+        Of the parameters that vary, in metres, (p, p); none along open directions.
+    sigmas
+        Of the directions [m], (p,), inf along open ones; the directions are the columns of `directions`, (p, p).
+    determined
+        Which of the parameters have no part in an open direction, (p,) of bool.
+    open
+        The open directions, as text.
+    """
+
+    covariance: np.ndarray
+    sigmas: np.ndarray
+    directions: np.ndarray
+    determined: np.ndarray
+    open: tuple[str, ...]
+
+
+def observability(
+    S: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray, length: float
+) -> Observability:
+    """Return what normal equations determine.
+
+    Parameters
+    ----------
+    S
+        Matrix of the parameters that vary, in metres, (p, p) [1/m^2].
+    scale
+        What each parameter is multiplied by to be a length, (P,).
+    length
+        Of the cables [m].
+    """
+    values, vectors = np.linalg.eigh(S)
+    fixed = values > unobservable_below(values, length)
+    V, N = vectors[:, fixed], vectors[:, ~fixed]
+    sigmas = np.full(len(values), np.inf)
+    sigmas[fixed] = 1 / np.sqrt(values[fixed])
+    names = _names(N, parameters, state, scale)
+    return Observability((V / values[fixed]) @ V.T, sigmas, vectors, (N**2).sum(axis=1) < OPEN, names)
+
+
+def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray) -> tuple[str, ...]:
+    """Return a text for each column of N, (p, d): gauges first."""
+    names: list[str] = []
+    rest = N
+    varies = parameters.varies
+    for words, generator in _generators(parameters, state):
+        if not rest.shape[1]:
+            break
+        own = generator * scale
+        size = np.linalg.norm(own)
+        if not size > 0 or np.linalg.norm(own[~varies]) > SAME * size:
+            continue
+        direction = own[varies] / size
+        within = N.T @ direction
+        left = rest.T @ direction  # what no generator before it accounts for
+        if np.linalg.norm(within) < INSIDE or np.linalg.norm(left) < SAME**0.5:
+            continue
+        names.append(words)
+        # The open directions that are left: those across this one.
+        rest = rest @ _across(left)
+    return (*names, *_by_parameters(rest, parameters, state))
+
+
+def _across(vector: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of all directions across a vector (d,), (d, d - 1)."""
+    basis: np.ndarray = np.linalg.qr(np.column_stack([vector, np.eye(len(vector))]))[0]
+    return basis[:, 1 : len(vector)]
+
+
+def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the gauges that there may be: text, and changes of all parameters, (P,)."""
+    table = parameters.table(state.x)
+    turned, placed = parameters.carriers
+    anchors = placed + np.einsum("mij,mj->mi", turned, table[:, :3])
+    middle, attachments = anchors.mean(axis=0), table[:, 3:6]
+
+    def change(d_anchors: np.ndarray | None = None, d_attachments: np.ndarray | None = None) -> np.ndarray:
+        result = np.zeros(parameters.count)
+        rows = parameters.table(result)
+        if d_anchors is not None:
+            rows[:, :3] = np.einsum("mji,mj->mi", turned, d_anchors)
+        if d_attachments is not None:
+            rows[:, 3:6] = d_attachments
+        return result
+
+    for axis, unit in zip(AXES, np.eye(3), strict=True):
+        yield f"all anchors together along {axis} of {{G}}", change(np.tile(unit, (len(anchors), 1)))
+    for axis, unit in zip(AXES, np.eye(3), strict=True):
+        yield f"all anchors together about {axis} of {{G}}", change(np.cross(unit, anchors - middle))
+    for axis, unit in zip(AXES, np.eye(3), strict=True):
+        along = np.tile(unit, (len(anchors), 1))
+        yield f"all attachments together along {axis} of the platform", change(None, along)
+    for axis, unit in zip(AXES, np.eye(3), strict=True):
+        about = np.cross(unit, attachments - attachments.mean(axis=0))
+        yield f"all attachments together about {axis} of the platform", change(None, about)
+    size = state.x.copy()
+    size[parameters.clock] = 0.0
+    parameters.table(size)[:, :3] = np.einsum("mji,mj->mi", turned, anchors - middle)
+    yield "the size of everything: no length is known for certain", size
+    for i in range(len(anchors)):
+        for axis, unit in zip(AXES, np.eye(3), strict=True):
+            rows = np.zeros_like(anchors)
+            rows[i] = unit
+            yield f"cables[{i}].anchor and cables[{i}].attachment together along {axis}", change(rows, rows)
+
+
+def _by_parameters(rest: np.ndarray, parameters: Parameters, state: State) -> list[str]:
+    """Return a text for each direction, by the parameters that it changes most: few in each, by pivots."""
+    if not rest.shape[1]:
+        return []
+    from scipy.linalg import qr
+
+    factors: Any = qr(rest.T, mode="r", pivoting=True)
+    pivots = factors[1][: rest.shape[1]]
+    sparse = np.linalg.solve(rest[pivots].T, rest.T).T  # 1 at its own pivot, 0 at the others'
+    where = np.flatnonzero(parameters.varies)
+    toward = _along_cables(parameters, state)
+    return [_one(column, where, parameters, toward) for column in sparse.T]
+
+
+def _along_cables(parameters: Parameters, state: State) -> np.ndarray:
+    """Return the unit vectors of the cables at home in the frames of their carriers, (m, 3)."""
+    robot, table = parameters.robot, parameters.table(state.x)
+    turned, placed = parameters.carriers
+    lines = np.einsum("mji,mj->mi", turned, robot.home_attachments - placed) - table[:, :3]
+    return lines / np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-12)
+
+
+def _one(column: np.ndarray, where: np.ndarray, parameters: Parameters, toward: np.ndarray) -> str:
+    changes = np.zeros(parameters.count)
+    changes[where] = column
+    table = parameters.table(changes)
+    parts: list[tuple[float, str]] = []
+    for i, row in enumerate(table):
+        for word, part in (("anchor", row[:3]), ("attachment", row[3:6])):
+            size = float(np.linalg.norm(part))
+            if size > 0:
+                parts.append(
+                    (size, f"cables[{i}].{word} {_direction(part / size, toward[i] if word == 'anchor' else None)}")
+                )
+        parts += [(abs(row[k]), f"cables[{i}].{WORDS[k]}") for k in range(6, OF_CABLE)]
+    rest = slice(parameters.clock, None)
+    parts += [(abs(value), name) for value, name in zip(changes[rest], parameters.names[rest], strict=True)]
+    parts.sort(key=lambda part: -part[0])
+    named = [text for size, text in parts if size >= NOTABLE * parts[0][0]][:MOST_NAMED]
+    return " with ".join(named)
+
+
+def _direction(unit: np.ndarray, cable: np.ndarray | None) -> str:
+    if cable is not None and abs(unit @ cable) > 0.9:
+        return "along its cable"
+    largest = int(np.argmax(np.abs(unit)))
+    if abs(unit[largest]) > 0.9:
+        return f"along {AXES[largest]}"
+    unit = unit * np.sign(unit[largest])
+    return f"along ({', '.join(f'{value:.2f}' for value in unit + 0.0)})"

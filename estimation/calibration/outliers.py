@@ -1,0 +1,230 @@
+"""Wrong readings and slipped winches, by statistical tests of the residuals (data snooping).
+
+With unknown poses an error of one reading spreads over the residuals of its sample. The part of it that stays in its
+own residual is the redundancy r of the reading, between 0 and 1; the residual divided by sigma sqrt(r) is normal, and
+the reading with the largest of a sample is the wrong one (Baarda). A slip changes the offset of a cable from one sample
+on; the test is that of an additional parameter, for every cable and sample at once by cumulative sums.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import points
+from .fit import fit, held
+from .measurements import Measurements
+from .model import Derivatives, Model, State
+from .normal_equations import NormalEquations, metric
+from .parameters import Parameters
+from .products import onto
+
+__all__ = ["Outlier", "Slip", "alike", "find_outliers", "find_slip"]
+
+LEVEL = 0.005  # of both tests, for all readings together
+LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
+SMALLEST_REDUNDANCY = 0.02  # a reading with less hardly shows its own errors
+SHORTEST = 5  # samples on each side of a slip
+CLEAR = 3.0  # a slip is at least this many times the other residuals of its cable
+WINDOW = 25  # samples on each side, over which a slip must be visible as a step
+VISIBLE = 0.5  # share of it that must be
+BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are alike
+SHORTEST_BLOCK = 8
+BY_CHANCE = 0.3  # of which the ratio of variances may exceed 1 where residuals are independent
+
+
+class Outlier(NamedTuple):
+    """A wrong reading: cable and sample, from 0, and by how much it is off [m]."""
+
+    cable: int
+    sample: int
+    error: float
+
+
+class Slip(NamedTuple):
+    """A slipped winch: cable and first sample after the slip, from 0; the cable's offset changes by `size` [m]."""
+
+    cable: int
+    sample: int
+    size: float
+    sigma: float
+
+
+class _Projected(NamedTuple):
+    """Residuals and their redundancies, (m, N), derivatives, and L^-1 G of each reading, (m, N, 6), if poses vary."""
+
+    residuals: np.ndarray
+    redundancy: np.ndarray
+    derivatives: Derivatives
+    scale: np.ndarray
+    equations: NormalEquations
+    root: np.ndarray | None
+
+
+def _threshold(count: int) -> float:
+    from scipy.special import ndtri
+
+    return max(LEAST_THRESHOLD, float(-ndtri(LEVEL / max(count, 1))))
+
+
+def _project(model: Model, state: State) -> _Projected:
+    residuals, derivatives = model.linearised(state)
+    scale = metric(model)
+    equations = NormalEquations.at(model, residuals, derivatives, scale)
+    redundancy = np.where(model.weights * model.inside(state) > 0, 1.0, 0.0)
+    if equations.inverse_root is None:
+        return _Projected(residuals.readings, redundancy, derivatives, scale, equations, None)
+    G = derivatives.poses * model.poses_vary
+    root = np.einsum("nab,mnb->mna", equations.inverse_root, G)  # L^-1 g of each reading
+    redundancy = redundancy - np.einsum("mna,mna->mn", root, root)
+    return _Projected(residuals.readings, redundancy, derivatives, scale, equations, root)
+
+
+def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
+    """Return how many times larger variances of parameters are since neighbouring residuals are alike; at least 1.
+
+    With g_b the sum of J'e over block b of the record, the parameters have the covariance S^-1 (sum g_b g_b') S^-1,
+    whatever the residuals inside a block have to do with each other; for independent ones it is excess^2 S^-1. Returned
+    is the ratio of the two, as the mean over all directions: single ones would need many more blocks.
+    """
+    found = _project(model, state)
+    count = found.residuals.shape[1]
+    if count < BLOCKS * SHORTEST_BLOCK or not rank:
+        return 1.0
+    edges = np.arange(BLOCKS) * count // BLOCKS
+    total = np.zeros((BLOCKS, len(covariance)))
+    for i, row in enumerate(found.residuals):
+        scores = _without_poses(model, found, i) * row[:, None]
+        total += np.add.reduceat(scores, edges, axis=0)
+    # The sums add up to 0 in a minimum, which takes one of them away.
+    ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
+    return ratio if ratio > 1 + BY_CHANCE else 1.0
+
+
+def find_outliers(model: Model, state: State) -> list[Outlier]:
+    """Return readings that do not belong to the others, at most one of a sample."""
+    found = _project(model, state)
+    seen = found.redundancy > SMALLEST_REDUNDANCY
+    if not seen.any():
+        return []
+    normalised = np.zeros_like(found.residuals)
+    normalised[seen] = found.residuals[seen] / np.sqrt(found.redundancy[seen])
+    size = np.abs(normalised)
+    limit = _threshold(int(seen.sum())) * max(1.0, 1.4826 * float(np.median(size[seen])))
+    worst = np.argmax(size, axis=0)
+    samples = np.arange(size.shape[1])
+    # The smaller half may only be the echo of the larger in other samples, through the parameters.
+    wrong = samples[size[worst, samples] > max(limit, 0.5 * float(size.max()))]
+    sigma = model.measurements.sigma.lengths
+    if np.isinf(model.pose_sigmas[wrong]).any():
+        return [_attributed(model, state, int(k)) for k in wrong]
+    return [
+        Outlier(int(i), int(k), float(-sigma * found.residuals[i, k] / found.redundancy[i, k]))
+        for i, k in zip(worst[wrong], wrong, strict=True)
+    ]
+
+
+def _attributed(model: Model, state: State, sample: int) -> Outlier:
+    """Return which reading of a sample is wrong: that without which a pose fits the others best.
+
+    A large error moves an unknown pose so far that the residuals there do not show whose it is.
+    """
+    m, parameters = model.robot.m, Parameters(model.robot, ())
+    lengths = model.measurements.lengths[sample].copy()
+    table = parameters.table(state.x)
+    for (cable, first), size in zip(model.parameters.slips, state.x[parameters.clock + 1 :], strict=True):
+        lengths[cable] += size / table[cable, 7] * (sample >= first)
+    position, rotation = model.poses(state)
+    pose = np.concatenate([position[sample], points.angles(rotation[sample])])
+    given = model.measurements.poses
+    copies = Measurements(
+        np.tile(lengths, (m, 1)),
+        None if given is None else np.tile(given[sample], (m, 1)),
+        tensions=None if model.measurements.tensions is None else np.tile(model.measurements.tensions[sample], (m, 1)),
+        sigma=model.measurements.sigma._asdict(),
+    )
+    used = np.tile(model.weights[:, sample, None], (1, m))
+    without = Model(parameters, copies, {}, used * (1 - np.eye(m)), np.tile(pose, (m, 1)))
+    begin = without.begin()._replace(x=state.x[: parameters.count].copy())
+    found = fit(without, begin, 1.0).state
+    costs = (without.residuals(found).readings ** 2).sum(axis=0)
+    costs[used[:, 0] == 0] = np.inf
+    cable = int(np.argmin(costs))
+    excess = replace(without, weights=np.ones((m, m))).residuals(found).readings[cable, cable]
+    return Outlier(cable, sample, float(-model.measurements.sigma.lengths * excess))
+
+
+def find_slip(model: Model, state: State, length: float) -> Slip | None:
+    """Return the clearest slip of a winch, or None if no cable has one."""
+    found = _project(model, state)
+    m, count = found.residuals.shape
+    if count < 4 * SHORTEST:
+        return None
+    seen = found.redundancy > SMALLEST_REDUNDANCY
+    if not seen.any():
+        return None
+    normalised = np.where(seen, found.residuals / np.sqrt(np.maximum(found.redundancy, SMALLEST_REDUNDANCY)), 0.0)
+    spread = 1.4826 * float(np.median(np.abs(normalised[seen])))
+    limit = _threshold(m * count) * max(1.0, spread)
+    candidates: list[tuple[float, int, int, float, float]] = []
+    inverse = np.linalg.inv(held(found.equations.S, length))
+    for i in range(m):
+        rows = _without_poses(model, found, i)  # (N, p)
+        after = np.cumsum(rows[::-1], axis=0)[::-1]
+        absorbed = (onto(after, inverse) * after).sum(axis=1)
+        total = np.cumsum(found.redundancy[i, ::-1])[::-1]
+        information = np.maximum(total - absorbed, 1e-9 * max(float(total[0]), 1e-9))
+        sums = np.cumsum(found.residuals[i, ::-1])[::-1]
+        statistic = sums**2 / information
+        statistic[:SHORTEST] = statistic[-SHORTEST + 1 :] = 0.0
+        statistic[information < SMALLEST_REDUNDANCY * SHORTEST] = 0.0
+        k = int(np.argmax(statistic))
+        candidates.append((float(statistic[k]), i, k, float(sums[k] / information[k]), float(information[k] ** -0.5)))
+    unit = model.measurements.sigma.lengths
+    # A wrong reading disturbs a cable's parameters, and so all its residuals: the clearest may be no step.
+    for statistic, cable, sample, size, sigma in sorted(candidates, reverse=True):
+        if statistic <= limit**2:
+            break
+        flat = found.residuals[cable].copy()
+        for part in (slice(None, sample), slice(sample, None)):
+            flat[part] -= flat[part].mean()
+        if statistic > limit**2 * _correlation(flat) and _is_a_step(found, cable, sample, size):
+            return Slip(cable, sample, unit * size, unit * sigma)
+    return None
+
+
+def _correlation(residuals: np.ndarray) -> float:
+    """Return over how many samples residuals (N,) are alike: 1 + 2 times the sum of their first autocorrelations."""
+    count = len(residuals)
+    lagged = np.fft.irfft(np.abs(np.fft.rfft(residuals, 2 * count)) ** 2)[: count // 4 + 1]
+    if not lagged[0] > 0:
+        return 1.0
+    lags = lagged[1:] / lagged[0]
+    ends = np.flatnonzero(lags < 2 / np.sqrt(count))
+    return 1.0 + 2.0 * float(lags[: ends[0] if ends.size else len(lags)].sum())
+
+
+def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
+    """Return whether residuals change at the sample by a good part of `size`, which is large beside their scatter."""
+    window = slice(max(sample - WINDOW, 0), sample), slice(sample, sample + WINDOW)
+    before, after = (np.median(found.residuals[cable, part]) for part in window)
+    kept = float(np.median(found.redundancy[cable, max(sample - WINDOW, 0) : sample + WINDOW]))
+    around = np.concatenate([found.residuals[cable, window[0]] - before, found.residuals[cable, window[1]] - after])
+    scatter = 1.4826 * float(np.median(np.abs(around)))
+    step = (after - before) / max(kept, SMALLEST_REDUNDANCY)
+    return bool(step * size > VISIBLE * size**2 and abs(step) * np.sqrt(max(kept, 0.0)) > CLEAR * min(scatter, 1e9))
+
+
+def _without_poses(model: Model, found: _Projected, cable: int) -> np.ndarray:
+    """Return the derivatives of one cable's residuals by the parameters, less what the poses absorb, (N, p) [1/m]."""
+    parameters, derivatives = model.parameters, found.derivatives
+    width = derivatives.cables.shape[2]
+    full = np.zeros((derivatives.cables.shape[1], parameters.count))
+    full[:, cable * width : (cable + 1) * width] = derivatives.cables[cable]
+    full[:, parameters.clock :] = derivatives.others[cable]
+    rows = (full / found.scale)[:, parameters.varies]
+    if found.root is None or found.equations.Y is None:
+        return rows
+    return rows - np.einsum("na,nap->np", found.root[cable], found.equations.Y)

@@ -1,0 +1,179 @@
+"""Parameters of a calibration: their names, their values of a robot, and the robot of their values.
+
+The vector x has nine numbers for each cable, in this order, then the clock offset, then one number for each slip:
+
+    anchor x y z  attachment x y z  offset  scale  radius
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...base.display import Displayed
+from ...base.errors import InputError
+from ...base.inputs import number, shown
+from ...models import points
+from ...models.robot import Robot
+
+__all__ = ["GROUPS", "OF_CABLE", "Parameters", "check_free", "check_prior"]
+
+OF_CABLE = 9  # parameters of a cable
+GROUPS = ("anchors", "attachments", "offsets", "scales", "radii", "clock")
+COLUMNS = {
+    "anchors": (0, 1, 2),
+    "attachments": (3, 4, 5),
+    "offsets": (6,),
+    "scales": (7,),
+    "radii": (8,),
+}
+_WORDS = ("anchor.x", "anchor.y", "anchor.z", "attachment.x", "attachment.y", "attachment.z")
+WORDS = (*_WORDS, "offset", "scale", "pulley.radius")
+LARGEST_PRIOR = 1e3
+SMALLEST_PRIOR = 1e-9
+
+
+@dataclass(frozen=True)
+class Parameters(Displayed):
+    """The parameters of a robot's calibration: which there are, and which of them vary.
+
+    Attributes
+    ----------
+    robot
+        Whose file has the values to begin with.
+    groups
+        Those that vary, in the order of `GROUPS`.
+    slips
+        Cable and first sample of each slip.
+    """
+
+    robot: Robot
+    groups: tuple[str, ...]
+    slips: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Return the number of all parameters, those that vary and those that do not."""
+        return OF_CABLE * self.robot.m + 1 + len(self.slips)
+
+    @property
+    def clock(self) -> int:
+        """Return the index of the clock offset."""
+        return OF_CABLE * self.robot.m
+
+    @cached_property
+    def varies(self) -> np.ndarray:
+        """Return which parameters vary, (count,) of bool."""
+        flags = np.zeros((self.robot.m, OF_CABLE), dtype=bool)
+        for group in self.groups:
+            flags[:, COLUMNS.get(group, ())] = True
+        flags[:, 8] &= self.robot.pulley_radii > 0
+        return np.concatenate([flags.ravel(), ["clock" in self.groups], np.ones(len(self.slips), dtype=bool)])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all parameters."""
+        cables = [f"cables[{i}].{word}" for i in range(self.robot.m) for word in WORDS]
+        return (*cables, "clock", *(f"cables[{i}].slip at sample {k}" for i, k in self.slips))
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Return the units of all parameters: m, 1 of scales, s of the clock offset."""
+        cable = ("m",) * 7 + ("1", "m")
+        return (*(cable * self.robot.m), "s", *("m" for _ in self.slips))
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """Return the values of the robot's file, (count,) [m, 1, s]."""
+        robot = self.robot
+        encoders = [cable.encoder for cable in robot.cables]
+        table = np.empty((robot.m, OF_CABLE))
+        table[:, :3], table[:, 3:6], table[:, 8] = robot.anchors, robot.attachments, robot.pulley_radii
+        table[:, 6] = [encoder.offset if encoder else 0.0 for encoder in encoders]
+        table[:, 7] = [encoder.scale if encoder else 1.0 for encoder in encoders]
+        return np.concatenate([table.ravel(), np.zeros(1 + len(self.slips))])
+
+    @cached_property
+    def carriers(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rotation (m, 3, 3) and the position (m, 3) [m] in {G} of each cable's carrier at home."""
+        pose = self.robot.carrier_home[self.robot.carrier_of_cable]
+        return points.rotations(pose[:, 3:]), pose[:, :3]
+
+    def table(self, x: np.ndarray) -> np.ndarray:
+        """Return the parameters of the cables, a row for each, (m, 9) [m, 1]."""
+        return x[: OF_CABLE * self.robot.m].reshape(self.robot.m, OF_CABLE)
+
+    def calibrated(self, x: np.ndarray, covariance: np.ndarray | None = None) -> Robot:
+        """Return the robot with the values `x`; an encoder is written where offset or scale differ from the file.
+
+        Parameters
+        ----------
+        covariance
+            Of the parameters that vary, (p, p); default: the robot has no uncertainty.
+
+        Raises
+        ------
+        InputError
+            If the values are not those of a robot.
+        """
+        data = self.robot.model_dump(mode="json")
+        before = self.table(self.first)
+        for i, row in enumerate(self.table(x).tolist()):
+            cable = data["cables"][i]
+            cable["anchor"], cable["attachment"] = row[:3], row[3:6]
+            if cable["pulley"] is not None:
+                cable["pulley"]["radius"] = row[8]
+            if cable["encoder"] is not None or row[6:8] != before[i, 6:8].tolist():
+                cable["encoder"] = {"offset": row[6], "scale": row[7]}
+        data["uncertainty"] = None if covariance is None else self._uncertainty(covariance)
+        return Robot.model_validate(data)
+
+    def _uncertainty(self, covariance: np.ndarray) -> dict[str, Any] | None:
+        """Return the part of a covariance (p, p) that belongs to anchors, attachments and pulleys, for a robot file."""
+        where = np.flatnonzero(self.varies)
+        kept = [row for row, i in enumerate(where) if i < self.clock and i % OF_CABLE not in (6, 7)]
+        if not kept:
+            return None
+        return {
+            "parameters": [self.names[where[row]] for row in kept],
+            "covariance": covariance[np.ix_(kept, kept)].tolist(),
+        }
+
+
+def check_free(robot: Robot, free: object) -> tuple[str, ...]:
+    """Return the groups of parameters that vary, in the order of `GROUPS`, or raise InputError."""
+    given = (free,) if isinstance(free, str) else free
+    if not isinstance(given, Sequence) or not given or any(not isinstance(name, str) for name in given):
+        raise InputError(f"free must be 'auto' or some of {', '.join(GROUPS)}, got {shown(free)}")
+    for name in given:
+        if name not in GROUPS:
+            raise InputError(f"free must be 'auto' or some of {', '.join(GROUPS)}, got {shown(name)}")
+    if "radii" in given and not robot.pulley_radii.any():
+        raise InputError(f"free must not have radii for robot {robot.name}, which has no pulleys, got {shown(free)}")
+    return tuple(name for name in GROUPS if name in given)
+
+
+def check_prior(prior: Any, groups: tuple[str, ...]) -> dict[str, float]:
+    """Return the standard deviations about the file's values by group [m, 1 of scales, s], or raise InputError."""
+    if prior is None:
+        return {}
+    if not isinstance(prior, Mapping):
+        raise InputError(f"prior must be a mapping of standard deviations, or None, got {shown(prior)}")
+    for name in prior:
+        if name not in groups:
+            raise InputError(f"prior must have keys among those of free, {', '.join(groups)}, got {shown(name)}")
+    return {name: number(f"prior.{name}", value, SMALLEST_PRIOR, LARGEST_PRIOR) for name, value in prior.items()}
+
+
+def prior_sigmas(parameters: Parameters, prior: Mapping[str, float]) -> np.ndarray:
+    """Return the standard deviation of each parameter about the file's value, (count,) [m, 1, s]; inf: none."""
+    table = np.full((parameters.robot.m, OF_CABLE), np.inf)
+    for group, columns in COLUMNS.items():
+        table[:, columns] = prior.get(group, np.inf)
+    others = np.full(1 + len(parameters.slips), np.inf)
+    others[0] = prior.get("clock", np.inf)
+    return np.concatenate([table.ravel(), others])

@@ -1,0 +1,157 @@
+"""The result of a calibration as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...base.text import quantity
+
+if TYPE_CHECKING:
+    from ...base.display import Fact
+    from .result import Calibration, Parameter
+
+__all__ = ["report"]
+
+MOST_LISTED = 12
+MOST_NAMED = 4
+LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than
+HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
+
+
+def report(result: Calibration) -> str:
+    """Return the result for people: how well lengths fit, the parameters, and what the measurements leave open."""
+    lines = [
+        headline(result),
+        f"  residual of the lengths {_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)",
+        *([] if result.refused is None else [f"  DO NOT USE THIS RESULT: {result.refused}"]),
+        *_of_held_out(result),
+        *_of_noise(result),
+        *_of_parameters(result),
+        *_of_exceptions(result),
+        *_of_open(result),
+    ]
+    return "\n".join(lines)
+
+
+def headline(result: Calibration) -> str:
+    """Return in one line what was calibrated, from how many samples, and whether the result can be used."""
+    free = ", ".join(result.free) or "the file as it is"
+    state = "" if result.converged else ", NOT CONVERGED"
+    return f"{result.file.name}: {free} from {len(result.residuals)} samples{state}"
+
+
+def facts(result: Calibration) -> list[Fact]:
+    """Return the facts that need no further calibration, with the parameters that changed most."""
+    residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
+    doubt = [] if result.doubt is None else [("DO NOT USE", result.doubt)]
+    by_size = sorted(result.parameters, key=lambda one: -abs(one.correction))
+    counts = (("wrong readings", result.outliers), ("slips", result.slips), ("unobservable", result.not_identifiable))
+    return [
+        *doubt,
+        ("residual of the lengths", residual),
+        *((name, quantity(len(of))) for name, of in counts if of),
+        ("parameters", quantity(len(by_size))),
+        *((one.name, " ".join(_one(one).split()[1:])) for one in by_size[:MOST_LISTED]),
+    ]
+
+
+def _mm(length: float) -> str:
+    return quantity(1e3 * length, "mm", digits=3)
+
+
+def _of_held_out(result: Calibration) -> list[str]:
+    if result.doubt is not None:
+        return []
+    held_out = result.held_out
+    if not np.isfinite(held_out.after):
+        return ["  too few samples, or no convergence: half of them do not determine these parameters to confirm them"]
+    lines = [f"  on samples left out {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
+    fitted = held_out.sets[-1].fitted
+    if not held_out.best:
+        return lines if held_out.after > held_out.before else [*lines, "  the file predicts samples left out as well"]
+    if set(held_out.best) < set(result.free):
+        lines.append(
+            f"  {', '.join(held_out.best)} alone predict samples left out as well: the other parameters do not help"
+        )
+    elif held_out.after > 1.5 * fitted:
+        lines.append(f"  fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
+    return lines
+
+
+def _of_noise(result: Calibration) -> list[str]:
+    stated = result.stated_sigma
+    lines = []
+    if np.isfinite(result.noise) and result.noise > 1.05 * stated:
+        lines.append(
+            f"  lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the sigmas below are larger "
+            f"by {quantity(result.noise / stated, digits=3)}"
+        )
+    if result.alike > 1:
+        lines.append(
+            "  residuals of neighbouring samples are alike, since the model is not complete: the sigmas below are "
+            f"larger by {quantity(result.alike**0.5, digits=2)}"
+        )
+    return lines
+
+
+def _of_parameters(result: Calibration) -> list[str]:
+    from .run import length_of
+
+    lines = ["  parameters, with standard deviations and their change from the file:"]
+    length = length_of(result.file)  # on which a scale acts
+    by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
+    shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
+    lines += [f"    {_one(one)}" for one in result.parameters if one.name in shown]
+    if len(result.parameters) > len(shown):
+        lines.append(f"    and {len(result.parameters) - len(shown)} with smaller changes")
+    if result.beyond_prior:
+        named = ", ".join(
+            f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior[:MOST_LISTED]
+        )
+        more = len(result.beyond_prior) - MOST_LISTED
+        others = f" and {more} more" if more > 0 else ""
+        lines.append(f"  beyond 5 sigmas of the prior: {named}{others}; check the log, the file and the prior")
+    return lines
+
+
+def _one(one: Parameter) -> str:
+    factor, unit = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm")}[one.unit]
+    sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
+    change = quantity(factor * one.correction, unit, digits=4)
+    return f"{one.name:26} {one.value:12.6f} {one.unit:2} +- {sigma:14} change {change}"
+
+
+def _of_exceptions(result: Calibration) -> list[str]:
+    lines = [
+        f"  winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(abs(slip.size))} "
+        f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
+        for slip in result.slips
+    ]
+    wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
+    lines += [
+        f"  left out: cable {one.cable + 1} at sample {one.sample}, off by {_mm(one.error)}"
+        for one in wrong[:MOST_LISTED]
+    ]
+    if len(wrong) > MOST_LISTED:
+        lines.append(f"  and {len(wrong) - MOST_LISTED} more readings left out")
+    return lines
+
+
+def _of_open(result: Calibration) -> list[str]:
+    texts = result.not_identifiable
+    loose = [one.name for one in result.parameters if one.unit == "m" and LOOSE < one.sigma < np.inf]
+    if loose:
+        names = ", ".join(loose[:MOST_NAMED]) + (
+            f" and {len(loose) - MOST_NAMED} more" if len(loose) > MOST_NAMED else ""
+        )
+        return [f"  hardly determined: {names}; measure other poses, or give a prior", *_directions(texts)]
+    return _directions(texts)
+
+
+def _directions(texts: tuple[str, ...]) -> list[str]:
+    if not texts:
+        return ["  no direction of the parameters is open"]
+    lines = [f"  the measurements leave {len(texts)} directions open, along which the file's values are kept:"]
+    return lines + [f"    {text}" for text in texts]

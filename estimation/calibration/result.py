@@ -1,0 +1,381 @@
+"""`Calibration`: the robot as measurements show it, and how certain that is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.display import BLUE, GREY, Displayed, Fact, picture
+from ...base.errors import InputError
+from ...base.inputs import real_array
+from ...base.text import quantity
+from ...models import points
+from ...models.part import LARGEST
+from ...models.robot import Robot
+from .outliers import Outlier, Slip
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .held_out import HeldOut
+    from .measurements import Measurements
+    from .run import Solved
+
+__all__ = ["Calibration", "Parameter"]
+
+EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
+FAR = 5.0  # standard deviations of the prior
+EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
+
+
+class Parameter(NamedTuple):
+    """One parameter: its name, value, standard deviation and change from the robot's file, all in `unit`.
+
+    Sigma is inf if the measurements do not determine the parameter.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    correction: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration(Displayed):
+    """The result of `calibrate`.
+
+    Attributes
+    ----------
+    free
+        The groups of parameters that were found.
+    prior
+        Their standard deviations about the file's values, where given.
+    doubt
+        A slip that the log seems to have, such as cables in another order or degrees read as radians, or None.
+    """
+
+    _solved: Solved
+    free: tuple[str, ...]
+    prior: Mapping[str, float]
+    doubt: str | None = None
+
+    def _headline(self) -> str:
+        from .report import headline
+
+        return headline(self)
+
+    def _facts(self) -> Iterable[Fact]:
+        from .report import facts
+
+        return facts(self)
+
+    def _picture(self) -> str:
+        samples = np.arange(len(self.residuals))
+        curves = (
+            (samples, 1e3 * np.sqrt(np.mean(residuals**2, axis=1)), colour)
+            for residuals, colour in ((self.residuals_before, GREY), (self.residuals, BLUE))
+        )
+        return picture(curves, "sample", "residual before (grey), after [mm]")
+
+    @property
+    def converged(self) -> bool:
+        """Return whether no other values near these fit notably better."""
+        return self._solved.fit.converged
+
+    @cached_property
+    def refused(self) -> str | None:
+        """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
+
+        The log seems to have a slip, the fit did not converge, or samples left out fit worse than with the file's
+        robot.
+        """
+        if self.doubt is not None:
+            return self.doubt
+        if not self.converged:
+            return f"the fit did not converge in {self._solved.fit.steps} steps"
+        if not self.free:
+            return "the file predicts samples left out as well as any parameters would: there is nothing to change"
+        held_out = self.held_out
+        if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
+            before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
+            return f"samples left out fit worse than with the file's robot: {after}, {before} with the file"
+        return None
+
+    @property
+    def beyond_prior(self) -> tuple[tuple[str, float], ...]:
+        """Return parameters that moved by more than 5 standard deviations of the prior, and by how many, most first."""
+        of, state = self._solved.model.parameters, self._solved.fit.state
+        moved = np.abs(state.x - of.first) / self._solved.model.prior_sigmas
+        far = [i for i in np.argsort(-moved) if moved[i] > FAR]
+        return tuple((of.names[i], float(moved[i])) for i in far)
+
+    @property
+    def file(self) -> Robot:
+        """Return the robot of the file, from which the calibration began."""
+        return self._solved.model.robot
+
+    @property
+    def measurements(self) -> Measurements:
+        """Return the measurements."""
+        return self._solved.model.measurements
+
+    @cached_property
+    def robot(self) -> Robot:
+        """Return the robot with the calibrated parameters, its encoders, and its uncertainty."""
+        parameters, x = self._solved.model.parameters, self._solved.fit.state.x
+        known = np.isfinite(self.noise) and np.abs(self.covariance).max(initial=0.0) <= LARGEST
+        return parameters.calibrated(x, self.covariance if known else None)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return the calibrated parameters, slips included."""
+        of, x = self._solved.model.parameters, self._solved.fit.state.x
+        where = np.flatnonzero(of.varies)
+        sigmas = np.sqrt(np.diag(self.covariance))
+        determined = self._solved.observability.determined
+        return tuple(
+            Parameter(
+                of.names[i],
+                float(x[i]),
+                float(sigma) if known else np.inf,
+                float(x[i] - of.first[i]),
+                of.units[i],
+            )
+            for i, sigma, known in zip(where, sigmas, determined, strict=True)
+        )
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
+
+        Directions that the measurements leave open have none. It is multiplied where residuals are larger than stated,
+        or alike in neighbouring samples (`noise`, `alike`).
+        """
+        from .normal_equations import metric
+
+        model = self._solved.model
+        scale = metric(model)[model.parameters.varies]
+        covariance = self._solved.observability.covariance / scale[:, None] / scale
+        return (covariance + covariance.T) / 2 * self._inflation
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        """Return the matrix of the normal equations, priors included, (p, p), of parameters as lengths.
+
+        Its unit is [1/m^2]; it is smaller where the covariance is larger, by `noise` and `alike`.
+        """
+        from .normal_equations import metric, state_equations
+
+        model = self._solved.model
+        return state_equations(model, self._solved.fit.state, metric(model)).S / self._inflation
+
+    @property
+    def _inflation(self) -> float:
+        excess, alike, _ = self._noise
+        return (excess**2 if excess > 1 + EXCEEDS else 1.0) * alike if np.isfinite(excess) else 1.0
+
+    @cached_property
+    def _noise(self) -> tuple[float, float, int]:
+        from .run import noise_of
+
+        return noise_of(self._solved)
+
+    @property
+    def noise(self) -> float:
+        """Return the standard deviation of a length that the residuals show [m]; nan without redundancy."""
+        return self._noise[0] * self.stated_sigma
+
+    @property
+    def stated_sigma(self) -> float:
+        """Return the standard deviation of a length that was stated with the measurements [m]."""
+        return self._solved.model.measurements.sigma.lengths
+
+    @property
+    def alike(self) -> float:
+        """Return the factor of the covariance for neighbouring residuals that are alike; 1 if they are independent."""
+        return self._noise[1]
+
+    @property
+    def identifiable(self) -> tuple[str, ...]:
+        """Return the names of the parameters that the measurements determine."""
+        return tuple(parameter.name for parameter in self.parameters if np.isfinite(parameter.sigma))
+
+    @property
+    def not_identifiable(self) -> tuple[str, ...]:
+        """Return what the measurements leave open, one text for each direction of the parameters."""
+        return self._solved.observability.open
+
+    @cached_property
+    def residuals(self) -> np.ndarray:
+        """Return the residuals of the lengths of the calibrated robot, (N, m) [m], wrong readings included."""
+        from .run import lengths_of
+
+        return lengths_of(self._solved.model, self._solved.fit.state)
+
+    @cached_property
+    def residuals_before(self) -> np.ndarray:
+        """Return the residuals of the lengths with the file's parameters, (N, m) [m], at poses that fit them best."""
+        from .held_out import poses_fitted
+        from .run import lengths_of
+
+        model = self._solved.model
+        return lengths_of(*poses_fitted(model, model.parameters.robot))
+
+    @property
+    def residual_before(self) -> float:
+        """Return the root mean square of `residuals_before` without wrong readings [m]."""
+        return self._rms(self.residuals_before)
+
+    @property
+    def residual_after(self) -> float:
+        """Return the root mean square of `residuals` without wrong readings [m]."""
+        return self._rms(self.residuals)
+
+    @property
+    def residual(self) -> float:
+        """Return `residual_after` [m]."""
+        return self.residual_after
+
+    def _rms(self, residuals: np.ndarray) -> float:
+        model = self._solved.model
+        used = residuals.T[model.weights * model.inside(self._solved.fit.state) > 0]
+        return float(np.sqrt((used**2).mean())) if used.size else np.nan
+
+    @cached_property
+    def poses(self) -> np.ndarray:
+        """Return the poses of the platform at the times of the lengths, (N, 6) [m, rad], measured or found."""
+        position, rotation = self._solved.model.poses(self._solved.fit.state)
+        return np.hstack([position, points.angles(rotation)])
+
+    @property
+    def outliers(self) -> tuple[Outlier, ...]:
+        """Return the readings that were left out."""
+        return self._solved.outliers
+
+    @property
+    def slips(self) -> tuple[Slip, ...]:
+        """Return the slips of winches."""
+        of, x = self._solved.model.parameters, self._solved.fit.state.x
+        sigmas = {parameter.name: parameter.sigma for parameter in self.parameters}
+        return tuple(
+            Slip(cable, sample, float(x[of.clock + 1 + i]), sigmas[of.names[of.clock + 1 + i]])
+            for i, (cable, sample) in enumerate(of.slips)
+        )
+
+    @property
+    def clock(self) -> float:
+        """Return by how much the clock of the poses is ahead of that of the lengths [s]; 0 if it is not free."""
+        return float(self._solved.fit.state.x[self._solved.model.parameters.clock])
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """Return how well these parameters, and smaller sets, predict measurements that were left out."""
+        from .held_out import compare
+        from .run import cleaned
+
+        return compare(self._solved.model.robot, *cleaned(self._solved), self.free, dict(self.prior), self.clock)
+
+    def lengths(self, readings: ArrayLike) -> np.ndarray:
+        """Return the lengths of the cables [m], (..., m), that readings (..., m) mean; after the last slip.
+
+        Raises
+        ------
+        InputError
+            If the readings have another number of cables.
+        """
+        of, x = self._solved.model.parameters, self._solved.fit.state.x
+        values = np.asarray(real_array("readings", readings), dtype=float)
+        table = of.table(x)
+        if values.ndim < 1 or values.shape[-1] != len(table):
+            raise InputError(f"readings must have the shape (..., {len(table)}), got {values.shape}")
+        offsets = table[:, 6].copy()
+        for (cable, _), size in zip(of.slips, x[of.clock + 1 :], strict=True):
+            offsets[cable] += size
+        return offsets + table[:, 7] * values
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Save the robot as a robot file (YAML), whole or not at all, and return the path.
+
+        A result that should not be used (`refused`) is not saved; `robot.save` saves it all the same.
+
+        Parameters
+        ----------
+        path
+            Of the file; one of the same name is replaced.
+
+        Raises
+        ------
+        InputError
+            If the result is refused, or the file cannot be written.
+        """
+        if self.refused is not None:
+            raise InputError(f"calibration must be one to use, to be saved, got one refused: {self.refused}")
+        from ...models.parsing import save_yaml
+
+        return save_yaml(self.robot, path, "path")
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw residuals before and after, anchors with ellipsoids, and standard deviations: by name, to show or save.
+
+        Anchors are drawn if the measurements determine all of them.
+        """
+        from .drawings import drawings
+
+        return drawings(self)
+
+    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
+        """Save the figures in `folder`, and return their paths.
+
+        Parameters
+        ----------
+        format
+            png, pdf or svg.
+
+        Raises
+        ------
+        InputError
+            If the format is another, or a file cannot be written.
+        """
+        from ...figures.style import save_all
+
+        return save_all(self.figures, folder, format)
+
+    def report(self) -> str:
+        """Return the result as text, for people."""
+        from .report import report
+
+        return report(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain data, as `towline calibrate --json` prints it."""
+        return {
+            "robot": self.file.name,
+            "converged": self.converged,
+            "refused": self.refused,
+            "doubt": self.doubt,
+            "beyond_prior": [{"name": name, "sigmas": sigmas} for name, sigmas in self.beyond_prior],
+            "free": list(self.free),
+            "samples": len(self._solved.model.measurements),
+            "residual_before": self.residual_before,
+            "residual_after": self.residual_after,
+            "noise": self.noise,
+            "alike": self.alike,
+            "clock": self.clock if "clock" in self.free else None,
+            "parameters": [
+                {**parameter._asdict(), "sigma": parameter.sigma if np.isfinite(parameter.sigma) else None}
+                for parameter in self.parameters
+            ],
+            "covariance": self.covariance.tolist(),
+            "not_identifiable": list(self.not_identifiable),
+            "held_out": None if self.doubt else self.held_out.to_dict(),
+            "outliers": [one._asdict() for one in self.outliers],
+            "slips": [one._asdict() for one in self.slips],
+        }

@@ -1,0 +1,151 @@
+"""Where a fit begins if poses were not measured, and poses that it left in another valley.
+
+A small platform whose readings are without their offsets seems turned by a right angle, and a fit from there ends in a
+wrong valley. So the platform is level first: its orientation is taken as measured to be that of home, roughly, lengths
+as less certain, and parameters stay near the file. Then all of that is released.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...models import points, pose_from_lengths
+from ...models.robot import Robot
+from ..pose.estimate import largest_cost
+from ..pose.problem import problem_of
+from ..pose.search import level_platform
+from .fit import Fit, fit
+from .model import Model, State
+from .outliers import find_outliers
+
+__all__ = ["LARGEST_SHARE", "fit_from", "level_poses"]
+
+SHORTEST = 1e-3  # [m]; readings without their offsets may be negative
+UPRIGHT = 0.2  # [rad], standard deviation of the orientation about home
+ROUGH = 5e-3  # [m], standard deviation of the lengths
+NEAR_THE_FILE = {"anchors": 0.01, "attachments": 0.01, "radii": 0.01, "offsets": 0.03}  # sigmas, of the cables' length
+SCALES = 0.01  # sigma [1]
+ENOUGH = 1e-3  # of the sum of squares, of a step that the first fit need not take
+FAR = 0.05  # of the cables' length: offsets that are farther from the file are no errors of it
+RARE = 0.05  # share of sound poses that fit no better than those that are looked for elsewhere
+TURN = 1.0  # [rad] to each side about each axis, where such a search begins
+CLEARLY = 2.0  # of the squares, in variances of the noise, by which another pose must fit better
+MOST_SEARCHES = 5
+LARGEST_SHARE = 0.1  # of readings that may be left out; more are no exceptions
+
+
+def fit_from(model: Model, state: State, length: float, outliers: bool = False) -> tuple[Fit, np.ndarray]:
+    """Minimise the sum of squares, from level poses if none were measured; `length` is that of the cables [m].
+
+    Returned are the fit and the weights (m, N) of its readings: with `outliers` it is without those that look wrong
+    from the beginning, since parameters and poses that follow them would hide them.
+
+    The state has parameters to begin with, and the poses of `model.begin()`.
+    """
+    if not np.isinf(model.pose_sigmas).any():
+        return fit(model, state, length), model.weights
+    rough, begin = _rough(model, state, length)
+    state = fit(rough, begin, length, enough=ENOUGH).state
+    for _ in range(MOST_SEARCHES if outliers else 0):
+        found = find_outliers(rough, state)
+        weights = rough.weights.copy()
+        for one in found:
+            weights[one.cable, one.sample] = 0.0
+        if not found or (weights == 0).sum() > LARGEST_SHARE * weights.size:
+            break
+        rough = replace(rough, weights=weights)
+        state = fit(rough, state, length, enough=ENOUGH).state
+    clean = replace(model, weights=rough.weights)
+    state = _elsewhere(clean, state) or state
+    result = fit(clean, state, length)
+    for _ in range(MOST_SEARCHES):
+        other = _elsewhere(clean, result.state)
+        if other is None:
+            break
+        result = fit(clean, other, length)
+    return result, clean.weights
+
+
+def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool) -> np.ndarray:
+    """Return poses (N, 6) [m, rad] with the orientation of home whose lengths are nearest to `lengths` (N, m) [m].
+
+    With unknown `offsets`, lengths count from home at the first sample if that fits better.
+    """
+    problem, weights = problem_of(robot), np.ones(robot.m)
+
+    def level(of: np.ndarray) -> tuple[np.ndarray, float]:
+        poses = level_platform(problem, np.maximum(of, SHORTEST), weights)
+        return poses, float(np.median(np.abs(_lengths(robot, poses) - of)))
+
+    poses, misfit = level(lengths)
+    if offsets and misfit > FAR * float(lengths.mean()):
+        other, smaller = level(lengths - lengths[0] + _lengths(robot, robot.home[None]))
+        if smaller < misfit:
+            return other
+    return poses
+
+
+def _lengths(robot: Robot, poses: np.ndarray) -> np.ndarray:
+    from ...models.dynamics import dynamics_of
+
+    return dynamics_of(robot).cable_lengths(poses)
+
+
+def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
+    """Return the model with level poses, rough lengths and parameters near the file, and where to begin."""
+    given = model.measurements.sigma
+    sigma = {**given._asdict(), "lengths": max(given.lengths, ROUGH)}
+    near = {name: share * length for name, share in NEAR_THE_FILE.items()} | {"scales": SCALES}
+    parameters = model.parameters
+    if "offsets" in parameters.groups and "offsets" not in model.prior:
+        misfit = np.median(model.residuals(state).readings, axis=1) * given.lengths
+        if np.abs(misfit).max() > FAR * length:
+            del near["offsets"]
+            state = state._replace(x=state.x.copy())
+            parameters.table(state.x)[:, 6] += misfit
+    prior = {name: value for name, value in near.items() if name in parameters.groups} | model.prior
+    measurements = model.measurements.with_sigma(sigma)
+    return replace(model, measurements=measurements, prior=prior, upright=UPRIGHT), state
+
+
+def _elsewhere(model: Model, state: State) -> State | None:
+    """Return the state with poses that fit clearly better where some fit badly, or None if there are none."""
+    unknown = np.isinf(model.pose_sigmas).any(axis=1)
+    spare = (model.weights > 0).sum(axis=0) - int((model.robot.dof_mask > 0).sum())
+    squares = (model.residuals(state).readings ** 2).sum(axis=0)
+    tested = unknown & (spare > 0)
+    if not tested.any():
+        return None
+    usual = squares / np.array([largest_cost(int(r), 0.5) if r > 0 else np.inf for r in spare])
+    noise = float(np.median(usual[tested]))
+    rare = np.array([largest_cost(int(r), RARE) if r > 0 else np.inf for r in spare])
+    bad = np.flatnonzero(tested & (squares > noise * rare))
+    if not bad.size:
+        return None
+    try:
+        robot = model.parameters.calibrated(state.x)
+    except InputError:  # values on the way that no robot has
+        return None
+    lengths = np.maximum(model.lengths(state)[bad], SHORTEST)
+    sigma = model.measurements.sigma.lengths
+    position, rotation = model.poses(state)
+    # One of the other poses with these lengths may be about any oblique axis away.
+    turns = np.array(list(product((0.0, TURN, -TURN), repeat=3))) * (robot.dof_mask[3:] > 0)
+    turns = np.unique(turns, axis=0)  # (k, 3)
+    starts = np.empty((len(bad), len(turns), 6))
+    starts[..., :3], starts[..., 3:] = position[bad, None], robot.home[3:] + turns
+    found = pose_from_lengths(robot, np.repeat(lengths[:, None], len(turns), axis=1), sigma=sigma, start=starts)
+    costs = ((found.residuals / sigma) ** 2).sum(axis=2)
+    best = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=1)
+    better = costs[np.arange(len(bad)), best] < squares[bad] - CLEARLY * noise
+    if not better.any():
+        return None
+    rows, poses = bad[better], found.pose[better, best[better]]
+    shift, turn = state.shift.copy(), state.turn.copy()
+    shift[rows] += poses[:, :3] - position[rows]
+    turn[rows] = points.rotations(poses[:, 3:]) @ np.swapaxes(rotation[rows], 1, 2) @ turn[rows]
+    return State(state.x, shift, turn)

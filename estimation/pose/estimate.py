@@ -1,0 +1,232 @@
+"""`PoseEstimate`: the pose that fits measured cable lengths best, and how far it can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...base.display import Displayed, Fact, brief
+from ...base.text import quantity, quantity_range, quantity_row
+from ...models import points
+from ...models.dynamics import dynamics_of
+from ...models.robot import Robot
+
+__all__ = ["PoseEstimate", "gradient", "largest_cost"]
+
+FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
+EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
+MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear
+MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standard deviations away
+SINGULAR = 1e-9  # of the gradient, relative to its largest singular value
+
+
+class PoseEstimate(Displayed):
+    """The pose of the platform that fits measured cable lengths best; arrays have the leading dimensions of these.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    pose
+        (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (..., 6) [m, rad].
+    residuals
+        Length of each cable at that pose less its measured length, (..., m) [m].
+    converged
+        Whether the search ended at a minimum of the residuals, (...).
+    sigma
+        Standard deviations of the measured lengths, (m,) [m].
+    carrier_pose
+        Of the carriers, (c, 6) or (..., c, 6), or None for those at home.
+    ambiguous
+        Whether the search met another pose that may be the true one, (...): it fits, or would by a test at 0.01 %, even
+        if cables cannot hold it with the file's CoM and load. None of an estimate with a start, the one nearby.
+    by_gravity
+        Whether the lengths alone leave the pose open, and the platform is at rest under its weight, (...).
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        pose: np.ndarray,
+        residuals: np.ndarray,
+        converged: Any,
+        sigma: np.ndarray,
+        carrier_pose: np.ndarray | None,
+        ambiguous: Any = None,
+        by_gravity: Any = False,
+        covariance: np.ndarray | None = None,
+    ):
+        self.robot, self.pose, self.residuals, self.converged = robot, pose, residuals, converged
+        self.sigma, self.carrier_pose = sigma, carrier_pose
+        self.ambiguous, self.by_gravity, self._covariance = ambiguous, by_gravity, covariance
+
+    def _headline(self) -> str:
+        shape = self.pose.shape[:-1]
+        return f"{self.robot.name}: {f'{quantity(int(np.prod(shape)))} poses' if shape else 'pose'} from cable lengths"
+
+    def _facts(self) -> Iterable[Fact]:
+        names = ("converged", "consistent", "determined", "ambiguous", "by_gravity")
+        verdicts = {name: np.asarray(getattr(self, name)) for name in names if getattr(self, name) is not None}
+        return [
+            ("pose", f"({quantity_row(self.pose)}) [m, rad]" if self.pose.ndim == 1 else brief(self.pose)),
+            ("residual", quantity_range(1e3 * np.ravel(self.residual), "mm")),
+            *((name, quantity(int(of.sum())) if of.ndim else brief(bool(of))) for name, of in verdicts.items()),
+        ]
+
+    def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
+        """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
+        parts = self.pose, self.residuals, self.converged, self.ambiguous, self.by_gravity, self._covariance
+        shaped: list[Any]
+        if batch:
+            shaped = [p.reshape((*batch, *p.shape[1:])) if isinstance(p, np.ndarray) else p for p in parts]
+        else:
+            shaped = [p[0] if isinstance(p, np.ndarray) else p for p in parts]
+            shaped[2:5] = [None if p is None else bool(p) for p in shaped[2:5]]
+        pose, residuals, converged, ambiguous, by_gravity, covariance = shaped
+        given = (self.robot, pose, residuals, converged, self.sigma, carrier_pose, ambiguous, by_gravity)
+        return PoseEstimate(*given, covariance)
+
+    @property
+    def residual(self) -> Any:
+        """Return the root mean square of the residuals, (...) [m]."""
+        return np.sqrt(np.mean(np.square(self.residuals), axis=-1))
+
+    @property
+    def consistent(self) -> Any:
+        """Return whether the residuals are what noise of `sigma` explains, by a chi-square test at 1 %, (...).
+
+        With no more cables than coordinates nearly all lengths belong to some pose, and the test decides nothing;
+        lengths with which the platform rests are consistent.
+        """
+        cost = np.sum(np.square(self.residuals / self.sigma), axis=-1)
+        fits = cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum()))
+        return self.converged & (fits | self.by_gravity)
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Return the covariance of x, y, z and a small rotation in {G}, (..., 6, 6) [m^2, m rad, rad^2].
+
+        It is zero for coordinates that cannot move, and infinite where the lengths leave some motion open.
+        """
+        if self._covariance is not None:
+            return self._covariance
+        return covariance_of(self._weighted_gradient(), self.robot)
+
+    @property
+    def sigmas(self) -> np.ndarray:
+        """Return the standard deviations of x, y, z and a small rotation in {G}, (..., 6) [m, rad]."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    @property
+    def determined(self) -> Any:
+        """Return whether the lengths decide the pose, or lengths and gravity where `by_gravity`, (...)."""
+        return np.isfinite(self.covariance).all(axis=(-2, -1))
+
+    @cached_property
+    def conditioned(self) -> Any:
+        """Return whether the covariance can be trusted, (...): the lengths are nearly linear about the pose.
+
+        It is False where the standard deviation of an angle exceeds 5 degrees, or where two standard deviations away,
+        along any principal axis of the covariance, half of the change of the lengths is not linear.
+        """
+        covariance = self.covariance
+        finite = np.asarray(np.isfinite(covariance).all(axis=(-2, -1)))
+        believed = np.where(finite[..., None, None], covariance, 0.0)
+        values, axes = np.linalg.eigh(believed)
+        steps = 2.0 * np.swapaxes(axes * np.sqrt(np.maximum(values, 0.0))[..., None, :], -1, -2)  # (..., 6, 6), rows
+        linear = np.einsum("...cj,...kj->...kc", self._weighted_gradient(), steps)
+        lengths = self._lengths_at(self.pose)[..., None, :]
+        change = (self._lengths_at(moved(self.pose[..., None, :], steps)) - lengths) / self.sigma
+        curved = np.linalg.norm(change - linear, axis=-1) > MOST_CURVED * np.linalg.norm(linear, axis=-1)
+        some = np.linalg.norm(linear, axis=-1) > 1e-6  # none for coordinates that cannot move
+        small = np.sqrt(np.linalg.eigvalsh(believed[..., 3:, 3:]).max(axis=-1)) <= MOST_TURN
+        return finite & small & ~(curved & some).any(axis=-1)
+
+    @property
+    def taut(self) -> Any:
+        """Return whether tensions of at least zero can hold the weight at rest there, (...)."""
+        from .taut import taut
+
+        carriers = self.carrier_pose
+        if carriers is not None and carriers.ndim > 2:
+            carriers = np.broadcast_to(carriers, (*self.pose.shape[:-1], *carriers.shape[-2:]))
+            carriers = carriers.reshape(-1, *carriers.shape[-2:])
+        held = taut(self.robot, self.pose.reshape(-1, 6), carriers)
+        return held.reshape(self.pose.shape[:-1]) if self.pose.ndim > 1 else bool(held[0])
+
+    def suspects(self) -> np.ndarray:
+        """Return each residual in its own standard deviations, (..., m); the largest is that of the likeliest error.
+
+        It is 0 for a cable that no other checks.
+        """
+        J = self._weighted_gradient()  # (..., m, 6)
+        hat = np.einsum("...ij,...jk,...lk->...il", J, np.linalg.pinv(np.swapaxes(J, -1, -2) @ J), J)
+        checked = 1.0 - np.diagonal(hat, axis1=-2, axis2=-1)
+        deviations = np.abs(self.residuals / self.sigma) / np.sqrt(np.maximum(checked, 1e-9))
+        return np.where(checked > 1e-6, deviations, 0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the estimate as plain numbers, for JSON."""
+        names = ("pose", "residual", "residuals", "converged", "consistent", "conditioned", "determined", "by_gravity")
+        plain = {name: np.asarray(getattr(self, name)).tolist() for name in names}
+        finite = np.where(np.isfinite(self.covariance), self.covariance, np.nan).astype(object)
+        finite[finite != finite] = None  # JSON has no infinity
+        return plain | {"covariance": finite.tolist(), "ambiguous": np.asarray(self.ambiguous).tolist()}
+
+    def _weighted_gradient(self) -> np.ndarray:
+        return gradient(self.robot, self.pose, self.carrier_pose) / self.sigma[:, None]
+
+    def _lengths_at(self, pose: np.ndarray) -> np.ndarray:
+        carriers = self.carrier_pose
+        if carriers is not None and carriers.ndim > 2:
+            carriers = carriers.reshape(*carriers.shape[:-2], *[1] * (pose.ndim - self.pose.ndim), *carriers.shape[-2:])
+        return dynamics_of(self.robot).cable_lengths(pose, carriers)
+
+
+def largest_cost(redundancy: int, false_alarm: float = FALSE_ALARM) -> float:
+    """Return the sum of squared errors, in standard deviations, that noise exceeds in a share of measurements."""
+    if redundancy <= 0:
+        return EXACT**2
+    from scipy.special import chdtri
+
+    return float(chdtri(redundancy, false_alarm))
+
+
+def gradient(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray | None) -> np.ndarray:
+    """Return d lengths / d (x, y, z, small rotation in {G} about the platform frame), (..., m, 6).
+
+    The pull of a cable on the platform is -dl/dx for each newton, so this is -A^T with the moments taken about the
+    platform frame; columns of coordinates that cannot move are zero.
+    """
+    A = dynamics_of(robot).wrench_matrix(pose, carrier_pose)  # (..., 6, m), moments about the CoM
+    arm = np.einsum("...ij,j->...i", points.rotations(pose[..., 3:]), np.array(robot.platform.com))
+    moments = A[..., 3:, :] + np.cross(arm[..., :, None], A[..., :3, :], axis=-2)
+    return -np.swapaxes(np.concatenate([A[..., :3, :], moments], axis=-2) * robot.dof_mask[:, None], -1, -2)
+
+
+def covariance_of(J: np.ndarray, robot: Robot) -> np.ndarray:
+    """Return (J^T J)^-1 of the coordinates that move, (..., 6, 6), infinite without full rank."""
+    rows = np.flatnonzero(robot.dof_mask)
+    scale = robot.wrench_scale[rows]  # metres for all coordinates
+    _, values, axes = np.linalg.svd(J[..., rows] * scale, full_matrices=False)
+    result = np.zeros((*J.shape[:-2], 6, 6))
+    full = (values.shape[-1] == len(rows)) & (values[..., -1] > SINGULAR * values[..., 0])
+    inverse = np.where(full[..., None], 1.0 / np.where(values > 0, values, 1.0), np.inf)
+    with np.errstate(invalid="ignore"):
+        spread = np.swapaxes(axes, -1, -2) * inverse[..., None, :] * scale[:, None]
+        block = np.where(full[..., None, None], spread @ np.swapaxes(spread, -1, -2), np.inf)
+    result[..., rows[:, None], rows] = block
+    return result
+
+
+def moved(pose: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return a pose, (..., 6), moved by a displacement and turned by a rotation vector in {G}, (..., 6)."""
+    from scipy.spatial.transform import Rotation
+
+    pose, step = np.broadcast_arrays(pose, step)
+    turn = Rotation.from_rotvec(np.array(step[..., 3:]).reshape(-1, 3)).as_matrix().reshape(*pose.shape[:-1], 3, 3)
+    angles = points.angles(turn @ points.rotations(pose[..., 3:]))
+    return np.concatenate([pose[..., :3] + step[..., :3], angles], axis=-1)

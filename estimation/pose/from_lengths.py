@@ -1,0 +1,156 @@
+"""`pose_from_lengths`: the pose of the platform from the lengths of its cables."""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.errors import InputError
+from ...base.inputs import shown
+from ...models.batch import as_array, leading
+from ...models.files import as_robot
+from ...models.part import LARGEST
+from ...models.robot import Robot
+from .estimate import PoseEstimate
+from .problem import Problem, problem_of
+from .search import search
+
+__all__ = ["SIGMA", "checked_lengths", "checked_sigma", "one_pose", "pose_from_lengths"]
+
+SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
+
+
+def pose_from_lengths(
+    robot: Robot | str | os.PathLike[str],
+    lengths: ArrayLike,
+    start: ArrayLike | None = None,
+    carrier_pose: ArrayLike | None = None,
+    sigma: ArrayLike = SIGMA,
+) -> PoseEstimate:
+    """Estimate the pose of the platform from the lengths of its cables: forward kinematics.
+
+    It minimises the squared errors of the lengths by Levenberg and Marquardt's method, with rotations as increments on
+    SO(3). Where the lengths leave a motion open, as with parallel cables or few of them, the estimate
+    is the pose in which the platform rests under its weight, see `models.statics`.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    lengths
+        Measured lengths of taut cables, from anchor to attachment, over the pulley where there is one, (..., m) [m].
+    start
+        Pose to start from, (..., 6) [m, rad], as the last one of a stream: the estimate is the minimum nearest to it.
+        Default: a search that needs none; where several poses fit, `branches` lists them.
+    carrier_pose
+        Of the carriers in {G}, (..., c, 6); default: at home.
+    sigma
+        Standard deviations of the lengths [m], one number or (m,).
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value.
+    """
+    robot = as_robot(robot)
+    lengths, deviations = checked_lengths(lengths, robot), checked_sigma(sigma, robot.m)
+    shapes = {"lengths": lengths.shape[:-1]}
+    carriers = None
+    if carrier_pose is not None:
+        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
+        shapes["carrier_pose"] = carriers.shape[:-2]
+    if start is not None:
+        start = as_array("start", start, (6,))
+        if np.abs(start).max(initial=0.0) > LARGEST:
+            raise InputError(f"start must be numbers up to {LARGEST:g} [m, rad], got {np.abs(start).max():g}")
+        shapes["start"] = start.shape[:-1]
+    first, *others = shapes.values()
+    batch = first if all(other == first for other in others) else leading(shapes)
+    rows = _rows(lengths, batch, 1)
+    each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
+    problem = problem_of(robot, each)
+    starts = None if start is None else _start(problem, start, batch)
+    if problem.open:
+        from .resting import open_estimates
+
+        flat = open_estimates(robot, problem, rows, starts, each, deviations)
+    else:
+        flat = estimates(robot, problem, rows, starts, each, deviations)
+    return flat.reshaped(batch, carriers)
+
+
+def estimates(
+    robot: Robot,
+    problem: Problem,
+    lengths: np.ndarray,
+    starts: np.ndarray | None,
+    carriers: np.ndarray | None,
+    sigma: np.ndarray,
+) -> PoseEstimate:
+    """Return the poses that fit lengths (N, m) best; the other arguments are checked ones of `pose_from_lengths`."""
+    if starts is None:
+        best = search(robot, problem, lengths, sigma, carriers)
+        residuals = np.multiply(best.errors, sigma, out=best.errors)
+        return PoseEstimate(robot, best.poses, residuals, best.ended, sigma, carriers, best.ambiguous)
+    poses, errors, converged = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
+    return PoseEstimate(robot, poses, np.multiply(errors, sigma, out=errors), converged, sigma, carriers)
+
+
+def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
+    """Return lengths (..., m), or raise InputError unless all are above zero and of a size that can be squared."""
+    array = as_array("lengths", lengths, (robot.m,))
+    if not array.min(initial=np.inf) > 0.0:
+        raise InputError(f"lengths must be numbers > 0 [m], got {array.min():g}")
+    # No number is larger than the root of the sum of squares.
+    if not np.vdot(array, array) <= LARGEST**2 and not array.max() <= LARGEST:
+        raise InputError(f"lengths must be numbers up to {LARGEST:g} [m], got {array.max():g}")
+    return array
+
+
+def one_pose(lengths: ArrayLike, carrier_pose: ArrayLike | None, robot: Robot) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the lengths (m,) and carriers (c, 6), or None, of one pose, or raise InputError."""
+    measured, carriers = checked_lengths(lengths, robot), None
+    if measured.ndim != 1:
+        raise InputError(f"lengths must have the shape ({robot.m},), those of one pose, got {shown(measured)}")
+    if carrier_pose is not None:
+        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
+        if carriers.ndim != 2:
+            raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {carriers.shape}")
+    return measured, carriers
+
+
+def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:
+    """Return standard deviations (m,) of one number or (m,), or raise InputError unless all are above zero."""
+    if isinstance(sigma, float) and 0.0 < sigma < np.inf:
+        return _equal(sigma, m)
+    deviations = as_array("sigma", sigma, ())
+    if deviations.shape not in ((), (m,)):
+        raise InputError(f"sigma must be a number > 0 or of shape ({m},) [m], got {shown(deviations)}")
+    if not deviations.min() > 0.0:
+        raise InputError(f"sigma must be numbers > 0 [m], got {deviations.min():g}")
+    return np.broadcast_to(deviations, (m,)).copy()
+
+
+@lru_cache(maxsize=16)
+def _equal(sigma: float, m: int) -> np.ndarray:
+    """Return the same standard deviation for all cables, kept for the next call of a stream."""
+    deviations = np.full(m, sigma)
+    deviations.flags.writeable = False
+    return deviations
+
+
+def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
+    """Return (N, ...) of an array whose last `core` dimensions are its own."""
+    own = array.shape[array.ndim - core :]
+    if array.shape == batch + own:
+        return np.ascontiguousarray(array.reshape(-1, *own))
+    return np.ascontiguousarray(np.broadcast_to(array, batch + own).reshape(-1, *own))
+
+
+def _start(problem: Problem, start: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
+    """Return starts (N, 6), with coordinates that cannot move at home."""
+    rows = _rows(start, batch, 1)
+    return rows if problem.freedoms == 6 else np.where(problem.free > 0.0, rows, problem.home)

@@ -1,0 +1,125 @@
+"""Poses from lengths without a start: descents from several attitudes until one fits.
+
+A level platform with the given lengths is often near the true one, and home often is, so these come first; those that
+do not fit exactly go on from the level platform turned by 45 and 90 degrees about one axis. Of several poses that fit
+the likeliest is taken, if angles from home are spread by 30 degrees. With as many cables as coordinates many poses
+fit, so that six cables go on from turns about oblique axes; a pose in which the cables can hold the weight comes before
+those in which they cannot, which make it ambiguous all the same, since CoM and load are not exact.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+
+import numpy as np
+
+from ...models import points
+from ...models.robot import Robot
+from .estimate import EXACT, largest_cost, moved
+from .problem import DAMPING, Problem
+from .taut import taut
+
+__all__ = ["APART", "level_platform", "search"]
+
+TURNS = np.radians([45.0, 90.0])
+OBLIQUE = np.radians([60.0, 25.0])  # about an axis between two, for platforms that have many poses with their lengths
+USUAL = np.radians(30.0)  # standard deviation of the angle from home, where several poses fit
+APART = 0.02  # in radians, and times the platform's size: poses that are not one
+RARE = 1e-4  # share of sound measurements that fit no better than the least likely pose that counts as ambiguous
+MISFIT = 1e12  # beyond the score of any pose that fits
+
+
+def search(
+    robot: Robot, problem: Problem, lengths: np.ndarray, sigma: np.ndarray, carrier_pose: np.ndarray | None
+) -> _Best:
+    """Return poses (N, 6), errors (N, m) in standard deviations, and where they are minima or ambiguous, (N,).
+
+    Arguments are those of `pose_from_lengths`, with lengths (N, m).
+    """
+    best = _Best(robot, problem, len(lengths))
+    level = level_platform(problem, lengths, 1.0 / sigma)
+    for start in _starts(problem, level):
+        left = best.left
+        to, errors, ended = problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left])
+        carriers = carrier_pose if carrier_pose is None or carrier_pose.ndim == 2 else carrier_pose[left]
+        best.offer(left, to, errors, ended, carriers)
+        if not best.left.size:
+            break
+    return best
+
+
+class _Best:
+    """The best poses so far.
+
+    Attributes
+    ----------
+    poses, errors, ended
+        As `search` returns them.
+    ambiguous
+        Where another pose fits too, held by the cables or not, (N,).
+    left
+        The problems that are to be searched on.
+    """
+
+    def __init__(self, robot: Robot, problem: Problem, count: int):
+        self._robot, self._home = robot, points.rotations(problem.home[3:])
+        redundancy = robot.m - problem.freedoms
+        self._most, self._square = largest_cost(redundancy), redundancy == 0
+        self._doubtful = largest_cost(redundancy, RARE)
+        self.poses, self.errors = np.tile(problem.home, (count, 1)), np.full((count, robot.m), np.inf)
+        self.ended, self.ambiguous, self.left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
+        self._score, self._plausible = np.full(count, np.inf), np.zeros(count, bool)
+
+    def offer(
+        self, rows: np.ndarray, poses: np.ndarray, errors: np.ndarray, ended: np.ndarray, carriers: np.ndarray | None
+    ) -> None:
+        """Keep the poses of `rows` that are better than those so far."""
+        cost = np.sum(errors**2, axis=1)
+        fits = ended & (cost <= self._most)
+        # The true pose may be one that hardly fits, or one that is not held with the file's CoM and load.
+        plausible = ended & (cost <= self._doubtful)
+        if self._square and fits.any():
+            of_fits = carriers if carriers is None or carriers.ndim == 2 else carriers[fits]
+            fits[fits] = taut(self._robot, poses[fits], of_fits)
+        R = points.rotations(poses[:, 3:])
+        turned = np.einsum("nij,ij->n", R, self._home)  # the trace of R R_home^T
+        angle = np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))
+        score = np.where(fits, cost + (angle / USUAL) ** 2, np.where(np.isfinite(cost), MISFIT + cost, np.inf))
+        apart = np.abs(poses[:, :3] - self.poses[rows, :3]).max(axis=1) > APART * self._robot.length
+        apart |= np.abs(R - points.rotations(self.poses[rows, 3:])).max(axis=(1, 2)) > APART
+        self.ambiguous[rows] |= plausible & self._plausible[rows] & apart
+        better = score < self._score[rows]
+        kept = rows[better]
+        self.poses[kept], self.errors[kept] = poses[better], errors[better]
+        self.ended[kept], self._score[kept] = ended[better], score[better]
+        self._plausible[kept] = plausible[better]
+        if not self._square:
+            # Errors that are rounding leave no doubt: two poses of a redundant robot hardly share all their lengths.
+            self.left = rows[~(fits & (cost <= EXACT**2))]
+
+
+def level_platform(problem: Problem, lengths: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the places, (N, 6), at which the platform has about these lengths with the attitude of home."""
+    straight = problem.free.copy()
+    straight[3:] = 0.0
+    home = np.broadcast_to(problem.home, (len(lengths), 6))
+    return problem.descend(lengths, problem.milder(weights), home, DAMPING, straight)[0]
+
+
+def _starts(problem: Problem, level: np.ndarray):
+    """Yield starting poses, (N, 6) each, the likeliest first."""
+    yield level
+    yield np.broadcast_to(problem.home, level.shape)
+    for turn in TURNS:
+        for axis in np.flatnonzero(problem.free[3:]):
+            for sign in (1.0, -1.0):
+                step = np.zeros(6)
+                step[3 + axis] = sign * turn
+                yield moved(level, step)
+    if problem.m == problem.freedoms == 6:
+        for turn in OBLIQUE:
+            for one, other in combinations(range(3, 6), 2):
+                for signs in product((1.0, -1.0), repeat=2):
+                    step = np.zeros(6)
+                    step[[one, other]] = turn * np.sqrt(0.5) * np.array(signs)
+                    yield moved(level, step)

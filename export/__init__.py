@@ -1,0 +1,1 @@
+"""What other programs take over: the control step as C, and robots as MuJoCo models."""

@@ -1,1 +1,0 @@
-"""Forward kinematics: the pose of the platform from the lengths of its cables."""

@@ -1,0 +1,38 @@
+"""`relative_violation`: how far a motion is from being feasible, as one number, to compare motions by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..tasks.scenario import Scenario
+from .audit import Audit
+from .excess import Excess
+
+__all__ = ["relative_violation"]
+
+
+def relative_violation(scenario: Scenario, audit: Audit) -> float:
+    """Return the largest violation of any limit, relative to that limit; zero if the audit passed.
+
+    A missing wrench is relative to `Robot.force_scale`. An excess over a limit of zero is relative to the same force or
+    to `Robot.length`, by its unit. A value that is undefined is an infinite violation.
+    """
+    if audit.passed:
+        return 0.0
+    missing = float(audit.violation.max())
+    shares = [missing / scenario.robot.force_scale if missing > audit.tolerance else 0.0]
+    shares += [_share(scenario, excess) for excess in audit.excess]
+    return max(shares)
+
+
+def _share(scenario: Scenario, excess: Excess) -> float:
+    if not np.isfinite(excess.value):
+        return np.inf
+    return abs(excess.value - excess.bound) / (abs(excess.bound) or _scale(scenario, excess.unit))
+
+
+def _scale(scenario: Scenario, unit: str) -> float:
+    """Return the robot's scale of a unit, in that unit; times are in seconds."""
+    robot = scenario.robot
+    quantity = unit.partition("/")[0].partition(",")[0].strip()
+    return {"m": robot.length, "N": robot.force_scale, "N m": robot.force_scale * robot.length}.get(quantity, 1.0)

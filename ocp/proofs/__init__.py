@@ -1,0 +1,1 @@
+"""Reasons why no motion can be feasible, each with its certificate."""

@@ -1,0 +1,273 @@
+"""Prove a task infeasible from values that the planner cannot change, before any program is solved: `blocked`.
+
+Where the platform starts and ends, and along a path that it must follow, some coordinates have no freedom. Whether a
+limit that depends on these alone is kept does not depend on the planner. Nor does whether tensions exist, where the
+task fixes all of platform and carriers, or whether all cables together can carry the weight. A distance from an
+obstacle changes by at most the distance that points of the platform can move inside the tube.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...solvers import Certificate
+from ..audits.audit import Audit
+from ..audits.by_phase import distribution
+from ..audits.checks import LENGTH_TOLERANCE
+from ..audits.excess import Excess
+from ..limits import Limit, Rate
+from ..tasks.ends import AT_REST, fixed_values
+from ..tasks.paths import Motion
+from ..tasks.scenario import ATTITUDE, Scenario
+from .no_attitude import CERTAIN, no_attitude
+from .too_fast import too_fast
+from .too_heavy import OF_WEIGHT, too_heavy
+
+__all__ = ["Blocked", "blocked"]
+
+PLACES = 41  # along the path
+GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
+
+
+class Blocked(NamedTuple):
+    """The proof that no motion keeps a task's limits.
+
+    Attributes
+    ----------
+    excess
+        Each limit that is exceeded whatever the planner chooses, where it is exceeded by most.
+    certificate
+        That of an end at which no tensions exist; None if both ends have tensions or are not fixed.
+    """
+
+    excess: list[Excess]
+    certificate: Certificate | None
+
+    def describe(self) -> str:
+        """Return one line for a person."""
+        lines = [str(excess) for excess in self.excess[:1]]
+        if self.certificate is not None:
+            lines.append(f"no tensions at t = {self.certificate.time:.3f} s")
+        return "; ".join(lines)
+
+    @property
+    def by_rates(self) -> bool:
+        """Return whether only speeds and accelerations are exceeded, which fall with a longer duration."""
+        return self.certificate is None and all("/s" in excess.unit for excess in self.excess)
+
+    @property
+    def by_weight(self) -> bool:
+        """Return whether the robot is too weak for what it carries, which no other field of the task changes."""
+        return any(excess.limit in OF_WEIGHT for excess in self.excess)
+
+    def of(self, audit: Audit) -> Audit:
+        """Return an audit that shows what is proven, and no more."""
+        return replace(audit, excess=self.excess, certificate=self.certificate)
+
+
+def blocked(scenario: Scenario) -> Blocked | None:
+    """Return the proof that a task is impossible, if its ends or a path that it must follow show it; else None."""
+    times = np.concatenate([[0.0, scenario.duration], np.linspace(0.0, scenario.duration, PLACES)[1:-1]])
+    freedom = [_freedom(scenario, 0), _freedom(scenario, -1), _freedom(scenario, None)]
+    platform, carriers = _at_places(scenario, times, freedom)
+    proven = _exceeded(scenario, times, freedom, platform, carriers)
+    proven += _stretched(scenario, times, freedom, platform, carriers)
+    known = {(excess.limit, excess.about) for excess in proven}
+    hurried = _hurried(scenario, times, freedom, platform, carriers)
+    proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
+    proven += too_heavy(scenario, _resting(freedom, platform, carriers))
+    certificate = _without_tensions(scenario, times, freedom, platform, carriers)
+    if not proven and certificate is None:
+        proven += _at_no_attitude(scenario, times, freedom, platform, carriers)
+    return Blocked(proven, certificate) if proven or certificate is not None else None
+
+
+def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
+    """Return the freedom of each value of the platform, then of each carrier, (1 + c, 3, 6), at an end or between."""
+    freedom = np.full((1 + len(scenario.robot.carriers), 3, 6), GIVEN)
+    if scenario.duration_range is not None:
+        platform, carriers = scenario.references(np.array([0.0, scenario.duration]))
+        for body, reference in enumerate((platform, *carriers)):
+            for order in (1, 2):
+                moves = reference[order][end].any() if end is not None else reference[order].any() or body == 0
+                freedom[body, order] = FREE if moves else GIVEN
+    for owner, coordinate in scenario.owners():
+        freedom[0 if owner is None else 1 + owner, :, coordinate] = FREE
+        if owner is None:
+            freedom[0, 0, coordinate] = NEAR
+    owners = scenario.owners()
+    for fixed in fixed_values(scenario):
+        owner, coordinate = owners[fixed.column]
+        if fixed.end == end:
+            freedom[0 if owner is None else 1 + owner, fixed.order, coordinate] = GIVEN
+    undone = any(owners[fixed.column][0] is None and fixed.value for fixed in fixed_values(scenario))
+    if scenario.relative and undone:  # rest in the frame of the carrier, on a path that moves there
+        freedom[0, 1:] = FREE
+    if scenario.relative:  # in {G} each value of the platform depends on all of the carrier's, and on its own
+        for order in range(3):
+            freedom[0, order] = FREE if freedom[1:, : order + 1].any() else freedom[0, : order + 1].max()
+    return freedom
+
+
+def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray]) -> tuple[Motion, Motion]:
+    """Return the motion in {G} of platform and carriers at start, end and places between, where it is given."""
+    platform, carriers = scenario.motion(times, None)
+    owners = scenario.owners()
+    for fixed in fixed_values(scenario):
+        owner, coordinate = owners[fixed.column]
+        where = (coordinate,) if owner is None else (owner, coordinate)
+        if owner is not None or not scenario.relative:
+            (platform if owner is None else carriers)[fixed.order][(abs(fixed.end), *where)] += fixed.value
+    return platform, carriers
+
+
+def _reach(scenario: Scenario, freedom: np.ndarray) -> float:
+    """Return how far a point of the platform can be from where the reference has it [m]."""
+    robot, tube = scenario.robot, scenario.task.tube
+    points = np.vstack([robot.attachments, robot.platform.com])
+    turns = tube.turn * (freedom[0, 0, list(ATTITUDE)] == NEAR).sum()
+    moves = tube.radius if (freedom[0, 0, :3] == NEAR).any() else 0.0
+    return float(moves + turns * np.linalg.norm(points, axis=1).max())
+
+
+def _exceeded(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> list[Excess]:
+    """Return the limits that are exceeded whatever the planner chooses, each where it is exceeded by most."""
+    limits, exceeded = scenario.limits, []
+    values = limits.along(platform, carriers, None, scenario.off_path(times, platform, carriers))
+    worst: dict[int, tuple[float, Excess]] = {}
+    for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
+        chosen, near = _dependent(scenario, freedom[which])
+        reach = _reach(scenario, freedom[which])
+        for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
+            if limit.soft is not None or isinstance(limit, Rate) or not (found := values[k][rows]).size:
+                continue
+            excess = _excess(limit, times[rows], found, chosen[place], near[place], reach)
+            if excess is not None and (k not in worst or excess[0] > worst[k][0]):
+                worst[k] = excess
+    for _, excess in sorted(worst.values(), key=lambda pair: -pair[0]):
+        if not any(excess.limit == other.limit and excess.about == other.about for other in exceeded):
+            exceeded.append(excess)
+    return exceeded
+
+
+def _at_no_attitude(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> list[Excess]:
+    """Return the limit that the platform exceeds at an end whatever attitude the planner chooses there."""
+    if scenario.relative:
+        return []
+    for end in (0, 1):
+        angles = [i for i in ATTITUDE if freedom[end][0, 0, i] == NEAR]
+        if angles and (freedom[end][0, 0, :3] == GIVEN).all():
+            usable = ~_dependent(scenario, freedom[end])[0]
+            pose, places = platform.pose[end], carriers.pose[end]
+            if proven := no_attitude(scenario, float(times[end]), angles, pose, places, usable):
+                return proven
+    return []
+
+
+def _stretched(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> list[Excess]:
+    """Return the worst cable that cannot keep the length that its drive fixes, if its carrier's place is given."""
+    robot = scenario.robot
+    if robot.fixed_lengths is None:
+        return []
+    off = np.abs(scenario.dynamics.cable_lengths(platform.pose, carriers.pose) - robot.fixed_lengths)
+    for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
+        free = freedom[which][:, 0].max(axis=1)
+        tied = (free[0] < FREE) & (free[1:] == GIVEN)[robot.carrier_of_cable]
+        off[rows] -= np.where(tied, _reach(scenario, freedom[which]), np.inf)
+    row, cable = np.unravel_index(off.argmax(), off.shape)
+    if off[row, cable] <= LENGTH_TOLERANCE:
+        return []
+    length = float(scenario.dynamics.cable_lengths(platform.pose[row], carriers.pose[row])[cable])
+    kept, why = float(robot.fixed_lengths[cable]), "with the drive fixed-length it stays"
+    return [Excess("cable_length", f"cable {cable + 1}", float(times[row]), length, kept, "m", "exactly", why)]
+
+
+def _hurried(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> Iterator[Excess]:
+    """Yield the limits of speeds and accelerations that are exceeded because the duration is too short."""
+    order = np.argsort(times)
+    which = np.minimum(np.arange(len(times)), 2)  # of `freedom`: start, end, between
+    poses = np.concatenate([platform.pose[None], carriers.pose.swapaxes(0, 1)])[:, order]
+    spread = np.zeros((len(poses), 3))
+    for kind, its in enumerate(freedom):
+        spread[:, kind] = np.where((its[:, 0] == FREE).any(axis=1), np.inf, 0.0)
+        spread[0, kind] += _reach(scenario, its)
+    resting = np.all(_resting(freedom, platform, carriers, 3), axis=0)
+    return too_fast(scenario, times[order], poses, spread[:, which[order]], resting)
+
+
+def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:
+    """Return which of platform and carriers have no speed in the first coordinates at start and end, (2, 1 + c)."""
+    speeds = np.concatenate([platform.velocity[:2, None], carriers.velocity[:2]], axis=1)[:, :, :count]
+    given = np.stack([freedom[end][:, 1, :count] == GIVEN for end in (0, 1)])
+    return np.all(given & (np.abs(speeds) < AT_REST), axis=2)
+
+
+def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which values of all limits depend on what the planner chooses, and which on the tube's freedom alone."""
+    function = scenario.limits.function
+    count = function.numel_out(0)
+    on_platform = freedom[0, 0] != GIVEN
+    of_input = [*freedom.reshape(len(freedom), -1), np.full(scenario.robot.m, FREE), np.where(on_platform, FREE, GIVEN)]
+    chosen, near = np.zeros(count, bool), np.zeros(count, bool)
+    for i, kinds in enumerate(of_input):
+        sparsity = function.jac_sparsity(0, i)
+        rows, columns = np.array(sparsity.row(), int), np.array(sparsity.get_col(), int)
+        chosen[rows[kinds[columns] == FREE]] = True
+        near[rows[kinds[columns] == NEAR]] = True
+    return chosen, near
+
+
+def _excess(
+    limit: Limit, times: np.ndarray, values: np.ndarray, chosen: np.ndarray, near: np.ndarray, reach: float
+) -> tuple[float, Excess] | None:
+    """Return by what part of its scale a limit is exceeded at some of `times`, and the excess itself."""
+    over = limit.over(times, values)
+    if over.shape[1] != values.shape[1]:  # one value of all components
+        chosen, near = (np.array([each.any()]) for each in (chosen, near))
+    room = np.where(chosen, np.inf, np.where(near, limit.per_metre * reach + CERTAIN, 0.0))
+    beyond = np.maximum(limit.low - over, over - limit.high) - room
+    beyond = np.where(np.isnan(beyond), -np.inf, beyond)
+    if beyond.max() <= limit.tolerance:
+        return None
+    row, which = np.unravel_index(beyond.argmax(), beyond.shape)
+    value = float(over[row, which])
+    side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
+    why = "" if not near[which] else f"the tube leaves it at most {room[which]:.3g} {limit.unit} more"
+    about = limit.about(int(which))
+    excess = Excess(limit.name, about, float(times[row]), value, bound, limit.unit, side, why)
+    return float(beyond[row, which]) / limit.scale, excess
+
+
+def _without_tensions(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> Certificate | None:
+    """Return the certificate of an end at which the whole robot is given and no tensions exist; None if they do."""
+    worst: Certificate | None = None
+    for row in (0, 1):
+        if freedom[row].any():
+            continue
+        one = slice(row, row + 1)
+        A = scenario.dynamics.wrench_matrix(platform.pose[one], carriers.pose[one])
+        distribute = distribution(scenario, times[one], A)
+        moving, bases = (Motion(*(part[one] for part in motion)) for motion in (platform, carriers))
+        for wind in scenario.winds_at(platform.pose[row], platform.velocity[row]):
+            result = distribute(scenario.required_wrench(times[one], moving, bases, wind), None)
+            found = result.certificate
+            if found is None or max(float(result.violation[0]), result.beyond) <= distribute.tolerance:
+                continue
+            if worst is None or found.shortfall > worst.shortfall:
+                at = None if scenario.wind_box is None else wind
+                worst = replace(found, time=float(times[row]), wind=at)
+    return worst

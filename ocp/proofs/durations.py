@@ -1,0 +1,104 @@
+"""Compute the durations in which a path can be followed exactly and by its own time law: `durations`.
+
+If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at each place of the path the wrench is
+
+    w(T) = c + d X,    X = (T_0 / T)^2,
+
+with c that of rest and c + d that of the duration T_0: the dynamics are linear in accelerations and quadratic in
+velocities. The X for which tensions inside their limits exist are then an interval, whose ends two linear programs in
+(t, X) give; a duration must lie in the intervals of all places.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..tasks.scenario import Scenario
+
+__all__ = ["Durations", "durations"]
+
+PLACES = 41
+FASTEST = 1e4  # of X: a hundredth of the duration
+SLACK = 1e-6  # relative: by so much the linear programs may be off
+INDEPENDENT = 1e-3  # of the largest singular value, as the audit has it
+
+
+class Durations(NamedTuple):
+    """A necessary condition on a duration T: shortest <= T <= longest.
+
+    Attributes
+    ----------
+    shortest, longest
+        [s]; longest is infinite if rest is possible everywhere. If no duration is possible, shortest is infinite and
+        longest zero.
+    at
+        The place that decides, as a fraction of the duration: that of `shortest`, or where no duration is possible.
+    """
+
+    shortest: float
+    longest: float
+    at: float
+
+    @property
+    def exist(self) -> bool:
+        """Return whether any duration is possible."""
+        return self.shortest <= self.longest
+
+    def leave(self, low: float, high: float) -> bool:
+        """Return whether a duration from `low` to `high` [s] may be possible; doubtful ones may."""
+        return max(self.shortest * (1 - SLACK), low) <= min(self.longest * (1 + SLACK), high)
+
+
+def durations(scenario: Scenario) -> Durations | None:
+    """Return the durations that are possible at `PLACES` places of the path; None if this method does not apply.
+
+    It does not if anything but the duration is free, a path has times of its own, the drag depends on the speed
+    in another way, or the cables have fewer independent columns than the platform has degrees of freedom.
+    """
+    paths = [scenario.path, *scenario.carrier_paths.values()]
+    if scenario.count or scenario.task.wind is not None or not all(path.stretches for path in paths):
+        return None
+    robot, dynamics = scenario.robot, scenario.dynamics
+    shares = np.linspace(0.0, 1.0, PLACES)
+    platform, carriers = scenario.motion(shares * scenario.duration, None)
+    rows = np.flatnonzero(robot.dof_mask)
+    scale = robot.wrench_scale[rows]
+    A = dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
+    values = np.linalg.svd(A, compute_uv=False)
+    if robot.m < len(rows) or (values[:, -1] < INDEPENDENT * values[:, 0]).any():
+        return None
+    still = np.zeros_like(platform.pose)
+    at_rest = dynamics.required_wrench(platform.pose, still, still)
+    c = at_rest[:, rows] * scale / robot.force_scale
+    d = dynamics.required_wrench(*platform, *carriers)[:, rows] * scale / robot.force_scale - c
+    bounds = [bound / robot.force_scale for bound in scenario.bounds()]
+    least, most, decisive = 0.0, FASTEST, 0
+    for k in range(PLACES):
+        interval = _interval(A[k], c[k], d[k], bounds, least, most)
+        if interval is None:
+            return Durations(np.inf, 0.0, float(shares[k]))
+        decisive = k if interval[1] < most else decisive
+        least, most = interval
+    shortest = scenario.duration / np.sqrt(most)
+    longest = np.inf if least <= SLACK else scenario.duration / np.sqrt(least)
+    return Durations(float(shortest), float(longest), float(shares[decisive]))
+
+
+def _interval(
+    A: np.ndarray, c: np.ndarray, d: np.ndarray, bounds: list[np.ndarray], least: float, most: float
+) -> tuple[float, float] | None:
+    """Return the least and largest X from `least` to `most` with A t = c + d X, t inside its bounds; or None."""
+    from scipy.optimize import linprog
+
+    ends = []
+    for sign in (1.0, -1.0):
+        cost = np.append(np.zeros(A.shape[1]), sign)
+        box = [*zip(*bounds, strict=True), (least, most)]
+        result = linprog(cost, A_eq=np.column_stack([A, -d]), b_eq=c, bounds=box, method="highs")
+        if result.status == 2:  # infeasible
+            return None
+        # Any other message of HiGHS proves nothing.
+        ends.append(float(result.x[-1]) if result.success else (least if sign > 0 else most))
+    return ends[0], ends[1]

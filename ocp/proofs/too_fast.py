@@ -1,0 +1,87 @@
+"""Prove limits on speeds and accelerations exceeded whatever the planner chooses: `too_fast`.
+
+From one time to another, a body moves at least as far as its places are apart, less its permitted distances from them.
+Its mean speed, from which its largest one follows, is at least this distance divided by the time; its largest
+acceleration, if it is at rest at both times, at least four times the distance divided by the square of the time. Inside
+a tube, second differences bound the acceleration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..audits.excess import Excess
+from ..limits import Limit
+from ..limits.cables import CableSpeed
+from ..limits.carriers import CarrierAcceleration, CarrierSpeed
+from ..limits.platform import PlatformAcceleration, PlatformSpeed
+from ..tasks.scenario import Scenario
+
+__all__ = ["too_fast"]
+
+
+def too_fast(
+    scenario: Scenario, times: np.ndarray, places: np.ndarray, spread: np.ndarray, resting: np.ndarray
+) -> Iterator[Excess]:
+    """Yield each limit that is exceeded, where it is exceeded by most.
+
+    Parameters
+    ----------
+    times
+        Equally spaced, from start to end, (n,) [s].
+    places
+        Poses of the platform and of each carrier in {G}, without what the planner chooses, (1 + c, n, 6) [m, rad].
+    spread
+        How far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
+    resting
+        Which of them are at rest at both ends, (1 + c,) of bool.
+    """
+    lengths = None
+    for limit in scenario.limits:
+        if limit.soft is not None:
+            continue
+        body = 0 if limit.hull is None or limit.hull.carrier is None else 1 + limit.hull.carrier
+        x, off = places[body, :, None, :3], spread[body, :, None]
+        if isinstance(limit, PlatformSpeed | CarrierSpeed):
+            yield from _mean_rate(limit, times, x, off)
+        elif isinstance(limit, CableSpeed):
+            if lengths is None:
+                poses = places[0], places[1:].swapaxes(0, 1)
+                lengths = scenario.dynamics.cable_lengths(*poses)[..., None]
+            yield from _mean_rate(limit, times, lengths, (spread[0] + spread[1:][scenario.robot.carrier_of_cable]).T)
+        elif isinstance(limit, PlatformAcceleration | CarrierAcceleration):
+            yield from _acceleration(limit, times, x[:, 0], off[:, 0], bool(resting[body]))
+
+
+def _mean_rate(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray) -> Iterator[Excess]:
+    """Yield the limit of a rate if the mean rate of some vector x (n, k, d), less off (n, k), exceeds it."""
+    first, last = np.triu_indices(len(times), 1)
+    moved = np.linalg.norm(x[last] - x[first], axis=2) - off[last] - off[first]
+    rate = moved / (times[last] - times[first])[:, None]
+    pair, which = np.unravel_index(rate.argmax(), rate.shape)
+    if rate[pair, which] > limit.high + limit.tolerance:
+        begin, end = float(times[first[pair]]), float(times[last[pair]])
+        why = f"the smallest possible mean speed until t = {end:.3f} s"
+        yield Excess(limit.name, limit.labels[which], begin, float(rate[pair, which]), limit.high, limit.unit, why=why)
+
+
+def _acceleration(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray, rests: bool) -> Iterator[Excess]:
+    """Yield the limit of an acceleration if that of a motion within off (n,) of x (n, 3) must exceed it."""
+    whole = times[-1] - times[0]
+    moved = np.linalg.norm(x[-1] - x[0]) - off[-1] - off[0]
+    worst, at, why = (
+        4 * moved / whole**2 if rests else -np.inf,
+        0.0,
+        "the smallest possible from rest to rest in this time",
+    )
+    for steps in range(1, (len(times) - 1) // 2 + 1):
+        before, here, after = slice(None, -2 * steps), slice(steps, -steps), slice(2 * steps, None)
+        bent = np.linalg.norm(x[before] - 2 * x[here] + x[after], axis=1) - off[before] - 2 * off[here] - off[after]
+        least = bent / (times[steps] - times[0]) ** 2
+        if least.max() > worst:
+            worst, at = float(least.max()), float(times[here][least.argmax()])
+            why = f"least from t = {at - times[steps]:.3f} s to t = {at + times[steps]:.3f} s"
+    if worst > limit.high + limit.tolerance:
+        yield Excess(limit.name, limit.labels[0], at, float(worst), limit.high, limit.unit, why=why)

@@ -1,0 +1,1 @@
+"""The steps of planning: from first guesses to an audited motion."""

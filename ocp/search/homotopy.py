@@ -1,0 +1,63 @@
+"""Solve a program from the solutions of easier ones: slower, coarser, with linear distances (`from_easier`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..nlp.guess import balanced
+from ..nlp.near import has_places
+from ..nlp.rows import MANY, Mesh
+from ..nlp.solver import Outcome
+from ..tasks.deviation import Deviation
+from .search import Search
+
+__all__ = ["from_easier"]
+
+COARSE = 50  # steps: from four times as many on, the program of so few is solved first
+COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 100 steps then takes a third of the time
+SLOWER = 3.0  # than the duration that the planner starts from
+
+
+def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bool) -> Outcome:
+    """Solve the program from a motion that is nearer to its solution than `start`, if there is one."""
+    if search.knows(mesh):
+        return search.solve("nonlinear program", mesh, start)
+    coarse = _coarse(search) if guessed else None
+    near = _slowly(search, coarse or mesh, start) if guessed else None
+    near = search.approach(coarse or mesh, near or start) or near
+    optimal = False
+    if coarse is not None:
+        outcome = search.solve("coarse program", coarse, near or start, clear=near is not None)
+        optimal = outcome.success
+        near = outcome.deviation if optimal else near
+    # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
+    outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
+    if outcome.success or near is None or search.seconds_left <= 0:
+        return outcome
+    return search.solve("nonlinear program", mesh, start)
+
+
+def _slowly(search: Search, mesh: Mesh, start: Deviation | None) -> Deviation | None:
+    """Return a team's motion past obstacles that begins with a slower one; None if there is none.
+
+    The slower a motion is, the less must its carriers tilt, and a guess that is balanced at rest is nearly balanced.
+    """
+    scenario, span = search.scenario, search.scenario.duration_range
+    if scenario.count <= MANY or not scenario.stretches:
+        return None
+    slow = scenario.held(SLOWER * scenario.duration if span is None else min(SLOWER * scenario.duration, span.max))
+    if start is not None:
+        # Nodes as few as those of the mesh: what is sharp between them would tilt carriers as no limit lets them.
+        nodes = np.linspace(0.0, slow.duration, mesh.steps + 1)
+        start = balanced(slow, start.stretched(slow.duration / start.nodes[-1]).at(nodes))
+    motion = search.approach(mesh, start, slow)
+    return motion.stretched(scenario.duration / slow.duration) if motion is not None and span is None else motion
+
+
+def _coarse(search: Search) -> Mesh | None:
+    """Return the mesh whose optimum the program of the task's own starts from; None if that would save no time."""
+    scenario = search.scenario
+    steps, coarse, times = scenario.task.steps, COARSE, 4
+    if scenario.count > MANY:
+        coarse, times = COARSE_OF_MANY, 2 if has_places(scenario) else 4
+    return Mesh(coarse) if steps >= times * coarse else None

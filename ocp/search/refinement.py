@@ -1,0 +1,88 @@
+"""Solve a program again as long as the audit of its solution reports violations: `refine`."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+
+from ..audits.audit import Audit
+from ..nlp.rows import Mesh
+from ..nlp.solver import Outcome
+from ..tasks.scenario import Scenario
+from .search import Search, ended
+
+__all__ = ["refine"]
+
+REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
+MOST_STEPS = 1600
+RESERVE = 1e-3  # of the weight, from the tension limits
+LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
+SHRINK = 2e-3  # of limits beside those of the tensions
+TIGHTENINGS = 3  # on the same mesh
+LITTLE = 0.05  # of a limit: what a motion exceeds between nodes where the same mesh does
+TIGHTENED = 1.1  # times what the audit reports, on the same mesh
+LARGEST_SHARE = 0.2  # of a limit, for what one audit reports
+
+Shares: TypeAlias = tuple[tuple[str, str, float], ...]
+"""Name of a limit, what it is about, and the share by which it is reduced (`Mesh.further`)."""
+
+
+def refine(search: Search, outcome: Outcome) -> str:
+    """Audit a solution, and solve again as long as the audit reports violations; return why it ends.
+
+    Limits that are exceeded a little between the nodes are tightened by that on the same mesh, a few times. Else the
+    mesh gets finer each time.
+    """
+    scenario, steps = search.scenario, search.scenario.task.steps
+    audit = search.audit(outcome)
+    further: Shares = ()
+    little = LITTLE
+    for _ in range(TIGHTENINGS):
+        beyond = _beyond(scenario, audit)
+        if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
+            break
+        further, little = _tightened(scenario, audit, further, TIGHTENED), beyond / 2
+        again = search.solve("nonlinear program", Mesh(steps, further=further), outcome.deviation, clear=True)
+        if not again.success:
+            break
+        outcome, audit = again, search.audit(again)
+    reserve, shrink = 0.0, 0.0
+    for attempt in range(1, REFINEMENTS + 1):
+        if audit.passed or not (outcome.success or further) or search.seconds_left <= 0:
+            break
+        # Between finer nodes less can happen; a little distance from the limits takes care of what still does. It falls
+        # at least as the distance of the nodes does, and with it half of what was reduced before.
+        steps = min(2 * steps, MOST_STEPS)
+        missed = float(audit.violation.max()) / scenario.robot.force_scale
+        reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
+        shrink = SHRINK * attempt if audit.excess else shrink
+        if outcome.success:  # else not again what had no solution
+            further = _tightened(scenario, audit, tuple((name, about, share / 2) for name, about, share in further))
+        else:
+            further = ()
+        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
+        outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
+        audit = search.audit(outcome)
+    if outcome.success:
+        return f"the audit reports violations up to the finest mesh, {steps} steps"
+    return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
+
+
+def _beyond(scenario: Scenario, audit: Audit) -> float:
+    """Return the largest share of a limit by which an audit reports it exceeded; inf if less of a limit is no help."""
+    if audit.violation.max() > audit.tolerance:
+        return np.inf
+    shares = [share for *_, share in _tightened(scenario, audit, ())]
+    return max(shares, default=0.0) if all(shares) and len(shares) == len(audit.excess) else np.inf
+
+
+def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float = 1.0) -> Shares:
+    """Return the share by which each limit is reduced: as `before`, and by `factor` times what the audit reports."""
+    shares = {(name, about): share for name, about, share in before}
+    for excess in audit.excess:
+        for limit in scenario.limits:
+            if limit.name == excess.limit and limit.is_about(excess.about):
+                share = shares.get((excess.limit, excess.about), 0.0) + factor * limit.share_beyond(excess.value)
+                shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
+    return tuple((*key, share) for key, share in shares.items())

@@ -1,0 +1,255 @@
+"""Search for feasible tasks near an infeasible one, by another duration or looser limits, and audit each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base.text import quantity
+from ...models.parsing import validate
+from ...models.ranges import PositiveRange
+from ..audits.audit import Audit, other_tensions_may_pass
+from ..audits.excess import Excess
+from ..nlp.rows import Mesh
+from ..nlp.solver import Outcome
+from ..proofs.durations import Durations
+from ..result import Plan, Relaxed
+from ..tasks.deviation import Deviation
+from ..tasks.lay_out import lay_out
+from ..tasks.scenario import Scenario
+from ..tasks.status import MotionStatus
+from ..tasks.task import Task
+from .search import Search
+
+__all__ = ["near_fixed_motion", "near_motion"]
+
+LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
+LONGEST = 100.0  # times the requested duration: a longer one does not help
+TRIES = 3  # of a duration: not all that is exceeded falls as speeds and accelerations do
+DIGITS = 4  # of what is offered: reports print no more
+HALVINGS = 12  # of a margin
+PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
+TIME_COUNTS = 1e-2  # of the requested duration: it adds one to the objective, so that other costs hardly matter
+LONGEST_CHOSEN = 20.0  # times the requested duration: the program starts at its geometric mean with the requested one
+LONGER_CHOSEN = 1.05  # than the shortest duration, at which almost nothing is left to choose
+BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
+SHRINK = 5e-3  # of the limits, for what happens between the nodes
+LEAST_SECONDS = 5.0  # for a program, however short the search was
+
+
+class Change(NamedTuple):
+    """A field of a task, and another value for it."""
+
+    name: str
+    unit: str
+    requested: float
+    possible: float
+
+
+def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+    """Return what would make a fixed motion feasible; `left` are the durations that the tensions allow."""
+    chosen = _soft_limits(search, None) if other_tensions_may_pass(scenario, audit) else []
+    return _other_duration(search, scenario, left, audit) + (chosen or _other_limits(search, scenario, None, audit))
+
+
+def near_motion(
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool = True
+) -> list[Relaxed]:
+    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one."""
+    limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
+    return (_longer_duration(search) if slower_helps else []) + limits
+
+
+def _other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+    """Return the nearest duration at which a scenario's fixed motion is possible, if one is known.
+
+    Speeds fall with the duration, accelerations with its square; `left` are the durations that the tensions allow.
+    """
+    if left is not None and not left.exist:
+        return []
+    if not scenario.stretches:
+        return []
+    missing = audit.violation.max() > audit.tolerance
+    if left is None and missing:
+        return []
+    requested = near = lasts = scenario.duration
+    if left is not None:
+        near = min(max(near, LONGER * left.shortest), left.longest / LONGER)
+    for _ in range(TRIES):
+        factor = max((_slower(excess) for excess in audit.excess), default=1.0)
+        near = max(near, LONGER * factor * lasts) if factor > 1 else near
+        if near == lasts:  # no duration changes what is exceeded, and this one is audited
+            return []
+        lasts = near = _rounded(near, up=near >= requested)
+        if (left is not None and not left.shortest <= near <= left.longest) or near > LONGEST * requested:
+            return []
+        longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
+        audit = search.audit_motion(longer, None, f"audit, duration {quantity(near, 's')}")
+        if audit.passed:
+            plan = Plan(longer, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
+            return [Relaxed("duration", "s", requested, near, plan)]
+        if audit.violation.max() > audit.tolerance:
+            return []
+    return []
+
+
+def _slower(excess: Excess) -> float:
+    """Return the factor of the duration that brings a speed or an acceleration to its bound; 1 for other limits."""
+    if not excess.bound or not excess.value / excess.bound > 1:
+        return 1.0
+    ratio = excess.value / excess.bound
+    return ratio**0.5 if excess.unit.endswith("/s^2") else ratio if excess.unit.endswith("/s") else 1.0
+
+
+def _other_limits(
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, beyond: float = 0.0
+) -> list[Relaxed]:
+    """Return looser bounds for all limits that a motion exceeds; with all of these changes together its audit passes.
+
+    They are looser than the motion needs by `beyond` of their change.
+    The list is empty if the motion exceeds what a task cannot loosen: tension limits, limits of the robot's file, the
+    ends of the motion, the inside of an obstacle.
+    """
+    given, changes = scenario.task.model_dump(), dict[str, Change]()
+    least = scenario.hard_margin
+    for _ in range(TRIES):
+        for excess in audit.excess:
+            change = _loosened(given, excess, scenario, beyond)
+            if change is None:
+                return []
+            first = changes.get(change.name, change)
+            changes[change.name] = change._replace(requested=first.requested)
+        if audit.violation.max() > audit.tolerance:
+            if not given["margin"] or not least:
+                return []
+            given["margin"] = 0.0
+        looser, audit = _audited(search, scenario, given, deviation)
+        if audit.passed:
+            break
+    else:
+        return []
+    if given["margin"] != scenario.task.margin:
+        low, high = 0.0, least
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            _, tried = _audited(search, scenario, given | {"margin": middle}, deviation)
+            low, high = (middle, high) if tried.passed else (low, middle)
+        changes["margin"] = Change("margin", "N", least, _rounded(low, up=False))
+        looser, audit = _audited(search, scenario, given | {"margin": changes["margin"].possible}, deviation)
+    plan = Plan(looser, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
+    return [Relaxed(*change, plan) for change in changes.values()]
+
+
+def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
+    """Return looser bounds from the motion that exceeds the limits which a task can loosen by least.
+
+    The list is empty if the program has no solution with these limits soft.
+    """
+    scenario = search.scenario
+    limits = scenario.task.limits
+    soft = {
+        limit.name: PREFERRED * limit.scale
+        for limit in scenario.limits
+        if limit.soft is None and (limit.name == "keep_out" or getattr(limits, limit.name, None) is not None)
+    }
+    if scenario.hard_margin:
+        soft["margin"] = PREFERRED * scenario.robot.force_scale
+    if not soft:
+        return []
+    softer = scenario.task.model_copy(update={"limits": limits.model_copy(update={"soft": limits.soft | soft})})
+    outcome = _solved(
+        search, replace(lay_out(scenario.robot, softer), path=scenario.path), start, Mesh(scenario.task.steps)
+    )
+    if not outcome.success:
+        return []
+    lasting = scenario.lasting(outcome.duration)
+    audit = search.audit_motion(lasting, outcome.deviation)
+    return _other_limits(search, lasting, outcome.deviation, audit, BEYOND)
+
+
+def _longer_duration(search: Search) -> list[Relaxed]:
+    """Return a longer duration at which a scenario's motion, which the planner chooses, is possible, if it is shown."""
+    scenario, task = search.scenario, search.scenario.task
+    if not scenario.stretches:
+        return []
+    requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
+    open_task = task.model_copy(
+        update={
+            "duration": PositiveRange(min=requested, max=LONGEST_CHOSEN * requested),
+            "objective": task.objective.model_copy(update={"time": TIME_COUNTS * requested}),
+        }
+    )
+    outcome = _solved(search, lay_out(scenario.robot, open_task), None, Mesh(task.steps))
+    for attempt in range(TRIES):
+        if not outcome.success:
+            break
+        near = _rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
+        mesh = Mesh(task.steps * 2**attempt, shrink=SHRINK * (1 + attempt))
+        longer = lay_out(scenario.robot, task.model_copy(update={"duration": near}))
+        outcome = _solved(search, longer, outcome.deviation.stretched(near / outcome.duration), mesh)
+        audit = search.audit_motion(longer, outcome.deviation)
+        if audit.passed:
+            plan = Plan(longer, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
+            return [Relaxed("duration", "s", requested, near, plan)]
+    return []
+
+
+def _solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
+    """Solve another scenario's program, in the time that the task's limit left and no longer than the search took."""
+    left = scenario.task.time_limit - search.solve_s
+    beside = Search(scenario, {}, search.progress, min(left, max(search.solve_s, LEAST_SECONDS)))
+    return beside.solve("program of a relaxation", mesh, guess)
+
+
+def _rounded(value: float, up: bool) -> float:
+    """Return a number of as many digits as reports print, on the side that keeps what it is for."""
+    if not value:
+        return value
+    exponent = int(np.floor(np.log10(abs(value)))) - DIGITS + 1
+    digits = (np.ceil if up else np.floor)(value / 10.0**exponent - (1e-9 if up else -1e-9))
+    return float(f"{int(digits)}e{exponent}")
+
+
+def _audited(
+    search: Search, scenario: Scenario, given: dict[str, Any], deviation: Deviation | None
+) -> tuple[Scenario, Audit]:
+    """Return the scenario of a task with other numbers, and the audit of the same motion for it."""
+    kept = scenario.task.limits  # limits of one's own, and what makes them soft, only Python holds
+    others = {**given["limits"], "soft": kept.without_own().soft}
+    task = validate({**given, "limits": others}, Task, "task")
+    held = {"own": kept.own, "soft": kept.soft}
+    task = task.model_copy(update={"limits": task.limits.model_copy(update=held)})
+    looser = replace(lay_out(scenario.robot, task), path=scenario.path, duration=scenario.duration)
+    return looser, search.audit_motion(looser, deviation, "audit, looser limits")
+
+
+def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond: float) -> Change | None:
+    """Return the change of a task's field that accepts an excess, made in `given`; None if there is no such field."""
+    limits, above = given["limits"], excess.value > excess.bound
+    value = _rounded(excess.value + beyond * (excess.value - excess.bound), above)
+    name, bound = f"limits.{excess.limit}", limits.get(excess.limit)
+    if excess.limit == "tube.position":
+        given["tube"]["position"], name = value, excess.limit
+    elif excess.limit == "keep_out":
+        subject, _, place = excess.about.partition(" outside ")
+        about = "platform" if subject == "platform" else "cables" if subject.startswith("cable ") else "carriers"
+        names = [each.name for each in scenario.task.limits.keep_out]
+        if value < 0 or names.count(place) != 1:
+            return None
+        limits["keep_out"][names.index(place)][about] = value
+        name = f"clearance of {about} from {place}"
+    elif isinstance(bound, dict):
+        side, name = ("max", f"{name}.max") if above else ("min", f"{name}.min")
+        if isinstance(bound[side], float):
+            bound[side] = value
+        else:
+            axis = "xyz".index(excess.about[-1])
+            bound[side] = tuple(value if i == axis else old for i, old in enumerate(bound[side]))
+            name = f"{name}, {'xyz'[axis]}"
+    elif isinstance(bound, float) and value != 0:
+        limits[excess.limit] = value = abs(value)
+    else:
+        return None
+    return Change(name, excess.unit, abs(excess.bound) if isinstance(bound, float) else excess.bound, value)

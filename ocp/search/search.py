@@ -1,0 +1,285 @@
+"""Solve one scenario's programs and audit the solutions, one after the other, and record them: `Search`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from operator import itemgetter
+
+import numpy as np
+
+from ...base.text import quantity
+from ..audits.audit import Audit, audit
+from ..audits.violation import relative_violation
+from ..nlp.grid import Grid
+from ..nlp.guess import initial_guess, usual_guess
+from ..nlp.interrupts import raise_if_swallowed
+from ..nlp.linear import LinearDistances
+from ..nlp.near import Near, has_places
+from ..nlp.program import Program, build
+from ..nlp.rows import Mesh
+from ..nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
+from ..nlp.waiting import wait_for
+from ..result import Plan
+from ..tasks.deviation import Deviation
+from ..tasks.scenario import Scenario
+from ..tasks.status import MotionStatus
+from .stage import Stage
+
+__all__ = ["Search"]
+
+
+NEAR = 0.3  # of a motion's extent: where a place is, of which a program has rows the first time
+PASSES = 3
+MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
+APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
+USABLE = 1e-2  # of it: what the true program makes up for
+FOR_AUDIT, MOST_FOR_AUDIT = 0.1, 2.0  # of the time limit, and [s]: what is kept for the audit of the best motion
+GAIN = 0.02  # of the objective: less of it is not worth another pass
+ENDS = {  # of a run of the solver, by its message; others are quoted
+    "Solve_Succeeded": "solved",
+    "Solved_To_Acceptable_Level": "solved with less accuracy",
+    "Infeasible_Problem_Detected": "no solution found",
+    "Maximum_Iterations_Exceeded": "iteration limit reached",
+    TIME_LIMIT: "time limit reached",
+    SETTLED: "stopped improving",
+}
+
+
+class RunningStage:
+    """A stage that is running; it sets its message."""
+
+    message = ""
+
+
+class Search:
+    """Solve one scenario's programs, and record the time and the message of each stage.
+
+    Parameters
+    ----------
+    scenario
+        That of the task.
+    solvers
+        Those that exist already, by mesh; new ones are added.
+    progress
+        Called with (iteration, objective, infeasibility).
+    seconds
+        For all that the search does, from now on [s]; default: the task's time limit, less what the last audit takes.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        solvers: dict[Mesh, Solver],
+        progress: Progress | None,
+        seconds: float | None = None,
+    ):
+        self.scenario, self.progress, self._solvers = scenario, progress, solvers
+        limit = scenario.task.time_limit
+        own = limit - min(FOR_AUDIT * limit, MOST_FOR_AUDIT)
+        self._deadline = time.perf_counter() + (own if seconds is None else seconds)
+        self.build_s, self.solve_s = 0.0, 0.0
+        self.stages: list[Stage] = []
+        self.mesh: Mesh | None = None  # of the program that was solved last
+        self._iterates: list[tuple[int, float, float]] = []
+        self._audited: list[tuple[float, Outcome, Audit]] = []
+        self._interrupted: Outcome | None = None
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[RunningStage]:
+        """Record what happens inside as a stage."""
+        raise_if_swallowed()
+        start, running = time.perf_counter(), RunningStage()
+        yield running
+        self.stages.append(Stage(name, running.message, time.perf_counter() - start))
+
+    def _iteration(self, iteration: int, objective: float, infeasibility: float) -> None:
+        """Record an iteration, and report it."""
+        self._iterates.append((iteration, objective, infeasibility))
+        if self.progress is not None:
+            self.progress(iteration, objective, infeasibility)
+
+    @property
+    def seconds_left(self) -> float:
+        """Return how much is left of the time for the search [s]."""
+        return max(self._deadline - time.perf_counter(), 0.0)
+
+    def knows(self, mesh: Mesh) -> bool:
+        """Return whether the program of `mesh` exists: it may have a solution to start from."""
+        return mesh in self._solvers
+
+    def has_solution(self, mesh: Mesh) -> bool:
+        """Return whether the program of `mesh` has an optimum to start from."""
+        return mesh in self._solvers and self._solvers[mesh].has_solution
+
+    def solve(
+        self, name: str, mesh: Mesh, guess: Deviation | None, coarser: bool = False, clear: bool = False
+    ) -> Outcome:
+        """Solve the program of `mesh` from `guess`; default: from its last solution, or else from a guess of its own.
+
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh, and `clear` if it is past all places
+        that are in the way, as such an optimum is.
+        """
+        with self.stage(f"{name}, {mesh.steps} steps") as stage:
+            if self.seconds_left <= 0:
+                stage.message = f"{ENDS[TIME_LIMIT]} before it began"
+                return self._unsolved(mesh, guess)
+            outcome = self._run(mesh, guess, coarser, NEAR if coarser or clear else np.inf)
+            if (
+                outcome.success
+                and self.seconds_left > 0
+                and not self._solvers[mesh].program.suffices(outcome.deviation)
+            ):
+                outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf)
+            how = ended(outcome.message)
+            stage.message = f"{how} {'in' if how == 'solved' else 'after'} {outcome.iterations} iterations"
+            if mesh.elastic:
+                stage.message += f", short by {quantity(outcome.slack, 'N')}"
+        return outcome
+
+    def solve_again(self, mesh: Mesh, guess: Deviation) -> Outcome:
+        """Solve the program with parameters of `mesh` from a guess near its last solution, of another scenario."""
+        with self.stage(f"nonlinear program, {mesh.steps} steps") as stage:
+            start, self.mesh = time.perf_counter(), mesh
+            if mesh in self._solvers:
+                solver = self._solvers[mesh]
+                solver.take(self.scenario)
+            else:
+                solver = self._solvers[mesh] = wait_for(
+                    lambda: Solver(build(self.scenario, mesh, movable=True), MOST_AGAIN)
+                )
+            built = time.perf_counter()
+            outcome = solver.solve(guess, self._iteration, False, self.seconds_left, near=True)
+            self.solve_s += time.perf_counter() - built
+            solver.prepare(None, near=True)  # for the next one
+            self.build_s += built - start
+            stage.message = f"{ended(outcome.message)} in {outcome.iterations} iterations"
+        return outcome
+
+    def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
+        """Return a motion past the places that are in the way, from which the program of `mesh` soon ends, or None.
+
+        It results from passes with linear distances, each about the motion of the one before. The motion is one of
+        `scenario`; default: of the search's own.
+        """
+        slower = "" if scenario is None else f", in {quantity(scenario.duration, 's')}"
+        scenario = scenario or self.scenario
+        if not has_places(scenario) or scenario.task.solver == "fatrop" or self.seconds_left <= 0:
+            return None
+        with self.stage(f"program with linear distances, {mesh.steps} steps{slower}") as stage:
+            start = time.perf_counter()
+            linear = wait_for(lambda: LinearDistances(build(scenario, mesh)))
+            self.build_s += time.perf_counter() - start
+            motion = initial_guess(scenario, linear.shares * scenario.duration) if guess is None else guess
+            motion = motion.at(linear.shares * motion.nodes[-1])
+            objective, iterations, missed = np.inf, 0, np.inf
+            for passed in range(PASSES):
+                start = time.perf_counter()
+                outcome = linear.solve(motion, self._iteration, self.seconds_left)
+                self.solve_s += time.perf_counter() - start
+                iterations += outcome.iterations
+                stage.message = f"{ended(outcome.message)} after {iterations} iterations in pass {passed + 1}"
+                if not outcome.success:
+                    break
+                motion, missed = outcome.deviation, linear.missed(outcome.deviation)
+                if missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective):
+                    break
+                objective = outcome.objective
+        return motion if missed <= USABLE else None
+
+    def _unsolved(self, mesh: Mesh, guess: Deviation | None) -> Outcome:
+        """Return the motion from which the program of `mesh` would start, as the outcome of no iteration."""
+        scenario = self.scenario
+        motion = guess or usual_guess(scenario, Grid.of(scenario, mesh.steps).shares * scenario.duration)
+        slack = np.inf if mesh.elastic else 0.0
+        return Outcome(motion, float(motion.nodes[-1]), False, TIME_LIMIT, 0, slack, np.nan)
+
+    def _run(self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float) -> Outcome:
+        """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""
+        start, self.mesh = time.perf_counter(), mesh
+        known = self._solvers.get(mesh)
+        again = known is not None and guess is None and known.has_solution  # goes on from there, with its own rows
+        if known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
+            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
+        solver = self._solvers[mesh]
+        solver.prepare(guess, coarser)
+        built = time.perf_counter()
+        at = None if guess is None else guess.at(solver.program.shares * guess.nodes[-1])
+        try:
+            outcome = solver.solve(at, self._iteration, coarser, self.seconds_left)
+        except BaseException:
+            self._interrupted = None if mesh.elastic else solver.interrupted
+            raise
+        self.build_s += built - start
+        self.solve_s += time.perf_counter() - built
+        return outcome
+
+    def _built(self, mesh: Mesh, guess: Deviation | None, reach: float) -> Program:
+        """Return the program of `mesh`, without the rows of places that are farther than `reach` from the guess."""
+        scenario = self.scenario
+        if not has_places(scenario) or not np.isfinite(reach):
+            return build(scenario, mesh)
+        shares = Grid.of(scenario, mesh.steps).shares
+        motion = initial_guess(scenario, shares * scenario.duration) if guess is None else guess
+        return build(scenario, mesh, Near.along(scenario, shares, motion, reach))
+
+    def audit(self, outcome: Outcome) -> Audit:
+        """Audit the motion of a program's solution, which `best` then chooses from."""
+        scenario = self.scenario.lasting(outcome.duration)
+        audited = self.audit_motion(scenario, outcome.deviation)
+        self._audited.append((relative_violation(scenario, audited), outcome, audited))
+        return audited
+
+    def best_of_interrupted(self) -> Plan | None:
+        """Return the best plan of a search that was interrupted, audited now if it has to be; None if there is none."""
+        if self._interrupted is not None:
+            outcome, self._interrupted = self._interrupted, None
+            self.audit(outcome)
+        return self.best("the search was interrupted") if self._audited else None
+
+    def best(self, reason: str = "") -> Plan:
+        """Return the plan of the audited solution that violates its limits by least; the latest of equal ones.
+
+        `reason` is why the search ended, if it was not because of the time limit.
+        """
+        _, outcome, audited = min(reversed(self._audited), key=itemgetter(0))
+        if self.seconds_left <= 0:
+            reason = f"the time limit of {quantity(self.scenario.task.time_limit, 's')} is reached"
+        return Plan(
+            scenario=self.scenario.lasting(outcome.duration),
+            status=MotionStatus.FEASIBLE if audited.passed else MotionStatus.NOT_FOUND,
+            deviation=outcome.deviation,
+            audit=audited,
+            build_s=self.build_s,
+            solve_s=self.solve_s,
+            reason="" if audited.passed else reason,
+            iterations=outcome.iterations,
+            message=outcome.message,
+            iterates=tuple(self._iterates),
+            objective=outcome.objective,
+        )
+
+    def audit_motion(self, scenario: Scenario, deviation: Deviation | None, name: str = "audit") -> Audit:
+        """Audit any motion."""
+        with self.stage(name) as stage:
+            audited = audit(scenario, deviation)
+            stage.message = "passed" if audited.passed else describe(audited)
+        return audited
+
+
+def ended(message: str) -> str:
+    """Return how a run of the solver ended, from its message."""
+    return ENDS.get(message, f"stopped ({message})")
+
+
+def describe(audited: Audit) -> str:
+    """Return the violations of an audit in short."""
+    lines = []
+    if audited.violation.max() > audited.tolerance:
+        short = quantity(audited.violation.max(), "N")
+        lines.append(f"short by up to {short} at t = {audited.times[audited.worst]:.3f} s")
+    if audited.excess:
+        count = len(audited.excess)
+        lines.append(f"{count} other limit{'s' * (count > 1)} exceeded")
+    return ", ".join(lines)

@@ -1,0 +1,45 @@
+"""Compute the fastest time law along a task's path, as a stage of planning: `fastest`.
+
+Where the path is followed exactly from rest to rest, `time_along` computes the least time of all time laws: a shorter
+duration is impossible, and its law is a plan if it keeps the task's other limits too. Its minimum is that of a grid:
+it differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it is proven.
+"""
+
+from __future__ import annotations
+
+from ...base.errors import InputError, SolverError
+from ...base.text import quantity
+from ..tasks.paths import LinePath, RestPath, WaypointPath
+from ..tasks.scenario import Scenario
+from ..tasks.task import Tube
+from ..tasks.task_limits import TaskLimits
+from ..timing.fastest_law import KNOWN_LIMITS, time_along
+from ..timing.timing import Timing
+
+__all__ = ["BOUND", "fastest"]
+
+BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
+
+
+def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
+    """Return the fastest law along the path of a scenario whose duration alone is free, or None, and the message.
+
+    Limits of the task that `time_along` does not know are left out: its time is a lower bound even so.
+    """
+    task, still = scenario.task, [RestPath]
+    if any(type(path) not in still for path in scenario.carrier_paths.values()):
+        return None, "not computed: carriers have time laws of their own"
+    if scenario.wind_box is not None:
+        return None, "not computed: in moving air the drag is not proportional to the square of the speed"
+    path = task.path
+    if not (path.stretches and isinstance(path, LinePath | WaypointPath)) or getattr(path, "timing", "") == "uniform":
+        return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
+    hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
+    alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}
+    try:
+        timing = time_along(scenario.robot, task.model_copy(update=alone))
+    except (InputError, SolverError) as error:
+        return None, f"not computed: {str(error).removeprefix('time_along: ')}"
+    if timing.feasible:
+        return timing, f"the fastest law takes {quantity(timing.duration, 's', 6)}"
+    return timing, f"{timing.status.value} at {quantity(100 * (timing.at or 0.0), '%', 3)} of the path"

@@ -1,0 +1,185 @@
+"""Plan for the robots of an uncertainty: limits tightened by what tensions differ between these, until that suffices.
+
+The tensions of a robot whose cables are at other places differ from the planned ones (`towline.statics.robust`). By
+how much depends on the plan, so there are rounds: plan, compute the largest difference for each cable along the plan,
+tighten the limits of the cable by that, and plan again from there, until the tensions leave their limits in no audited instant
+of the requested share of the robots. Differences grow with the tensions, and the limits are tightened by a little more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...base.display import Displayed
+from ...base.text import quantity
+from ...models import Robot
+from ...statics.robust import Spread, motion_factor
+from ..audits.excess import Excess
+from ..audits.tensions import TOLERANCE
+from ..result import Plan
+from ..tasks.deviation import Deviation
+from ..tasks.lay_out import lay_out
+from ..tasks.scenario import Scenario
+from ..tasks.status import MotionStatus
+from .stage import Stage
+
+__all__ = ["RobustMargin", "for_robots", "judged"]
+
+ROUNDS = 4  # after the plan for the robot of the file; two suffice as a rule
+GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
+AT_ONCE = 4096  # instants
+MOST_OF_CURVE = 2000  # instants for the lengths of the curves
+
+
+@dataclass(frozen=True)
+class RobustMargin(Displayed):
+    """The differences of tensions between the robots of the uncertainty, along a plan, to first order.
+
+    Attributes
+    ----------
+    share
+        Of the robots that must have tensions inside their limits at all times.
+    factor
+        Standard deviations that this share keeps to (`robust.motion_factor`).
+    reach
+        By how much the tensions of these robots differ at most, at each audited time, (n, m) [N].
+    tightened
+        By how much the limits of the program were tightened, (m,) [N].
+    violation
+        How far tensions less their reach are outside of the limits less the task's margin, (n, m) [N]; 0: inside.
+    """
+
+    share: float
+    factor: float
+    reach: np.ndarray
+    tightened: np.ndarray
+    violation: np.ndarray
+
+    @property
+    def holds(self) -> bool:
+        """Return whether the share of the robots keeps all limits, to first order."""
+        return bool(self.violation.max() <= TOLERANCE)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return share, factor, and by cable the largest reach and what limits were tightened by, for JSON."""
+        return {
+            "share": self.share,
+            "factor": self.factor,
+            "reach": self.reach.max(axis=0).tolist(),
+            "tightened": self.tightened.tolist(),
+            "worst_violation": float(self.violation.max()),
+        }
+
+
+def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation | None], Plan]) -> Plan:
+    """Return the plan for a share of the robots, from the plan for the robot of the file.
+
+    Parameters
+    ----------
+    first
+        The plan that counts the robot of the file as exact.
+    share
+        Of the robots, above 0 and below 1.
+    climb
+        Plans a scenario from a start.
+    """
+    robot, task = first.scenario.robot, first.scenario.task
+    plan, stages = judged(first, robot, share), list(first.stages)
+    if not first.feasible:
+        return plan
+    spent = np.array([first.build_s, first.solve_s])
+    tightened, reason = np.zeros(robot.m), ""
+    for _ in range(ROUNDS):
+        if plan.robust is None or plan.robust.holds:
+            break
+        tightened = np.maximum(tightened, GROWTH * plan.robust.reach.max(axis=0))
+        cable = int(np.argmax(tightened))
+        by = f"limits tightened by up to {quantity(tightened[cable], 'N')} (cable {cable + 1})"
+        narrow = np.flatnonzero(robot.t_min + tightened + task.margin > robot.t_max - tightened - task.margin)
+        if narrow.size:
+            reason = f"tensions of the robots differ by more than the limits of cable {narrow[0] + 1} are apart"
+            break
+        again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
+        stages += [Stage(f"for {quantity(100 * share, '%')} of the robots", by, 0.0), *again.stages]
+        spent += again.build_s, again.solve_s
+        if not again.feasible:
+            reason = f"no motion was found with {by}"
+            break
+        plan = judged(again, robot, share)
+    else:
+        reason = f"tensions of the robots still differ by too much after {ROUNDS} rounds"
+    failed = plan.robust is not None and not plan.robust.holds
+    return replace(
+        plan,
+        stages=tuple(stages),
+        build_s=float(spent[0]),
+        solve_s=float(spent[1]),
+        reason=reason if failed else plan.reason,
+    )
+
+
+def judged(plan: Plan, robot: Robot, share: float) -> Plan:
+    """Return a plan of the robot with tightened limits as one of `robot` itself; not feasible if the share is less."""
+    scenario, audit = plan.scenario, plan.audit
+    tightened = scenario.robot.t_min - robot.t_min
+    task = scenario.task.model_copy(update={"robust": share})
+    own = lay_out(robot, task)
+    scenario = replace(scenario, robot=robot, task=task, dynamics=own.dynamics, limits=own.limits, tightened=tightened)
+    plan = replace(plan, scenario=scenario, offers=tuple)
+    if not np.isfinite(audit.tensions).all():
+        return plan
+    margin = _margin(scenario, plan, share)
+    plan = replace(plan, robust=margin)
+    if margin.holds:
+        return plan
+    row, cable = np.unravel_index(int(margin.violation.argmax()), margin.violation.shape)
+    excess = _excess(scenario, plan, margin, int(row), int(cable))
+    audit = replace(audit, excess=[*audit.excess, excess])
+    status = MotionStatus.NOT_FOUND if plan.feasible else plan.status
+    return replace(plan, status=status, audit=audit)
+
+
+def _margin(scenario: Scenario, plan: Plan, share: float) -> RobustMargin:
+    robot, audit = scenario.robot, plan.audit
+    n = len(audit.times)
+    some = np.unique(np.linspace(0, n - 1, min(n, MOST_OF_CURVE)).round().astype(int))
+    curve, sigmas = [], np.empty((n, robot.m))
+    for start in range(0, n, AT_ONCE):
+        part = slice(start, min(start + AT_ONCE, n))
+        changes = Spread(robot, audit.motion.pose[part], audit.carriers.pose[part]).changes(audit.tensions[part])
+        sigmas[part] = np.linalg.norm(changes, axis=2)
+        curve.append(changes[some[(some >= part.start) & (some < part.stop)] - start])
+    factor = motion_factor(np.concatenate(curve), share)
+    reach = factor * sigmas
+    low, high = _limits(scenario, audit.times)
+    outside = np.maximum(low + reach - audit.tensions, audit.tensions + reach - high)
+    return RobustMargin(share, factor, reach, scenario.tightened_by, np.maximum(outside, 0.0))
+
+
+def _limits(scenario: Scenario, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the limits of the robot less the task's margin, not tightened, (n, m) and (m,) [N]."""
+    return scenario.t_min_at(times) + scenario.hard_margin, scenario.robot.t_max - scenario.hard_margin
+
+
+def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin, row: int, cable: int) -> Excess:
+    audit, reach = plan.audit, float(margin.reach[row, cable])
+    low, high = _limits(scenario, audit.times)
+    value = float(audit.tensions[row, cable])
+    below = value - reach < low[row, cable]
+    bound = float(low[row, cable] + reach if below else high[cable] - reach)
+    why = f"{quantity(100 * margin.share, '%')} of the robots differ by up to {quantity(reach, 'N')}"
+    if reach > high[cable]:
+        why += ", since the cables hardly resist some direction"
+    side = "at least" if below else "at most"
+    return Excess("tension", f"cable {cable + 1}", float(audit.times[row]), value, bound, "N", side, why)
+
+
+def _tightened(robot: Robot, by: np.ndarray) -> Robot:
+    """Return the robot with tension limits that are tightened by (m,) [N]."""
+    cables = zip(robot.cables, by, strict=True)
+    new = [c.model_copy(update={"t_min": c.t_min + float(x), "t_max": c.t_max - float(x)}) for c, x in cables]
+    return robot.model_copy(update={"cables": tuple(new)})

@@ -1,0 +1,441 @@
+"""`Plant`: a robot in forward time, with cables that get slack, winches, wind and disturbances."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base import processors
+from ..base.errors import InputError, SolverError
+from ..base.inputs import number, one_of, shown, whole_number
+from ..models.batch import as_array, leading
+from ..models.dynamics import dynamics_of
+from ..models.files import as_robot
+from ..models.robot import Robot
+from . import layout
+from .machine import run_rows
+from .packing import bodies_of, cables_of, place, settings_of
+from .reading import Reading
+from .samples import complete
+
+__all__ = ["History", "Plant"]
+
+DRIVES = {
+    "lengths": layout.LENGTHS,
+    "rates": layout.RATES,
+    "forces": layout.FORCES,
+    "tensions": layout.TENSIONS,
+}
+SHORTEST_STEP, LONGEST_STEP = 1e-12, 1e3  # [s]
+STEPS_WORTH_A_THREAD = 20_000  # some 20 milliseconds
+
+
+class History(NamedTuple):
+    """States over time, with leading dimensions of a batch.
+
+    Attributes
+    ----------
+    times
+        (K,) [s], from 0.
+    states
+        (..., K, n).
+    tensions
+        (..., K, m) [N], at each state, under the command that begins there; at the last, under the one that ends there.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    tensions: np.ndarray
+
+
+class Plant:
+    """Simulate a robot: what it does for commands, step by step, in one kernel for all robots.
+
+    A state is a row of numbers, (n,), and the only memory: `start` makes one, `read` reads it, `step` and `run` return
+    later ones. Arguments may have leading batch dimensions, which broadcast. The same arguments give the same bits.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    drive
+        What cables are commanded: "lengths" [m], unstrained; "rates" of these [m/s]; "forces" [N], with which the
+        motors of winches pull; or "tensions" [N], whatever the motion. Without a winch in the robot's file, lengths and
+        rates are followed exactly: a length is reached, at constant rate, when its step ends. A winch follows them as a
+        servo loop inside its limits.
+    contacts
+        "located": steps end where a cable gets taut or slack, or a winch begins or ends to slip, so that the error
+        keeps its fourth order. "sampled": Runge-Kutta over the kinks, in a third of the time where there are many; for
+        elastic cables alone.
+    stiffness, damping
+        E A [N] and C [N s/m], a number or one for each cable, instead of those of the file. A cable without stiffness
+        never stretches: it holds its ends at most its length apart, and gets taut in an impact.
+    carrier_bandwidth, winch_bandwidth
+        Of the servo loops of mobile carriers and of winches [rad/s]. Assumed: no robot file has them.
+    tension_lag
+        Time constant [s] with which tensions follow their commands; 0: exactly.
+
+    Attributes
+    ----------
+    robot
+        The `Robot`.
+    size
+        How many numbers a state has, n.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value, or forces are commanded of cables without winches. Every method raises it, in
+        one line, for an argument of a wrong shape or value.
+    """
+
+    def __init__(
+        self,
+        robot: Robot | str | os.PathLike[str],
+        drive: str = "lengths",
+        contacts: str = "located",
+        stiffness: float | Sequence[float] | np.ndarray | None = None,
+        damping: float | Sequence[float] | np.ndarray | None = None,
+        carrier_bandwidth: float = 20.0,
+        winch_bandwidth: float = 100.0,
+        tension_lag: float = 0.0,
+    ):
+        self.robot = as_robot(robot)
+        self.drive = one_of("drive", drive, DRIVES)
+        self.contacts = one_of("contacts", contacts, ("located", "sampled"))
+        cables = self.robot.cables
+        EA = self._of_cables("stiffness", stiffness, [cable.stiffness or 0.0 for cable in cables])
+        C = self._of_cables("damping", damping, [cable.damping or 0.0 for cable in cables])
+        if drive == "forces" and any(cable.winch is None for cable in cables):
+            first = next(i for i, cable in enumerate(cables) if cable.winch is None)
+            raise InputError(f"drive must not be 'forces' unless every cable has a winch, got none in cables[{first}]")
+        if contacts == "sampled" and drive != "tensions" and not EA.all():
+            first = int(np.flatnonzero(EA == 0)[0])
+            raise InputError(
+                f"contacts must be 'located' unless all cables stretch, got no stiffness of cables[{first}]"
+            )
+        self._bodies, self._cables = bodies_of(self.robot), cables_of(self.robot, EA, C)
+        self._settings = settings_of(self.robot)
+        self._settings[layout.DRIVE] = DRIVES[drive]
+        self._settings[layout.LOCATE] = float(contacts == "located")
+        self._settings[layout.CARRIER_BANDWIDTH] = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e4)
+        self._settings[layout.WINCH_BANDWIDTH] = number("winch_bandwidth", winch_bandwidth, 1e-3, 1e4)
+        self._settings[layout.LAG] = number("tension_lag", tension_lag, 0.0, 1e3)
+        self._places = layout.BODY * len(self._bodies)
+        self.size = self._places + layout.CABLE_BLOCKS * self.robot.m
+        self._command_size = layout.COMMANDS + self.robot.m + layout.CARRIER * len(self.robot.carriers)
+
+    def _of_cables(self, name: str, value: Any, default: list[float]) -> np.ndarray:
+        given = default if value is None else value
+        result = as_array(name, given, () if np.ndim(given) == 0 else (self.robot.m,))
+        if result.ndim > 1 or (result < 0).any():
+            raise InputError(f"{name} must be numbers >= 0, one or one for each cable, got {shown(value)}")
+        return np.broadcast_to(result, self.robot.m)
+
+    def start(
+        self,
+        pose: Any = None,
+        velocity: Any = None,
+        carrier_pose: Any = None,
+        carrier_velocity: Any = None,
+        tensions: Any = None,
+        lengths: Any = None,
+    ) -> np.ndarray:
+        """Return a state, (..., n).
+
+        Parameters
+        ----------
+        pose, velocity
+            Of the platform frame in {G} [m, rad], (..., 6), and its time derivative; default: at home, at rest.
+        carrier_pose, carrier_velocity
+            The same of the carriers, (..., c, 6); velocities that a carrier cannot have are left out.
+        tensions
+            (..., m) [N]: elastic cables have the unstrained lengths that give these at rest.
+        lengths
+            Unstrained, (..., m) [m], instead of `tensions`; default: those without tension at the pose.
+
+        Raises
+        ------
+        InputError
+            If both tensions and lengths are given, or an argument has a wrong shape or value.
+        """
+        robot, count = self.robot, len(self.robot.carriers)
+        poses = as_array("pose", robot.home if pose is None else pose, (6,))
+        velocities = as_array("velocity", np.zeros(6) if velocity is None else velocity, (6,))
+        carriers = as_array("carrier_pose", robot.carrier_home if carrier_pose is None else carrier_pose, (count, 6))
+        moving = as_array(
+            "carrier_velocity", np.zeros((count, 6)) if carrier_velocity is None else carrier_velocity, (count, 6)
+        )
+        if tensions is not None and lengths is not None:
+            raise InputError("lengths must be None where tensions are given, got both")
+        pulls = as_array("tensions", np.zeros(robot.m) if tensions is None else tensions, (robot.m,))
+        own = np.zeros(robot.m) if lengths is None else as_array("lengths", lengths, (robot.m,))
+        if lengths is not None and not (own >= layout.SHORTEST).all():
+            raise InputError(f"lengths must be numbers >= {layout.SHORTEST:g} m, got {own.min():g} m")
+        if (pulls < 0).any():
+            raise InputError(f"tensions must be numbers >= 0 N, got {pulls.min():g} N")
+        batch = leading(
+            {
+                "pose": poses.shape[:-1],
+                "velocity": velocities.shape[:-1],
+                "carrier_pose": carriers.shape[:-2],
+                "carrier_velocity": moving.shape[:-2],
+                "tensions": pulls.shape[:-1],
+                "lengths": own.shape[:-1],
+            }
+        )
+        bodies = np.zeros((*batch, 1 + count, layout.BODY))
+        place(bodies[..., 0, :], poses, velocities, np.array(robot.platform.com))
+        place(bodies[..., 1:, :], carriers, moving, np.zeros(3))
+        kinds = self._bodies[1:, layout.MOTION]
+        bodies[..., 1:, layout.VELOCITY : layout.RATE] *= (kinds != layout.RESTS)[:, None]
+        bodies[..., 1:, layout.RATE :] *= np.isin(kinds, (layout.FREE, layout.IMPOSED))[:, None]
+        cables = np.zeros((*batch, layout.CABLE_BLOCKS, robot.m))
+        if self.drive == "tensions":
+            first = pulls
+        elif lengths is not None:
+            first = own
+        else:
+            stretches = self._cables[:, layout.STIFFNESS] > 0
+            strain = np.where(stretches, pulls / np.where(stretches, self._cables[:, layout.STIFFNESS], 1.0), 0.0)
+            first = np.maximum(dynamics_of(robot).cable_lengths(poses, carriers) / (1 + strain), layout.SHORTEST)
+        cables[..., layout.LENGTH, :] = cables[..., layout.REFERENCE, :] = first
+        return np.concatenate([bodies.reshape(*batch, -1), cables.reshape(*batch, -1)], axis=-1)
+
+    def command(
+        self,
+        cables: Any,
+        actuation: Any = None,
+        carrier_pose: Any = None,
+        carrier_velocity: Any = None,
+        carrier_acceleration: Any = None,
+        wind: Any = None,
+        wrench: Any = None,
+    ) -> np.ndarray:
+        """Pack what a plant is commanded during a step into rows, (..., k).
+
+        Parameters
+        ----------
+        cables
+            (..., m): lengths [m], rates [m/s], forces [N] or tensions [N], depending on the drive.
+        actuation
+            Commands of the actuators of each carrier, in its order, (..., c, a): for a quadrotor thrust [N] and torques
+            about its axes [N m]. The plant cuts them at their limits. Default: zeros.
+        carrier_pose, carrier_velocity, carrier_acceleration
+            Reference of the carriers at the beginning of the step, (..., c, 6). It moves on to that of the next command
+            of a `run`, or without one with this acceleration. Prescribed carriers are there; mobile ones follow it with
+            a lag of second order, inside their limits of speed and acceleration. Default: at home, at rest; of poses
+            without velocities or accelerations, those that the poses of a `run` have, see `samples`.
+        wind
+            Velocity of the air in {G} [m/s], (..., 3); default: no air at all, also no drag of the motion.
+        wrench
+            Disturbance on the platform: force [N] and moment about the CoM [N m] in {G}, (..., 6).
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong shape or value, or wind is given and the robot's file has no `platform.aero`.
+        """
+        robot, count = self.robot, len(self.robot.carriers)
+        if wind is not None and robot.platform.aero is None:
+            raise InputError(f"wind must be None for robot {robot.name!r}, which has no platform.aero, got a wind")
+        actuators = max([len(carrier.actuators) for carrier in robot.carriers])
+        home = robot.carrier_home
+        parts = {
+            "cables": as_array("cables", cables, (robot.m,)),
+            "wind": as_array("wind", np.zeros(3) if wind is None else wind, (3,)),
+            "wrench": as_array("wrench", np.zeros(6) if wrench is None else wrench, (6,)),
+        }
+        of_carriers = {
+            "actuation": as_array(
+                "actuation", np.zeros((count, actuators)) if actuation is None else actuation, (count, actuators)
+            ),
+            "carrier_pose": as_array("carrier_pose", home if carrier_pose is None else carrier_pose, home.shape),
+        }
+        for name, value in (("velocity", carrier_velocity), ("acceleration", carrier_acceleration)):
+            of_carriers[f"carrier_{name}"] = (
+                np.full(home.shape, 0.0 if carrier_pose is None else np.nan)  # which `complete` replaces
+                if value is None
+                else as_array(f"carrier_{name}", value, home.shape)
+            )
+        if self.drive == "lengths" and not (parts["cables"] >= layout.SHORTEST).all():
+            least = parts["cables"].min()
+            raise InputError(f"cables must be lengths >= {layout.SHORTEST:g} m, got {least:g} m")
+        shapes = {name: value.shape[:-1] for name, value in parts.items()}
+        batch = leading(shapes | {name: value.shape[:-2] for name, value in of_carriers.items()})
+        row = np.zeros((*batch, self._command_size))
+        row[..., layout.AIR] = float(wind is not None)
+        row[..., layout.WIND : layout.WRENCH] = parts["wind"]
+        row[..., layout.WRENCH : layout.COMMANDS] = parts["wrench"]
+        row[..., layout.COMMANDS : layout.COMMANDS + robot.m] = parts["cables"]
+        for index in range(count):
+            first = layout.COMMANDS + robot.m + layout.CARRIER * index
+            row[..., first : first + actuators] = of_carriers["actuation"][..., index, :]
+            for order, name in enumerate(("pose", "velocity", "acceleration")):
+                at = first + layout.REFERENCE_POSE + 6 * order
+                row[..., at : at + 6] = of_carriers[f"carrier_{name}"][..., index, :]
+        return row
+
+    def step(self, state: np.ndarray, command: np.ndarray, dt: float, after: np.ndarray | None = None) -> np.ndarray:
+        """Return the state [m, rad, s] after `dt` [s] under one command, (..., n).
+
+        Parameters
+        ----------
+        state, command, dt
+            As in `run`.
+        after
+            The next command, (..., k): carriers move on to its reference as in a `run`, and otherwise with constant
+            acceleration.
+
+        Raises
+        ------
+        InputError, SolverError
+            As in `run`.
+        """
+        try:
+            rows = np.stack([command] if after is None else np.broadcast_arrays(command, after), axis=-2)
+        except ValueError:
+            raise InputError(f"after must be a command like {shown(command)}, got {shown(after)}") from None
+        both = isinstance(state, np.ndarray) and isinstance(command, np.ndarray)
+        if both and state.shape == (self.size,) and rows.shape[:-2] == () and rows.shape[-1] == self._command_size:
+            end = self._step_one(state, rows, number("dt", dt, SHORTEST_STEP, LONGEST_STEP))
+            if end is not None:
+                return end
+        return self._run(state, rows, 1, dt, 1, 1, None).states[..., -1, :]
+
+    def _step_one(self, state: np.ndarray, rows: np.ndarray, dt: float) -> np.ndarray | None:
+        """Step from one state, in a third of the time of `run`; return None for what that has to report."""
+        if state.dtype != np.float64 or rows.dtype != np.float64:
+            return None
+        if not math.isfinite(np.vdot(state, state) + np.vdot(rows, rows)):
+            return None
+        history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
+        run_rows()(0, 1, *self.arrays, state[None], rows[None], 1, dt, 1, 1, history, tensions)
+        return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
+
+    def run(
+        self,
+        state: np.ndarray,
+        commands: np.ndarray,
+        dt: float,
+        substeps: int = 1,
+        keep: int = 1,
+        threads: int | None = None,
+    ) -> History:
+        """Simulate a sequence of commands.
+
+        Parameters
+        ----------
+        state
+            (..., n), from `start`, `step` or `run`.
+        commands
+            (..., K, k), from `command`: each is held for `dt`.
+        dt
+            Period of the commands [s].
+        substeps
+            Runge-Kutta steps in each period.
+        keep
+            Return the first state and every `keep`-th one after it.
+        threads
+            How many threads share the rows of a batch; default: as many as there are processors, at most one for each
+            20 000 steps. The result does not depend on it.
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong shape or value.
+        SolverError
+            If the motion grows beyond all numbers, as it does for steps too long for stiff cables.
+        """
+        rows = np.asarray(commands)
+        if rows.ndim < 2 or not rows.shape[-2]:
+            raise InputError(f"commands must have the shape (..., K, {self._command_size}), got {shown(commands)}")
+        return self._run(state, rows, rows.shape[-2], dt, substeps, keep, threads)
+
+    def _run(
+        self,
+        state: np.ndarray,
+        rows: np.ndarray,
+        steps: int,
+        dt: float,
+        substeps: int,
+        keep: int,
+        threads: int | None,
+    ) -> History:
+        """Simulate the first `steps` commands."""
+        substeps, keep = whole_number("substeps", substeps, 1, 10**6), whole_number("keep", keep, 1, 10**9)
+        period = number("dt", dt, SHORTEST_STEP, LONGEST_STEP)
+        states = as_array("state", state, (self.size,))
+        if rows.shape[-1] != self._command_size:
+            raise InputError(f"commands must have the shape (..., K, {self._command_size}), got {shown(rows)}")
+        rows = complete(rows, self.robot.m, len(self.robot.carriers), period)
+        rows = as_array("commands", rows, rows.shape[-2:])
+        batch = leading({"state": states.shape[:-1], "commands": rows.shape[:-2]})
+        count, kept = math.prod(batch), 1 + steps // keep
+        history, tensions = np.empty((count, kept, self.size)), np.empty((count, kept, self.robot.m))
+        arguments = (
+            *self.arrays,
+            np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size),
+            np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:]),
+            steps,
+            period,
+            substeps,
+            keep,
+            history,
+            tensions,
+        )
+        if threads is None:
+            threads = min(processors.available(), count * steps * substeps // STEPS_WORTH_A_THREAD)
+        else:
+            threads = whole_number("threads", threads, 1, 10**4)
+        threads = max(1, min(threads, count))
+        kernel = run_rows()
+        if threads == 1:
+            kernel(0, count, *arguments)
+        else:
+            edges = [count * i // threads for i in range(threads + 1)]
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(lambda begin, end: kernel(begin, end, *arguments), edges[:-1], edges[1:]))
+        if not np.isfinite(history[:, -1]).all():
+            raise SolverError(
+                f"the motion of {self.robot.name} grows beyond all numbers in steps of {period / substeps:g} s: use "
+                "more substeps, or stiffness where cables that do not stretch get lengths that no pose has"
+            )
+        times = period * keep * np.arange(kept)
+        return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return bodies, cables and settings as the kernels read them, see `layout`."""
+        return self._bodies, self._cables, self._settings
+
+    def read(self, states: np.ndarray) -> Reading:
+        """Return what `states`, (..., n), are: poses [m, rad], velocities, lengths."""
+        return Reading(self.robot, as_array("states", states, (self.size,)))
+
+    def cut(self, state: np.ndarray, cable: int) -> np.ndarray:
+        """Return the state, (..., n) [m, rad, s], with a cable cut: it never pulls again.
+
+        Parameters
+        ----------
+        state
+            (..., n).
+        cable
+            Its index, from 0.
+        """
+        return self._with_condition(state, cable, layout.CUT)
+
+    def stick(self, state: np.ndarray, cable: int) -> np.ndarray:
+        """Return the state, (..., n) [m, rad, s], with a winch stuck at its cable's length. Arguments as in `cut`."""
+        return self._with_condition(state, cable, layout.STUCK)
+
+    def _with_condition(self, state: np.ndarray, cable: int, condition: float) -> np.ndarray:
+        result = as_array("state", state, (self.size,)).copy()
+        index = whole_number("cable", cable, 0, self.robot.m - 1)
+        result[..., self._places + layout.CONDITION * self.robot.m + index] = condition
+        return result

@@ -1,0 +1,320 @@
+"""Margins that hold for the robots of an uncertainty, to first order: where places of cables and tensions meet.
+
+A robot whose cables are at other places by dp has another wrench matrix. The tensions t that the planned robot needs,
+A t = w, balance again with the least change
+
+    t + dt      dt = -A^+ dA t = G dp      G = -A^+ d(A t)/dp
+
+So dt is normally distributed with the covariance G Sigma G^T, and t inside the limits less k sigma_i, of each cable,
+leaves t + dt inside the limits as long as |dt_i| <= k sigma_i. Two factors k belong to the share P of the robots for
+which that has to hold at all poses at once:
+
+- any poses (`ellipsoid_factor`): the ellipsoid dp^T Sigma^-1 dp <= k^2 has P of the robots for k^2 = chi-square of r
+  degrees of freedom, r the rank of Sigma, and in it |g . dp| <= k sqrt(g^T Sigma g) for whatever g (Scheffe);
+- a motion (`motion_factor`): along it the row of each cable, scaled to variance 1, is a curve of length L_i on the unit
+  sphere. By Rice's formula the chance that it exceeds k somewhere is at most 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
+  The sum over the cables is 1 - P. The factor is usually half of the first one, and never taken larger.
+
+Source: H. Scheffe, Biometrika 40, 1953; S. O. Rice, Bell System Technical Journal 24, 1945; D. Q. Naiman, Annals of
+Statistics 14, 1986.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.display import record
+from ..base.errors import InputError
+from ..base.inputs import real_array, required, shown, whole_number
+from ..models.part import LARGEST
+from ..models.robot import Robot
+
+if TYPE_CHECKING:
+    from ..models.uncertainty import Uncertainty
+
+__all__ = ["RobotShare", "Spread", "check_share", "ellipsoid_factor", "motion_factor", "share_of_robots", "spread"]
+
+RANK = 1e-9  # of the largest singular value
+HALVINGS = 60
+ROUNDING = 1e-9  # of the force scale, in comparisons of tensions
+
+
+def check_share(robot: Robot, share: object) -> float:
+    """Return the share of robots for which limits must hold, or raise InputError.
+
+    Raises
+    ------
+    InputError
+        If it is no number above 0 and below 1, or the robot has no uncertainty.
+    """
+    value = _share("robust", share)
+    uncertainty_of(robot)
+    return value
+
+
+def _share(name: str, value: object) -> float:
+    if not isinstance(value, float | np.floating) or not 0.0 < value < 1.0:
+        raise InputError(f"{name} must be a share of robots above 0 and below 1, such as 0.95, got {shown(value)}")
+    return float(value)
+
+
+def uncertainty_of(robot: Robot) -> Uncertainty:
+    """Return the uncertainty of a robot, or raise InputError if it has none."""
+    uncertainty = required("robot", robot, Robot).uncertainty
+    if uncertainty is None:
+        raise InputError(f"robust must be left out if the robot's file has no uncertainty, got robot {robot.name!r}")
+    return uncertainty
+
+
+class Spread:
+    """Compute how tensions at n places change with the robots of an uncertainty, to first order.
+
+    Parameters
+    ----------
+    robot
+        With an uncertainty.
+    pose, carrier_pose
+        Of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
+    rows
+        Wrench rows that the cables balance; default: those of the coordinates that can move.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables than rows.
+    """
+
+    def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):
+        from ..models.sensitivity import derivatives, wrench_matrices
+
+        uncertainty = uncertainty_of(robot)
+        pose, carrier_pose = _places(robot, pose, carrier_pose)
+        rows = np.flatnonzero(robot.dof_mask) if rows is None else _indices("rows", rows, 6)
+        scale = robot.wrench_scale[rows]
+        A = wrench_matrices(robot, pose, carrier_pose)[:, rows] * scale[:, None]
+        D, self._cables = derivatives(robot, pose, carrier_pose, uncertainty.parameters)
+        self._D = D[:, rows] * scale[:, None]  # (n, rows, p)
+        self._inverse = _inverse(A)  # (n, m, rows)
+        self._factor = uncertainty.factor  # (p, r)
+
+    def changes(self, tensions: ArrayLike) -> np.ndarray:
+        """Return the change of tensions (n, m) along each direction of `Uncertainty.factor`, (n, m, r) [N]."""
+        values = real_array("tensions", tensions)
+        if values.shape != self._inverse.shape[:2]:
+            raise InputError(f"tensions must be an array of shape {self._inverse.shape[:2]}, got {shown(values)}")
+        change = (self._D * values[:, None, self._cables]) @ self._factor  # of A t, (n, rows, r)
+        return -self._inverse @ change
+
+    def sigmas(self, tensions: ArrayLike) -> np.ndarray:
+        """Return the standard deviations of tensions (n, m) over the robots of the uncertainty, (n, m) [N]."""
+        return np.linalg.norm(self.changes(tensions), axis=2)
+
+    def only(self, rows: ArrayLike) -> Spread:
+        """Return the same of some places, by their indices."""
+        rows = _indices("rows", rows, len(self._inverse))
+        part = object.__new__(Spread)
+        part._cables, part._factor = self._cables, self._factor
+        part._D, part._inverse = self._D[rows], self._inverse[rows]
+        return part
+
+
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """Return the inverse of least norm of matrices (n, rows, m), (n, m, rows).
+
+    What the cables do not span takes huge tensions, instead of none as in a pseudo-inverse: other robots need wrenches
+    there.
+    """
+    U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
+    if A.shape[1] > A.shape[2]:
+        raise InputError(f"robust must be left out for {A.shape[2]} cables and {A.shape[1]} wrench rows")
+    held = np.maximum(sigma, RANK * np.maximum(sigma[:, :1], np.finfo(float).tiny))
+    return (Vt.swapaxes(1, 2) / held[:, None]) @ U.swapaxes(1, 2)
+
+
+def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray:
+    """Return the standard deviations of tensions over the robots of an uncertainty, to first order, (n, m) [N].
+
+    Parameters
+    ----------
+    robot
+        With an uncertainty.
+    pose
+        Of the platform in {G} [m, rad], (n, 6).
+    tensions
+        That the planned robot has there [N], (n, m).
+    carrier_pose
+        Of the carriers, (n, c, 6); default: at home.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or shape, or the robot has no uncertainty.
+    """
+    poses, carriers = _places(robot, pose, carrier_pose)
+    values = _rows("tensions", tensions, len(poses), (robot.m,))
+    return Spread(robot, poses, carriers).sigmas(values)
+
+
+def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
+    """Return the factor k of standard deviations that a share of the robots keeps to at any poses, all at once.
+
+    Parameters
+    ----------
+    uncertainty
+        Of a robot.
+    share
+        Of the robots, above 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong.
+    """
+    from ..models.uncertainty import Uncertainty
+
+    return _chi(required("uncertainty", uncertainty, Uncertainty).factor.shape[1], _share("share", share))
+
+
+def motion_factor(changes: ArrayLike, share: float) -> float:
+    """Return the factor k that a share of the robots keeps to along a motion, at all its times and cables.
+
+    Parameters
+    ----------
+    changes
+        Of the tensions along each direction of the uncertainty, at dense times in order, (n, m, r) [N].
+    share
+        Of the robots, above 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value.
+    """
+    from scipy.special import erfc
+
+    share, changes = _share("share", share), real_array("changes", changes).astype(float)
+    if changes.ndim != 3 or 0 in changes.shape[:2] or not (np.abs(changes) <= LARGEST).all():
+        accepted = f"an array of shape (n, m, r) of numbers up to {LARGEST:g}"
+        raise InputError(f"changes must be {accepted}, got {shown(changes)}")
+    sigmas = np.linalg.norm(changes, axis=2, keepdims=True)  # (n, m, 1)
+    varied = sigmas > ROUNDING * max(float(sigmas.max()), np.finfo(float).tiny)
+    units = np.divide(changes, sigmas, out=np.zeros_like(changes), where=varied)
+    flat = units.reshape(-1, units.shape[2])
+    rank = int(np.linalg.matrix_rank(flat.T @ flat, tol=RANK * max(len(flat), 1), hermitian=True))
+    if rank == 0:
+        return 0.0
+    curves, length = 0, 0.0
+    for cable in range(units.shape[1]):
+        curve = units[varied[:, cable, 0], cable]
+        curves += bool(len(curve))
+        # The chord's angle, exact also where it is small.
+        length += float(2 * np.arcsin(np.clip(np.linalg.norm(np.diff(curve, axis=0), axis=1) / 2, 0, 1)).sum())
+    most = _chi(rank, share)
+
+    def excess(k: float) -> float:
+        return float(curves * erfc(k / np.sqrt(2)) + length / np.pi * np.exp(-(k**2) / 2) - (1 - share))
+
+    low, high = 0.0, most
+    for _ in range(HALVINGS if excess(most) < 0 else 0):
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+    return high
+
+
+def _chi(rank: int, share: float) -> float:
+    from scipy.special import gammaincinv
+
+    return float(np.sqrt(2 * gammaincinv(rank / 2, share))) if rank else 0.0
+
+
+class RobotShare(NamedTuple):
+    """Robots that were drawn, and which of them have tensions inside their limits at all poses.
+
+    Attributes
+    ----------
+    holds
+        Whether each robot has, (count,).
+    """
+
+    holds: np.ndarray
+
+    __repr__ = record
+
+    @property
+    def share(self) -> float:
+        """Return the share of the robots that have tensions inside their limits at all poses."""
+        return float(self.holds.mean())
+
+
+def share_of_robots(
+    robot: Robot,
+    pose: ArrayLike,
+    wrench: ArrayLike,
+    carrier_pose: ArrayLike | None = None,
+    count: int = 200,
+    seed: int = 0,
+) -> RobotShare:
+    """Draw robots from the uncertainty, and check at poses whether tensions inside the limits give the wrenches.
+
+    It is no approximation: each robot has its own wrench matrices, and the exact solver decides.
+
+    Parameters
+    ----------
+    robot
+        With an uncertainty.
+    pose
+        Of the platform in {G} [m, rad], (n, 6).
+    wrench
+        Required there, about the CoM in {G} [N, N m], (n, 6).
+    carrier_pose
+        Of the carriers, (n, c, 6); default: at home.
+    count
+        How many robots.
+    seed
+        Of the random numbers.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or shape, or the robot has no uncertainty.
+    """
+    from ..models.sensitivity import wrench_matrices
+    from ..solvers import solve_batch
+
+    poses, carriers = _places(robot, pose, carrier_pose)
+    rows = np.flatnonzero(robot.dof_mask)
+    scale = robot.wrench_scale[rows]
+    w = _rows("wrench", wrench, len(poses), (6,))[:, rows] * scale
+    holds = np.zeros(whole_number("count", count, 1, 1_000_000), dtype=bool)
+    for index, one in enumerate(robot.drawn(count, seed)):
+        A = wrench_matrices(one, poses, carriers)[:, rows] * scale[:, None]
+        holds[index] = solve_batch(A, w, robot.t_min, robot.t_max).feasible.all()
+    return RobotShare(holds)
+
+
+def _places(robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (n, 6) and carriers (n, c, 6) as arrays of finite numbers, or raise InputError."""
+    home = required("robot", robot, Robot).carrier_home
+    poses = real_array("pose", pose).astype(float)
+    if poses.ndim != 2 or poses.shape[1] != 6 or not np.isfinite(poses).all():
+        raise InputError(f"pose must be an array of shape (n, 6) of finite numbers, got {shown(poses)}")
+    if carrier_pose is None:
+        return poses, np.broadcast_to(home, (len(poses), *home.shape))
+    return poses, _rows("carrier_pose", carrier_pose, len(poses), home.shape)
+
+
+def _rows(name: str, value: ArrayLike, n: int, shape: tuple[int, ...]) -> np.ndarray:
+    array = real_array(name, value).astype(float)
+    if array.shape != (n, *shape) or not np.isfinite(array).all():
+        raise InputError(f"{name} must be an array of shape {(n, *shape)} of finite numbers, got {shown(array)}")
+    return array
+
+
+def _indices(name: str, value: ArrayLike, n: int) -> np.ndarray:
+    array = real_array(name, value)
+    if array.ndim != 1 or array.dtype.kind not in "iu" or not ((array >= 0) & (array < n)).all():
+        raise InputError(f"{name} must be an array of indices below {n}, got {shown(array)}")
+    return array
