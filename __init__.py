@@ -11,9 +11,9 @@ the robot as built), `towline.control` (one step of a controller), `towline.ocp`
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .base import former_names
-from .base.version import __version__ as __version__
+from .base import former_names, version
 
+__version__ = version.__version__
 former_names.install()
 
 if TYPE_CHECKING:

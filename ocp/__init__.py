@@ -1,7 +1,7 @@
 """Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; timing."""
 
+from .plan import Plan
 from .planner import Planner, plan
-from .result import Plan
 from .sweeps.result import Sweep
 from .sweeps.run import sweep
 from .tasks.status import MotionStatus

@@ -35,9 +35,9 @@ from .global_path.start import motion_past
 from .nlp.interrupts import heeding
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
+from .plan import Plan
 from .proofs.blocked import blocked
 from .proofs.durations import Durations, durations
-from .result import Plan
 from .search.homotopy import from_easier
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion, near_motion

@@ -1,28 +1,22 @@
-"""`Plan`: a planned motion and its audit, as data, dataset, file, figures, film and report."""
+"""`PlanData`: a planned motion and its audit as numbers, which reports and figures read; the face is `Plan`."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.display import Displayed, Fact, tensions_over_time
-from ..base.inputs import check_ending, file_path
-from ..base.netcdf import save_netcdf
-from ..base.writing import whole_file
+from ..base.display import Displayed, tensions_over_time
 from ..solvers import Certificate
 from .audits.audit import Audit
 from .audits.infeasible_spans import infeasible_spans
 from .audits.phase_summary import PhaseSummary, summaries
+from .audits.planner_step import PlannerStep
 from .audits.waypoint_distance import WaypointDistance, waypoint_distance
-from .search.stage import Stage
 from .tasks.deviation import Deviation
-from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
 from .warnings.inside_bodies import into_places
@@ -31,21 +25,16 @@ from .warnings.leaves_its_points import leaves_its_points
 from .warnings.warnings import warnings
 
 if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
+    from .audits.robust_margin import RobustMargin
 
-    from ..statics.robust import RobotShare
-    from .search.uncertain_robots import RobustMargin
+__all__ = ["PlanData", "Relaxed"]
 
-__all__ = ["Plan", "Relaxed"]
-
-DRAWN_AT = 200  # times at which drawn robots are checked
 MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twice as many
 
 
 @dataclass(frozen=True)
-class Plan(Displayed):
-    """A planned motion and its audit.
+class PlanData(Displayed):
+    """A planned motion and its audit, without figures, files and reports.
 
     Attributes
     ----------
@@ -86,7 +75,7 @@ class Plan(Displayed):
     iterations: int = 0
     message: str = ""
     iterates: tuple[tuple[int, float, float], ...] = ()
-    stages: tuple[Stage, ...] = ()
+    stages: tuple[PlannerStep, ...] = ()
     objective: float | None = None
     robust: RobustMargin | None = None
     offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
@@ -94,16 +83,6 @@ class Plan(Displayed):
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the relaxations, which are computed now, rather than what computes them."""
         return {**self.__dict__, "offers": partial(tuple, self.relaxations)}
-
-    def _headline(self) -> str:
-        from .reports.report import headline
-
-        return headline(self)
-
-    def _facts(self) -> Iterable[Fact]:
-        from .reports.report import facts_at_once
-
-        return facts_at_once(self)
 
     def _picture(self) -> str:
         robot, audit = self.scenario.robot, self.audit
@@ -203,32 +182,6 @@ class Plan(Displayed):
         """Return name, times, load, tensions and ground reaction of each phase; empty for a task without phases."""
         return summaries(self.scenario, self.audit)
 
-    def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
-        """Draw robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
-
-        Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
-        own wrench matrices, and the exact solver decides.
-
-        Parameters
-        ----------
-        count
-            How many robots.
-        seed
-            Of the random numbers.
-
-        Raises
-        ------
-        InputError
-            If an argument is wrong, or the robot has no uncertainty.
-        """
-        from ..statics.robust import share_of_robots
-
-        audit, scenario = self.audit, self.scenario
-        rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))
-        motion, carriers = (Motion(*(part[rows] for part in each)) for each in (audit.motion, audit.carriers))
-        w = scenario.required_wrench(audit.times[rows], motion, carriers, scenario.wind)
-        return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
-
     def to_dict(self) -> dict[str, Any]:
         """Return what `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""
         return {
@@ -254,108 +207,6 @@ class Plan(Displayed):
             "stages": [stage._asdict() for stage in self.stages],
         }
 
-    @cached_property
-    def trajectory(self) -> xr.Dataset:
-        """Return the motion in {G} and the audited tensions over time, at the task's output rate, units as attributes.
-
-        Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
-        """
-        from .reports.trajectory import trajectory
-
-        return trajectory(self).dataset()
-
-    def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the trajectory as NetCDF, whole or not at all; `xarray.load_dataset` reads it.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        from .reports.trajectory import trajectory
-
-        return save_netcdf(trajectory(self), check_ending("file", file_path("file", file), ".nc"))
-
-    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
-        """Save the figures in `folder`, as wide as a journal's column (88 mm), and return their paths.
-
-        Path, views, tensions, base offset, other limits and convergence. A figure without content is left out:
-        convergence if no solver ran, base if every carrier is on the ground.
-
-        Parameters
-        ----------
-        format
-            png, pdf or svg.
-
-        Raises
-        ------
-        InputError
-            If the format is another, or a file cannot be written.
-        """
-        from ..figures.style import save_all
-
-        return save_all(self.figures, folder, format)
-
-    def figures(self) -> dict[str, Figure]:
-        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.
-
-        A figure without content is left out, as in `plot`.
-        """
-        from .reports.drawings import drawings
-
-        return {name: drawing.figure for name, drawing in drawings(self, self.trajectory).items()}
-
-    def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
-        """Draw the robot in motion as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.
-
-        Cables are coloured by tension, and grey where no tensions exist.
-
-        Parameters
-        ----------
-        file
-            Ends in .gif or .mp4.
-        speed
-            Seconds of the motion in one second of the film; 1 is real time.
-        fps
-            Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
-            motion keeps its speed.
-
-        Raises
-        ------
-        InputError
-            If the suffix, the speed or the rate is not valid, or the file cannot be written.
-        """
-        from ..figures import animation
-        from .reports.scene import scene
-
-        path = file_path("file", file)
-        frames = animation.timing(path, self.scenario.duration, speed, fps)
-        return animation.draw(scene(self, frames.times), frames, path)
-
-    def report(self) -> str:
-        """Return the report as text: the result in the first line, then the facts behind it."""
-        from .reports.report import as_text
-
-        return as_text(self)
-
-    def save_report(self, file: str | os.PathLike[str]) -> Path:
-        """Write the report as one HTML file with its figures inside, whole or not at all.
-
-        The file loads nothing from anywhere, so that it can be mailed and kept. This is a method of its own, not an
-        argument of `report`: what returns text writes no files.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        from .reports.report_page import page
-
-        path = file_path("file", file)
-        with whole_file(path) as temporary:
-            temporary.write_text(page(self, self.trajectory), encoding="utf-8")
-        return path
-
 
 @dataclass(frozen=True)
 class Relaxed(Displayed):
@@ -375,7 +226,7 @@ class Relaxed(Displayed):
     unit: str
     requested: float
     possible: float
-    plan: Plan
+    plan: Any  # a `Plan`, which is above this file
 
     def to_dict(self) -> dict[str, Any]:
         """Return {"name", "unit", "requested", "possible"} for JSON."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..base.text import quantity
-
-if TYPE_CHECKING:
-    from .flight import Flight
+from .flight_data import FlightData
 
 __all__ = ["Event", "events", "sentence"]
 
@@ -29,7 +27,7 @@ class Event(NamedTuple):
         return {"at_s": self.at, "kind": self.kind, "what": self.what}
 
 
-def events(flight: Flight) -> list[Event]:
+def events(flight: FlightData) -> list[Event]:
     """Return the faults of a flight and the first instants at which a limit was exceeded, the earliest first."""
     found = [Event(fault.at, "fault", _words(fault, flight)) for fault in flight.conditions.faults]
     if flight.slack.any():
@@ -52,7 +50,7 @@ def sentence(of: list[Event]) -> str:
     return "; ".join(f"{event.what} at {event.at:.4g} s" for event in of)
 
 
-def _words(fault: Any, flight: Flight) -> str:
+def _words(fault: Any, flight: FlightData) -> str:
     if fault.kind == "cut":
         return f"cable {fault.part + 1} was cut"
     if fault.kind == "stick":

@@ -4,159 +4,34 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.display import Displayed, Fact, tensions_over_time
+from ..base.display import Fact, tensions_over_time
 from ..base.inputs import check_ending, file_path
 from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import quantity
-from ..control import ANSWERS, Reference
-from ..control.command import OTHERWISE
+from ..control import ANSWERS
+from ..figures.drawn import Filmed
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
-from ..models.robot import Robot
-from .conditions import Conditions
 from .events import events, sentence
-from .record import Record
+from .flight_data import FlightData
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["TENSION_TOLERANCE", "Flight"]
+    from ..figures.animation import Scene
 
-TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
+__all__ = ["Flight"]
 
 
-@dataclass(frozen=True, eq=False)
-class Flight(Displayed):
-    """A flown motion.
-
-    Attributes
-    ----------
-    robot
-        The robot.
-    conditions
-        References, faults and noise, see `Conditions`.
-    seed
-        Of wind and noise.
-    record
-        What happened, a row for each period.
-    lasted
-        How many periods the flight lasted, fewer than there are references if the motion grew beyond all numbers.
-    tolerance
-        Largest error of the position [m] of a flight that passes.
-    wind
-        Velocity of the air in {G} [m/s], (K, 3); None if there is no air.
-    seconds
-        How long each step of the controller took [s], (K,).
-    wall
-        Wall time of the whole flight [s].
-    """
-
-    robot: Robot
-    conditions: Conditions
-    seed: int
-    record: Record
-    lasted: int
-    tolerance: float
-    wind: np.ndarray | None
-    seconds: np.ndarray
-    wall: float
-
-    @property
-    def references(self) -> Sequence[Reference]:
-        """Return the reference of each period."""
-        return self.conditions.references
-
-    @property
-    def period(self) -> float:
-        """Return the period of the controller [s]."""
-        return self.conditions.period
-
-    @property
-    def _recorded(self) -> int:
-        """Return how many periods have a row: the first one has, also if the motion does not survive it."""
-        return max(self.lasted, 1)
-
-    @cached_property
-    def times(self) -> np.ndarray:
-        """Return the times at which the recorded periods begin [s], (n,)."""
-        return self.period * np.arange(self._recorded)
-
-    @cached_property
-    def error(self) -> np.ndarray:
-        """Return the distance of the platform from its reference [m], (n,)."""
-        wanted = np.stack([reference.pose[:3] for reference in self.references[: self._recorded]])
-        return np.linalg.norm(self.record.motions[: self._recorded, 0, :3] - wanted, axis=1)
-
-    @cached_property
-    def slack(self) -> np.ndarray:
-        """Return where a cable is slack that should pull, (n, m)."""
-        pulls = self.conditions.should_pull(self.robot.t_min, np.arange(self._recorded))
-        return (self.record.tensions[: self._recorded] <= 0) & pulls
-
-    @cached_property
-    def above(self) -> np.ndarray:
-        """Return by how much tensions exceed t_max with its tolerance [N], (n, m); below zero where they do not."""
-        robot = self.robot
-        return self.record.tensions[: self._recorded] - robot.t_max - TENSION_TOLERANCE * (robot.t_max - robot.t_min)
-
-    @property
-    def passed(self) -> bool:
-        """Return whether the flight lasted, near its reference, with tensions inside their limits and cables taut."""
-        return not self.failures
-
-    @cached_property
-    def failures(self) -> tuple[str, ...]:
-        """Return why the flight did not pass, a line each."""
-        lines = []
-        if self.lasted < len(self.references):
-            lines.append(f"the motion grew beyond all numbers at t = {self.lasted * self.period:.3f} s")
-        at = int(self.error.argmax())  # the first nan, if there is one
-        if np.isnan(self.error[at]):
-            lines.append(f"no position at t = {self.times[at]:.3f} s")
-        elif self.error[at] > self.tolerance:
-            lines.append(
-                f"error of {quantity(1e3 * self.error[at], 'mm')} at t = {self.times[at]:.3f} s "
-                f"(tolerance {quantity(1e3 * self.tolerance, 'mm')})"
-            )
-        tensions = self.record.tensions[: self._recorded]
-        row, cable = np.unravel_index(np.nanargmax(self.above), self.above.shape)
-        if self.above[row, cable] > 0:
-            lines.append(
-                f"{quantity(tensions[row, cable], 'N')} in cable {cable + 1} at t = {self.times[row]:.3f} s "
-                f"(t_max {quantity(self.robot.t_max[cable], 'N')})"
-            )
-        if self.slack.any():
-            row, cable = np.argwhere(self.slack)[0]
-            lines.append(
-                f"slack for {quantity(self.slack_s, 's')}, first cable {cable + 1} at t = {self.times[row]:.3f} s"
-            )
-        return tuple(lines)
-
-    @property
-    def slack_s(self) -> float:
-        """Return for how long a cable was slack that should pull [s]."""
-        return float(self.slack.any(axis=1).sum() * self.period)
-
-    @property
-    def answered(self) -> dict[str, int]:
-        """Return how many steps were answered in each way."""
-        counts = np.bincount(self.record.answered[: self._recorded], minlength=len(ANSWERS))
-        return dict(zip(ANSWERS, counts.tolist(), strict=True))
-
-    @property
-    def handed_over(self) -> float | None:
-        """Return when computed torque took over [s], as the robot does not move as its controller predicts, or None."""
-        steps = np.flatnonzero(self.record.answered[: self._recorded] == OTHERWISE)
-        return float(self.times[steps[0]]) if steps.size else None
+class Flight(FlightData, Filmed):
+    """A flown motion; its numbers are those of `FlightData`."""
 
     def figures_of_merit(self) -> dict[str, Any]:
         """Return what the flight is judged by, without times of the machine: the same for the same seed."""
@@ -272,55 +147,20 @@ class Flight(Displayed):
         """
         return save_netcdf(self._contents(), check_ending("file", file_path("file", file), ".nc"))
 
-    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
-        """Save the figures in `folder`, as wide as a journal's column (88 mm), and return their paths.
-
-        Parameters
-        ----------
-        format
-            png, pdf or svg.
-
-        Raises
-        ------
-        InputError
-            If the format is another, or a file cannot be written.
-        """
-        from ..figures.style import save_all
-
-        return save_all(self.figures, folder, format)
-
     def figures(self) -> dict[str, Figure]:
         """Draw the flight, by the names of files: "flight", error, answers, wind and carriers over time; "tensions"."""
         from ..figures import flight
 
         return {"flight": flight.flight(self.trajectory), "tensions": flight.tensions(self.trajectory)}
 
-    def animate(self, file: str | os.PathLike[str], speed: float = 1.0, fps: float = 20.0) -> Path:
-        """Draw the robot in flight as a film: GIF, or MP4 if ffmpeg is installed; the suffix decides.
+    @property
+    def _film_duration(self) -> float:
+        return self.times[-1]
 
-        Cables are coloured by tension.
-
-        Parameters
-        ----------
-        file
-            Ends in .gif or .mp4.
-        speed
-            Seconds of the flight in one second of the film; 1 is real time.
-        fps
-            Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
-            motion keeps its speed.
-
-        Raises
-        ------
-        InputError
-            If the suffix, the speed or the rate is not valid, or the file cannot be written.
-        """
-        from ..figures import animation
+    def _scene(self, times: np.ndarray) -> Scene:
         from .scene import scene
 
-        path = file_path("file", file)
-        frames = animation.timing(path, self.times[-1], speed, fps)
-        return animation.draw(scene(self, frames.times), frames, path)
+        return scene(self, times)
 
     def report(self) -> str:
         """Return the report as text: the result in the first line, then the facts behind it."""

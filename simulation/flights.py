@@ -20,7 +20,7 @@ from ..models.robot import Robot
 from ..plant import Plant
 from .conditions import Conditions
 from .extremes import Extremes
-from .flight import TENSION_TOLERANCE
+from .flight_data import TENSION_TOLERANCE
 from .flying import fly
 
 if TYPE_CHECKING:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..result import Plan
+from ..result import PlanData
 
 __all__ = ["cost"]
 
 
-def cost(plan: Plan) -> float:
+def cost(plan: PlanData) -> float:
     """Return the objective of a feasible plan without free coordinates: tensions, their rates, duration and margin."""
     objective, robot, audit = plan.scenario.task.objective, plan.scenario.robot, plan.audit
     total = float(np.mean(np.sum((audit.tensions / (objective.tension or robot.force_scale)) ** 2, axis=1)))

@@ -11,7 +11,7 @@ from ...figures.convergence import convergence
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
 from ...figures.views import views
-from ..result import Plan
+from ..result import PlanData
 from .limited import limited
 from .scene import scene
 from .trajectory import output_rows
@@ -24,7 +24,7 @@ __all__ = ["drawings"]
 INSTANTS = 60  # along the carriers' paths in the views
 
 
-def drawings(plan: Plan, trajectory: xr.Dataset) -> dict[str, Drawing]:
+def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     """Return the figures by the names of their files, without suffix; a figure without content is left out."""
     times = np.linspace(0.0, plan.scenario.duration, INSTANTS)
     drawn = {

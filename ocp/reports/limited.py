@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ...figures.limits import Limited
-from ..result import Plan
+from ..result import PlanData
 
 __all__ = ["limited"]
 
 
-def limited(plan: Plan, rows: np.ndarray) -> list[Limited]:
+def limited(plan: PlanData, rows: np.ndarray) -> list[Limited]:
     """Return the limits of task, robot and carriers at the audit's `rows`, those of one name and bound together."""
     gathered: dict[tuple[str, str, float, float], tuple[list[str], list[np.ndarray]]] = {}
     for limit, values in zip(plan.scenario.limits, plan.audit.limited, strict=True):

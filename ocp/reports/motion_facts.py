@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base.text import quantity, quantity_row
 from ...models.part import Vector3
-from ..result import Plan
+from ..result import PlanData
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
@@ -15,7 +15,7 @@ __all__ = ["Fact", "millimetres", "motion_facts", "wind"]
 Fact = tuple[str, str]  # its name, and the fact with its unit
 
 
-def motion_facts(plan: Plan) -> list[Fact]:
+def motion_facts(plan: PlanData) -> list[Fact]:
     """Return the facts of the platform's motion."""
     task, audit = plan.scenario.task, plan.audit
     speed, acceleration = (
@@ -32,7 +32,7 @@ def motion_facts(plan: Plan) -> list[Fact]:
     ]
 
 
-def _accuracy(plan: Plan) -> list[Fact]:
+def _accuracy(plan: PlanData) -> list[Fact]:
     """Return the distance from the path, and that from its waypoints, which the path itself may round."""
     audit, from_waypoints = plan.audit, plan.waypoint_distance
     error = millimetres(plan.tracking_error_max)

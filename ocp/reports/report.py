@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.text import quantity, quantity_row
 from ...solvers import Certificate
-from ..result import Plan, Relaxed
+from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
 from .motion_facts import Fact, millimetres, motion_facts, wind
 
@@ -30,19 +30,19 @@ class Table(NamedTuple):
     rows: list[tuple[str, ...]]
 
 
-def headline(plan: Plan) -> str:
+def headline(plan: PlanData) -> str:
     """Return the result in one line: robot, task, status, and what decided it."""
     about = f"{plan.scenario.robot.name}, {plan.scenario.task.name}"
     return f"{about}: {plan.status.value.upper()}, {decisive(plan)}"
 
 
-def decisive(plan: Plan) -> str:
+def decisive(plan: PlanData) -> str:
     """Return what decided the result, in one line."""
     because = f"{plan.reason}; closest motion: " if plan.reason else ""
     return f"{because}{_of_the_motion(plan)}"
 
 
-def sections(plan: Plan) -> list[Section]:
+def sections(plan: PlanData) -> list[Section]:
     """Return the report below its first line; sections without facts are left out."""
     titles = {"infeasible": "Why it is infeasible", "not-found": "What the closest motion violates"}
     every = [
@@ -59,7 +59,7 @@ def sections(plan: Plan) -> list[Section]:
     return [section for section in every if section.facts]
 
 
-def facts_at_once(plan: Plan) -> list[Fact]:
+def facts_at_once(plan: PlanData) -> list[Fact]:
     """Return the facts that need no further plans or motions, the most important first."""
     certificate = plan.certificate
     why = [] if certificate is None else certificate.text(_up(plan))._asdict().items()
@@ -67,7 +67,7 @@ def facts_at_once(plan: Plan) -> list[Fact]:
     return [(name.replace("_", " "), fact) for name, fact in facts]
 
 
-def spans_table(plan: Plan) -> Table | None:
+def spans_table(plan: PlanData) -> Table | None:
     """Return the table of the time spans without tensions, with needed and available at the worst instant of each.
 
     None for a motion with fewer than two: a single one is described by the certificate of the plan.
@@ -85,7 +85,7 @@ def spans_table(plan: Plan) -> Table | None:
     return Table("Time spans with no feasible tensions", columns, rows) if len(rows) > 1 else None
 
 
-def phases_table(plan: Plan) -> Table | None:
+def phases_table(plan: PlanData) -> Table | None:
     """Return the table of the phases; None for a task without."""
     rows = [
         (
@@ -107,7 +107,7 @@ def _or_none(value: float | None) -> str:
     return "none" if value is None else quantity(value)
 
 
-def stages_table(plan: Plan) -> Table | None:
+def stages_table(plan: PlanData) -> Table | None:
     """Return the table of the planner's stages; None if there is none. A stage without a message is left out."""
     rows = [
         (stage.name, quantity(stage.seconds, "s", digits=2), stage.message) for stage in plan.stages if stage.message
@@ -115,7 +115,7 @@ def stages_table(plan: Plan) -> Table | None:
     return Table("Stages", ("stage", "computed in", "result"), rows) if rows else None
 
 
-def as_text(plan: Plan) -> str:
+def as_text(plan: PlanData) -> str:
     """Return the whole report for a terminal."""
     parts = sections(plan)
     width = max(len(name) for section in parts for name, _ in section.facts)
@@ -139,12 +139,12 @@ def _in_columns(table: Table) -> list[str]:
     return [f"  {table.title}", *(f"    {line}" for line in lines)]
 
 
-def _up(plan: Plan) -> np.ndarray:
+def _up(plan: PlanData) -> np.ndarray:
     """Return the direction against gravity in {G}, (3,)."""
     return -np.array(plan.scenario.robot.gravity)
 
 
-def _of_the_motion(plan: Plan) -> str:
+def _of_the_motion(plan: PlanData) -> str:
     if plan.feasible:
         if plan.margin is None or plan.margin < WORTH_A_NUMBER:
             return "every tension inside its limits"
@@ -161,7 +161,7 @@ def _of_the_motion(plan: Plan) -> str:
     return f"{short}{_more(len(excess))}"
 
 
-def _in_phase(plan: Plan, time: float | None) -> str:
+def _in_phase(plan: PlanData, time: float | None) -> str:
     """Return the phase of a time, to follow it; empty for a task without phases."""
     phase = None if time is None else plan.scenario.phases.at(time)
     return "" if phase is None else f" in phase {phase.name!r}"
@@ -172,7 +172,7 @@ def _more(count: int) -> str:
     return f", {count} other limit{'s' * (count > 1)} exceeded" if count else ""
 
 
-def _reasons(plan: Plan) -> list[Fact]:
+def _reasons(plan: PlanData) -> list[Fact]:
     if plan.feasible:
         return []
     facts: list[Fact] = []
@@ -191,7 +191,7 @@ def _reasons(plan: Plan) -> list[Fact]:
     return facts + [_relaxation(plan, relaxed) for relaxed in plan.relaxations]
 
 
-def _relaxation(plan: Plan, relaxed: Relaxed) -> Fact:
+def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
     fact = f"{quantity(relaxed.possible, relaxed.unit)} (audited)"
     if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
@@ -201,7 +201,7 @@ def _relaxation(plan: Plan, relaxed: Relaxed) -> Fact:
     return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")
 
 
-def _bounds(plan: Plan, certificate: Certificate) -> str:
+def _bounds(plan: PlanData, certificate: Certificate) -> str:
     """Return the tension limits of a certificate with their values; empty if no cable pulls along it."""
     scenario, time = plan.scenario, certificate.time
     low, high = scenario.bounds_in(None if time is None else scenario.phases.at(time))
@@ -215,7 +215,7 @@ def _bounds(plan: Plan, certificate: Certificate) -> str:
     return "; ".join(limits) + (f", with the margin of {quantity(margin, 'N')}" if limits and margin else "")
 
 
-def _tensions(plan: Plan) -> list[Fact]:
+def _tensions(plan: PlanData) -> list[Fact]:
     robot, audit = plan.scenario.robot, plan.audit
     exist = np.isfinite(audit.tensions).all(axis=1)
     facts: list[Fact] = []
@@ -250,7 +250,7 @@ def _tensions(plan: Plan) -> list[Fact]:
     return [*facts, ("limits", f"{pairs[0]}{more}{slack}"), *_jumps(plan)]
 
 
-def _robots(plan: Plan) -> list[Fact]:
+def _robots(plan: PlanData) -> list[Fact]:
     """Return what tensions differ by between the robots of the uncertainty, and how many drawn ones keep the limits."""
     margin = plan.robust
     if margin is None:
@@ -270,7 +270,7 @@ def _robots(plan: Plan) -> list[Fact]:
     ]
 
 
-def _jumps(plan: Plan) -> list[Fact]:
+def _jumps(plan: PlanData) -> list[Fact]:
     """Return where the tensions jump, because the load changes in the air."""
     facts = []
     for time in plan.scenario.phases.jumps:
@@ -281,7 +281,7 @@ def _jumps(plan: Plan) -> list[Fact]:
     return facts
 
 
-def _carriers(plan: Plan) -> list[Fact]:
+def _carriers(plan: PlanData) -> list[Fact]:
     """Return the largest speed, acceleration and tilt of each carrier that could move, against its limits."""
     facts = []
     motion, times = plan.audit.carriers, plan.audit.times
@@ -310,7 +310,7 @@ def _against(values: np.ndarray, limit: float | None, unit: str, times: np.ndarr
     return f"up to {quantity(values[row], unit)} at t = {times[row]:.3f} s ({bound})"
 
 
-def _audit(plan: Plan) -> list[Fact]:
+def _audit(plan: PlanData) -> list[Fact]:
     audit = plan.audit
     worst = quantity(audit.violation.max(), "N")
     if not worst.startswith("0 "):
@@ -336,7 +336,7 @@ def _error(position: float, attitude: float) -> str:
     return f"at most {millimetres(position)} and {quantity(attitude * 1e3, 'mrad')}"
 
 
-def _computation(plan: Plan) -> list[Fact]:
+def _computation(plan: PlanData) -> list[Fact]:
     """Return the times for the nonlinear programs; a plan that needed none has no facts."""
     if plan.build_s == 0:
         return []

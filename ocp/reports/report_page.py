@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ...figures import page as html
 from ...figures import style
 from ...models.parsing import to_yaml
-from ..result import Plan
+from ..result import PlanData
 from .drawings import drawings
 from .report import headline, phases_table, sections, spans_table, stages_table
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 COLOURS = {"feasible": style.colour(0), "infeasible": style.colour(1), "not-found": style.colour(5)}
 
 
-def page(plan: Plan, trajectory: xr.Dataset) -> str:
+def page(plan: PlanData, trajectory: xr.Dataset) -> str:
     """Return the whole page."""
     robot, task, status = plan.scenario.robot, plan.scenario.task, plan.status.value
     decisive = headline(plan).partition(f"{status.upper()}, ")[2]
@@ -31,7 +31,7 @@ def page(plan: Plan, trajectory: xr.Dataset) -> str:
     return html.page(f"{robot.name}: {task.name}", status, decisive, COLOURS[status], parts)
 
 
-def _tables(plan: Plan) -> list[str]:
+def _tables(plan: PlanData) -> list[str]:
     """Return the sections, with the spans without tensions after the first, which states why there is no plan."""
     tables, spans = [html.facts(*section) for section in sections(plan)], spans_table(plan)
     after_first = [] if spans is None else [html.columns(*spans)]

@@ -7,14 +7,14 @@ import numpy as np
 from ...figures.animation import Scene
 from ...figures.robot import box_edges
 from ...models.rotor_discs import rotor_discs
-from ..result import Plan
+from ..result import PlanData
 from ..tasks.task_limits import AnyKeepOut, Block, ConvexMesh, Sphere
 
 TRAIL = 10  # every so many audited instants have a point of the trail
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
 
 
-def scene(plan: Plan, times: np.ndarray) -> Scene:
+def scene(plan: PlanData, times: np.ndarray) -> Scene:
     """Return the plan's robot at the audited instants nearest to `times` [s]; nothing is interpolated."""
     robot, audit = plan.scenario.robot, plan.audit
     step = audit.times[1] - audit.times[0]

@@ -9,12 +9,12 @@ import numpy as np
 from ...base.netcdf import Contents, Variable
 from ...models.dimensions import dimensions
 from ...models.parsing import to_yaml
-from ..result import Plan
+from ..result import PlanData
 
 __all__ = ["output_rows", "trajectory"]
 
 
-def trajectory(plan: Plan) -> Contents:
+def trajectory(plan: PlanData) -> Contents:
     """Return the motion and the audited tensions at the task's output rate.
 
     Dimensions: time, coordinate, carrier, cable; of a task in phases also phase.
@@ -60,6 +60,6 @@ def trajectory(plan: Plan) -> Contents:
     return Contents(variables, coordinates, attributes)
 
 
-def output_rows(plan: Plan) -> np.ndarray:
+def output_rows(plan: PlanData) -> np.ndarray:
     """Return the rows of the audit that are saved, equally spaced in time."""
     return np.arange(0, len(plan.audit.times), (len(plan.audit.times) - 1) // plan.scenario.output_samples)

@@ -14,8 +14,9 @@ from ..audits.audit import Audit, other_tensions_may_pass
 from ..audits.excess import Excess
 from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
+from ..plan import Plan
 from ..proofs.durations import Durations
-from ..result import Plan, Relaxed
+from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario

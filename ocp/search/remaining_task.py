@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...models import Robot
-from ..result import Plan
+from ..plan import Plan
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, platform_ends

@@ -13,7 +13,7 @@ from ...models.batch import compiled
 from ..nlp.rows import Mesh
 from ..nlp.solver import Progress, Solver
 from ..nlp.waiting import wait_for
-from ..result import Plan
+from ..plan import Plan
 from ..tasks.deviation import Deviation
 from ..tasks.initial import check_ends
 from ..tasks.measured import initial_of

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...base.text import quantity
 from ..audits.audit import Audit, audit
+from ..audits.planner_step import PlannerStep
 from ..audits.violation import relative_violation
 from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess, usual_guess
@@ -21,11 +22,10 @@ from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
 from ..nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from ..nlp.waiting import wait_for
-from ..result import Plan
+from ..plan import Plan
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
-from .stage import Stage
 
 __all__ = ["Search"]
 
@@ -80,7 +80,7 @@ class Search:
         own = limit - min(FOR_AUDIT * limit, MOST_FOR_AUDIT)
         self._deadline = time.perf_counter() + (own if seconds is None else seconds)
         self.build_s, self.solve_s = 0.0, 0.0
-        self.stages: list[Stage] = []
+        self.stages: list[PlannerStep] = []
         self.mesh: Mesh | None = None  # of the program that was solved last
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
@@ -92,7 +92,7 @@ class Search:
         raise_if_swallowed()
         start, running = time.perf_counter(), RunningStage()
         yield running
-        self.stages.append(Stage(name, running.message, time.perf_counter() - start))
+        self.stages.append(PlannerStep(name, running.message, time.perf_counter() - start))
 
     def _iteration(self, iteration: int, objective: float, infeasibility: float) -> None:
         """Record an iteration, and report it."""

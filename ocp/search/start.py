@@ -12,7 +12,7 @@ from ...base.inputs import shown
 from ...models.parsing import validate
 from ...models.part import Part
 from ..nlp.guess import initial_guess
-from ..result import Plan
+from ..plan import Plan
 from ..tasks.deviation import Deviation
 from ..tasks.paths import AnyPath, PathBase, RestPath
 from ..tasks.scenario import Scenario

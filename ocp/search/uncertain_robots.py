@@ -2,77 +2,36 @@
 
 The tensions of a robot whose cables are at other places differ from the planned ones (`towline.statics.robust`). By
 how much depends on the plan, so there are rounds: plan, compute the largest difference for each cable along the plan,
-tighten the limits of the cable by that, and plan again from there, until the tensions leave their limits in no audited instant
-of the requested share of the robots. Differences grow with the tensions, and the limits are tightened by a little more.
+tighten the limits of the cable by that, and plan again from there, until the tensions leave their limits in no audited
+instant of the requested share of the robots. Differences grow with the tensions, and the limits are tightened by a
+little more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
-from ...base.display import Displayed
 from ...base.text import quantity
 from ...models import Robot
 from ...statics.robust import Spread, motion_factor
 from ..audits.excess import Excess
-from ..audits.tensions import TOLERANCE
-from ..result import Plan
+from ..audits.planner_step import PlannerStep
+from ..audits.robust_margin import RobustMargin
+from ..plan import Plan
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
-from .stage import Stage
 
-__all__ = ["RobustMargin", "for_robots", "judged"]
+__all__ = ["for_robots", "judged"]
 
 ROUNDS = 4  # after the plan for the robot of the file; two suffice as a rule
 GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
 AT_ONCE = 4096  # instants
 MOST_OF_CURVE = 2000  # instants for the lengths of the curves
-
-
-@dataclass(frozen=True)
-class RobustMargin(Displayed):
-    """The differences of tensions between the robots of the uncertainty, along a plan, to first order.
-
-    Attributes
-    ----------
-    share
-        Of the robots that must have tensions inside their limits at all times.
-    factor
-        Standard deviations that this share keeps to (`robust.motion_factor`).
-    reach
-        By how much the tensions of these robots differ at most, at each audited time, (n, m) [N].
-    tightened
-        By how much the limits of the program were tightened, (m,) [N].
-    violation
-        How far tensions less their reach are outside of the limits less the task's margin, (n, m) [N]; 0: inside.
-    """
-
-    share: float
-    factor: float
-    reach: np.ndarray
-    tightened: np.ndarray
-    violation: np.ndarray
-
-    @property
-    def holds(self) -> bool:
-        """Return whether the share of the robots keeps all limits, to first order."""
-        return bool(self.violation.max() <= TOLERANCE)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return share, factor, and by cable the largest reach and what limits were tightened by, for JSON."""
-        return {
-            "share": self.share,
-            "factor": self.factor,
-            "reach": self.reach.max(axis=0).tolist(),
-            "tightened": self.tightened.tolist(),
-            "worst_violation": float(self.violation.max()),
-        }
 
 
 def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation | None], Plan]) -> Plan:
@@ -104,7 +63,7 @@ def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation |
             reason = f"tensions of the robots differ by more than the limits of cable {narrow[0] + 1} are apart"
             break
         again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
-        stages += [Stage(f"for {quantity(100 * share, '%')} of the robots", by, 0.0), *again.stages]
+        stages += [PlannerStep(f"for {quantity(100 * share, '%')} of the robots", by, 0.0), *again.stages]
         spent += again.build_s, again.solve_s
         if not again.feasible:
             reason = f"no motion was found with {by}"

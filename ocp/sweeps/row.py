@@ -13,9 +13,9 @@ from ...base.errors import TowlineError
 from ...base.inputs import printable
 from ...models import Robot
 from ..audits.cost import cost
+from ..plan import Plan
 from ..planner import plan
 from ..reports.report import decisive
-from ..result import Plan
 from ..tasks.task import Task
 
 __all__ = ["FAILED", "LONGEST", "Row", "plan_case", "read_row", "written_row"]

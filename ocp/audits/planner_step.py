@@ -1,13 +1,13 @@
-"""`Stage`: one step of the planner, its message and its time."""
+"""`PlannerStep`: one step of the planner, its message and its time."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Stage"]
+__all__ = ["PlannerStep"]
 
 
-class Stage(NamedTuple):
+class PlannerStep(NamedTuple):
     """One step of the planner.
 
     Attributes

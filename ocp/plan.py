@@ -1,0 +1,129 @@
+"""`Plan`: a planned motion and its audit, as data, dataset, file, figures, film and report."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.display import Fact
+from ..base.inputs import check_ending, file_path
+from ..base.netcdf import save_netcdf
+from ..base.writing import whole_file
+from ..figures.drawn import Filmed
+from .reports.report import as_text, facts_at_once, headline
+from .result import PlanData
+from .tasks.paths import Motion
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from ..figures.animation import Scene
+    from ..statics.robust import RobotShare
+
+__all__ = ["Plan"]
+
+DRAWN_AT = 200  # times at which drawn robots are checked
+
+
+class Plan(PlanData, Filmed):
+    """A planned motion and its audit; its numbers are those of `PlanData`."""
+
+    def _headline(self) -> str:
+        return headline(self)
+
+    def _facts(self) -> Iterable[Fact]:
+        return facts_at_once(self)
+
+    def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
+        """Draw robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
+
+        Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
+        own wrench matrices, and the exact solver decides.
+
+        Parameters
+        ----------
+        count
+            How many robots.
+        seed
+            Of the random numbers.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the robot has no uncertainty.
+        """
+        from ..statics.robust import share_of_robots
+
+        audit, scenario = self.audit, self.scenario
+        rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))
+        motion, carriers = (Motion(*(part[rows] for part in each)) for each in (audit.motion, audit.carriers))
+        w = scenario.required_wrench(audit.times[rows], motion, carriers, scenario.wind)
+        return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
+
+    @cached_property
+    def trajectory(self) -> xr.Dataset:
+        """Return the motion in {G} and the audited tensions over time, at the task's output rate, units as attributes.
+
+        Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
+        """
+        from .reports.trajectory import trajectory
+
+        return trajectory(self).dataset()
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the trajectory as NetCDF, whole or not at all; `xarray.load_dataset` reads it.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from .reports.trajectory import trajectory
+
+        return save_netcdf(trajectory(self), check_ending("file", file_path("file", file), ".nc"))
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.
+
+        A figure without content is left out, as in `plot`.
+        """
+        from .reports.drawings import drawings
+
+        return {name: drawing.figure for name, drawing in drawings(self, self.trajectory).items()}
+
+    @property
+    def _film_duration(self) -> float:
+        return self.scenario.duration
+
+    def _scene(self, times: np.ndarray) -> Scene:
+        from .reports.scene import scene
+
+        return scene(self, times)
+
+    def report(self) -> str:
+        """Return the report as text: the result in the first line, then the facts behind it."""
+        return as_text(self)
+
+    def save_report(self, file: str | os.PathLike[str]) -> Path:
+        """Write the report as one HTML file with its figures inside, whole or not at all.
+
+        The file loads nothing from anywhere, so that it can be mailed and kept. This is a method of its own, not an
+        argument of `report`: what returns text writes no files.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from .reports.report_page import page
+
+        path = file_path("file", file)
+        with whole_file(path) as temporary:
+            temporary.write_text(page(self, self.trajectory), encoding="utf-8")
+        return path

@@ -1,0 +1,150 @@
+"""`FlightData`: what a robot did along a reference, as numbers, which events, figures and reports read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.display import Displayed
+from ..base.text import quantity
+from ..control import ANSWERS, Reference
+from ..control.command import OTHERWISE
+from ..models.robot import Robot
+from .conditions import Conditions
+from .record import Record
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["TENSION_TOLERANCE", "FlightData"]
+
+TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
+
+
+@dataclass(frozen=True, eq=False)
+class FlightData(Displayed):
+    """What a robot did along a reference, without figures, files and reports.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    conditions
+        References, faults and noise, see `Conditions`.
+    seed
+        Of wind and noise.
+    record
+        What happened, a row for each period.
+    lasted
+        How many periods the flight lasted, fewer than there are references if the motion grew beyond all numbers.
+    tolerance
+        Largest error of the position [m] of a flight that passes.
+    wind
+        Velocity of the air in {G} [m/s], (K, 3); None if there is no air.
+    seconds
+        How long each step of the controller took [s], (K,).
+    wall
+        Wall time of the whole flight [s].
+    """
+
+    robot: Robot
+    conditions: Conditions
+    seed: int
+    record: Record
+    lasted: int
+    tolerance: float
+    wind: np.ndarray | None
+    seconds: np.ndarray
+    wall: float
+
+    @property
+    def references(self) -> Sequence[Reference]:
+        """Return the reference of each period."""
+        return self.conditions.references
+
+    @property
+    def period(self) -> float:
+        """Return the period of the controller [s]."""
+        return self.conditions.period
+
+    @property
+    def _recorded(self) -> int:
+        """Return how many periods have a row: the first one has, also if the motion does not survive it."""
+        return max(self.lasted, 1)
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Return the times at which the recorded periods begin [s], (n,)."""
+        return self.period * np.arange(self._recorded)
+
+    @cached_property
+    def error(self) -> np.ndarray:
+        """Return the distance of the platform from its reference [m], (n,)."""
+        wanted = np.stack([reference.pose[:3] for reference in self.references[: self._recorded]])
+        return np.linalg.norm(self.record.motions[: self._recorded, 0, :3] - wanted, axis=1)
+
+    @cached_property
+    def slack(self) -> np.ndarray:
+        """Return where a cable is slack that should pull, (n, m)."""
+        pulls = self.conditions.should_pull(self.robot.t_min, np.arange(self._recorded))
+        return (self.record.tensions[: self._recorded] <= 0) & pulls
+
+    @cached_property
+    def above(self) -> np.ndarray:
+        """Return by how much tensions exceed t_max with its tolerance [N], (n, m); below zero where they do not."""
+        robot = self.robot
+        return self.record.tensions[: self._recorded] - robot.t_max - TENSION_TOLERANCE * (robot.t_max - robot.t_min)
+
+    @property
+    def passed(self) -> bool:
+        """Return whether the flight lasted, near its reference, with tensions inside their limits and cables taut."""
+        return not self.failures
+
+    @cached_property
+    def failures(self) -> tuple[str, ...]:
+        """Return why the flight did not pass, a line each."""
+        lines = []
+        if self.lasted < len(self.references):
+            lines.append(f"the motion grew beyond all numbers at t = {self.lasted * self.period:.3f} s")
+        at = int(self.error.argmax())  # the first nan, if there is one
+        if np.isnan(self.error[at]):
+            lines.append(f"no position at t = {self.times[at]:.3f} s")
+        elif self.error[at] > self.tolerance:
+            lines.append(
+                f"error of {quantity(1e3 * self.error[at], 'mm')} at t = {self.times[at]:.3f} s "
+                f"(tolerance {quantity(1e3 * self.tolerance, 'mm')})"
+            )
+        tensions = self.record.tensions[: self._recorded]
+        row, cable = np.unravel_index(np.nanargmax(self.above), self.above.shape)
+        if self.above[row, cable] > 0:
+            lines.append(
+                f"{quantity(tensions[row, cable], 'N')} in cable {cable + 1} at t = {self.times[row]:.3f} s "
+                f"(t_max {quantity(self.robot.t_max[cable], 'N')})"
+            )
+        if self.slack.any():
+            row, cable = np.argwhere(self.slack)[0]
+            lines.append(
+                f"slack for {quantity(self.slack_s, 's')}, first cable {cable + 1} at t = {self.times[row]:.3f} s"
+            )
+        return tuple(lines)
+
+    @property
+    def slack_s(self) -> float:
+        """Return for how long a cable was slack that should pull [s]."""
+        return float(self.slack.any(axis=1).sum() * self.period)
+
+    @property
+    def answered(self) -> dict[str, int]:
+        """Return how many steps were answered in each way."""
+        counts = np.bincount(self.record.answered[: self._recorded], minlength=len(ANSWERS))
+        return dict(zip(ANSWERS, counts.tolist(), strict=True))
+
+    @property
+    def handed_over(self) -> float | None:
+        """Return when computed torque took over [s], as the robot does not move as its controller predicts, or None."""
+        steps = np.flatnonzero(self.record.answered[: self._recorded] == OTHERWISE)
+        return float(self.times[steps[0]]) if steps.size else None
