@@ -35,9 +35,11 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..base.reading import read_bytes
 from . import points
+from .cable import Cable
 from .parsing import validate
 from .part import COORDINATES, LARGEST, Coordinate, inertia_matrix
-from .robot import Cable, Platform, Robot
+from .platform import Platform
+from .robot import Robot
 from .rotation import rotation
 
 # What each joint's q moves, in the order of q; both spatial ones turn freely; each writes the angles in its own form.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import combinations
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from ..base.inputs import printable
 from ..base.text import quantity, quantity_range, quantity_row
 from .part import Part
 
-if TYPE_CHECKING:
-    from .robot import Robot
-
 __all__ = ["DisplayedRobot"]
 
 PLANES = {"x": [[0, 0], [1, 0], [0, 1]], "y": [[1, 0], [0, 0], [0, 1]], "z": [[1, 0], [0, 1], [0, 0]]}  # without it
@@ -23,16 +20,16 @@ OBLIQUE = [[0.9, -0.25], [-0.45, -0.45], [0.0, 0.95]]  # (3, 2), from above
 
 
 class DisplayedRobot(Part):
-    """The base of `Robot`, with its headline, facts and picture."""
+    """The base of `Robot`, whose numbers its headline, facts and picture show."""
 
     def _headline(self) -> str:
-        robot = cast("Robot", self)
+        robot: Any = self
         kinds = [carrier.kind for carrier in robot.carriers]
         carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
         return f"{robot.name}: {robot.m} cables; carriers: {carriers}"
 
     def _facts(self) -> Iterable[Fact]:
-        robot = cast("Robot", self)
+        robot: Any = self
         return [
             ("mass", quantity(robot.platform.mass, "kg")),
             ("moves", ", ".join(robot.platform.dof)),
@@ -46,7 +43,7 @@ class DisplayedRobot(Part):
 
     def _picture(self) -> str:
         """Return cables and platform at home, in the plane of a planar robot, else obliquely from above."""
-        robot = cast("Robot", self)
+        robot: Any = self
         flat = [plane for name, plane in PLANES.items() if name not in robot.platform.dof]
         view = np.array(flat[0] if flat else OBLIQUE)
         anchors, attachments = robot.home_anchors @ view, robot.home_attachments @ view  # (m, 2)

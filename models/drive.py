@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
-from .carriers import Drive
-
-if TYPE_CHECKING:
-    from .robot import Cable, Robot
+from .cable import Cable
+from .carriers import Carrier, Drive
 
 __all__ = ["lengths_to_keep", "usual_drive"]
 
 
-def usual_drive(robot: Robot) -> Drive:
-    """Return the drive of a robot whose file has none.
+def usual_drive(carriers: Iterable[Carrier], cables: Iterable[Cable]) -> Drive:
+    """Return the drive of a robot whose file has none, from its cables and the carriers that hold these.
 
     Cables keep their lengths if all hang from carriers that move them about, such as quadrotors, and none has a winch,
     or an encoder or a pulley, which belong to one. All others have winches.
     """
-    towed = all(robot.carriers[index].tows for index in robot.carrier_of_cable)
-    winches = any(part is not None for cable in robot.cables for part in (cable.winch, cable.encoder, cable.pulley))
+    towed = all(carrier.tows for carrier in carriers)
+    winches = any(part is not None for cable in cables for part in (cable.winch, cable.encoder, cable.pulley))
     return "fixed-length" if towed and not winches else "both"
 
 
-def lengths_to_keep(robot: Robot, at_home: np.ndarray) -> tuple[Cable, ...]:
+def lengths_to_keep(cables: tuple[Cable, ...], at_home: np.ndarray) -> tuple[Cable, ...]:
     """Return the cables of a robot with fixed lengths; one without a length has its distance at home, (m,) [m].
 
     Raises
@@ -33,7 +31,7 @@ def lengths_to_keep(robot: Robot, at_home: np.ndarray) -> tuple[Cable, ...]:
     ValueError
         If a cable without a length runs over a pulley.
     """
-    for index, cable in enumerate(robot.cables):
+    for index, cable in enumerate(cables):
         if cable.length is None and cable.pulley is not None:
             raise ValueError(
                 f"cables[{index}].length must be a number > 0 [m] if drive is fixed-length and the cable has a pulley, "
@@ -41,5 +39,5 @@ def lengths_to_keep(robot: Robot, at_home: np.ndarray) -> tuple[Cable, ...]:
             )
     return tuple(
         cable if cable.length is not None else cable.model_copy(update={"length": float(length)})
-        for cable, length in zip(robot.cables, at_home, strict=True)
+        for cable, length in zip(cables, at_home, strict=True)
     )

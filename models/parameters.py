@@ -10,19 +10,13 @@ Cables count from 0, as in error messages about robot files.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from ..base.errors import InputError
-from ..base.inputs import number, required, shown
-from .part import LARGEST
+from ..base.inputs import shown
+from .cable import Cable
 
-if TYPE_CHECKING:
-    from .robot import Cable, Robot
-
-__all__ = ["Parameter", "changed", "locate", "values"]
+__all__ = ["Parameter", "locate", "located"]
 
 FORMS = "cables[i].anchor.x, cables[i].attachment.x (or .y, .z) or cables[i].pulley.radius"
 _NAME = re.compile(r"cables\[(0|[1-9][0-9]{0,5})\]\.(?:(anchor|attachment)\.([xyz])|pulley\.radius)")
@@ -55,46 +49,9 @@ def locate(name: object, cables: tuple[Cable, ...] | None = None) -> Parameter:
     return Parameter(cable, part, axis)
 
 
-def values(robot: Robot, names: Iterable[str]) -> np.ndarray:
-    """Return the numbers that the names stand for, (p,) [m].
-
-    Raises
-    ------
-    InputError
-        If `names` is no list of names, or the robot has no such number.
-    """
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        raise InputError(f"names must be a list of names of a robot's numbers, got {shown(names)}")
-    radii = robot.pulley_radii[:, None]
-    numbers = {"anchor": robot.anchors, "attachment": robot.attachments, "radius": radii}
-    places = (_place(robot, "names", name) for name in names)
-    return np.array([numbers[place.part][place.cable, place.axis] for place in places])  # (p,)
-
-
-def changed(robot: Robot, numbers: Mapping[str, float]) -> dict[str, Any]:
-    """Return the data of the robot with other numbers [m], by their names.
-
-    Raises
-    ------
-    InputError
-        If `numbers` is no mapping, the robot has no such number, or a value is not one.
-    """
-    data = robot.model_dump()
-    cables = [dict(cable) for cable in data["cables"]]
-    for name, value in required("values", numbers, Mapping).items():
-        cable, part, axis = _place(robot, "keys of values", name)
-        new = number(name, value, -LARGEST, LARGEST)
-        if part == "radius":
-            cables[cable]["pulley"] = {**cables[cable]["pulley"], "radius": new}
-        else:
-            point = list(cables[cable][part])
-            point[axis] = new
-            cables[cable][part] = point
-    return {**data, "cables": cables}
-
-
-def _place(robot: Robot, field: str, name: object) -> Parameter:
+def located(field: str, name: object, cables: tuple[Cable, ...]) -> Parameter:
+    """Return which number of the cables a name stands for, or raise InputError that names the field."""
     try:
-        return locate(name, robot.cables)
+        return locate(name, cables)
     except ValueError as error:
         raise InputError(f"{field} {error}") from None

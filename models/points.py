@@ -6,14 +6,22 @@ CasADi Function, and a robot is checked without importing CasADi.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .robot import Robot
-
 __all__ = ["anchors", "angles", "attachments", "default_home", "in_frame", "placed", "rotations"]
+
+
+class WithPoints(Protocol):
+    """What is read of a robot: its anchors in the carriers' frames, its attachments in that of the platform."""
+
+    @property
+    def carrier_of_cable(self) -> np.ndarray: ...  # (m,)
+    @property
+    def anchors(self) -> np.ndarray: ...  # (m, 3) [m]
+    @property
+    def attachments(self) -> np.ndarray: ...  # (m, 3) [m]
 
 
 def rotations(angles: np.ndarray) -> np.ndarray:
@@ -47,7 +55,7 @@ def in_frame(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...i->...j", rotations(pose[..., 3:]), points - pose[..., :3])
 
 
-def anchors(robot: Robot, carrier_pose: np.ndarray) -> np.ndarray:
+def anchors(robot: WithPoints, carrier_pose: np.ndarray) -> np.ndarray:
     """Place the anchors of a robot into {G}, with its carriers at `carrier_pose` (..., c, 6), (..., m, 3) [m]."""
     owner, points = robot.carrier_of_cable, robot.anchors
     if not points.any():
@@ -59,7 +67,7 @@ def anchors(robot: Robot, carrier_pose: np.ndarray) -> np.ndarray:
     return result
 
 
-def attachments(robot: Robot, pose: np.ndarray) -> np.ndarray:
+def attachments(robot: WithPoints, pose: np.ndarray) -> np.ndarray:
     """Place the attachments of a robot into {G}, with its platform at `pose` (..., 6), (..., m, 3) [m]."""
     return placed(pose, robot.attachments)
 

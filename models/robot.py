@@ -10,175 +10,28 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self, cast
+from typing import Any, Self, cast
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
+from ..base.errors import InputError
+from ..base.inputs import number, required, shown, whole_number
 from . import parameters, points
+from .cable import Cable
 from .carriers import AnyCarrier, Drive
 from .displayed_robot import DisplayedRobot
 from .drive import lengths_to_keep, usual_drive
 from .part import (
     COORDINATES,
-    BodyInertia,
-    Coordinate,
-    Finite,
+    LARGEST,
     Name,
-    NonNegative,
-    Part,
-    Pose,
-    Positive,
     Vector3,
     inertia_matrix,
 )
+from .platform import Platform
 from .pulleys import check_pulleys
-from .uncertainty import Uncertainty, draw
-
-# Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
-# or with fewer axes, the reactions of what is locked would enter them.
-TURNING_DOF: tuple[tuple[Coordinate, ...], ...] = (
-    COORDINATES,
-    ("x", "z", "pitch"),
-    ("x", "y", "yaw"),
-    ("y", "z", "roll"),
-    ("x", "y", "z", "yaw"),
-)
-
-
-class Aero(Part):
-    """The force of the air on the platform (paper F, Eq. 25).
-
-    The force acts at the CoM along the axes of {G}: along x and y with the drag coefficient, along z with the lift
-    coefficient; V is the air's velocity relative to the platform.
-    """
-
-    air_density: Positive = Field(description="rho [kg/m^3]")
-    drag: NonNegative = Field(description="drag coefficient C_d [-]")
-    lift: NonNegative = Field(description="lift coefficient C_l [-]")
-    area: Positive = Field(description="largest cross-section S of the platform [m^2]")
-    form: Literal["signed", "printed"] = Field(
-        default="signed", description="signed: V abs(V), as drag acts; printed: V^2, never negative, as in paper F"
-    )
-
-
-class Platform(Part):
-    """The rigid body that the cables pull."""
-
-    mass: Positive = Field(description="[kg]")
-    inertia: BodyInertia | None = Field(
-        default=None,
-        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
-        "required unless the platform cannot turn",
-    )
-    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
-    home: Pose | None = Field(
-        default=None,
-        description="pose in {G} to start from and to diagnose at [m, rad]; default: level, amid or below the anchors",
-    )
-    dof: tuple[Coordinate, ...] = Field(
-        default=COORDINATES,
-        min_length=1,
-        description="coordinates that can move; a point mass has x, y, z. The cables balance only the rows of these",
-    )
-    aero: Aero | None = Field(
-        default=None, description="how the air pushes the platform; default: without it no wind can be given"
-    )
-
-    @field_validator("dof")
-    @classmethod
-    def _in_order(cls, dof: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
-        if len(set(dof)) != len(dof):
-            raise ValueError("must name each coordinate once")
-        ordered: tuple[Coordinate, ...] = tuple(name for name in COORDINATES if name in dof)
-        turning = [name for name in ordered if name in COORDINATES[3:]]
-        if turning and ordered not in TURNING_DOF:
-            sets = "; ".join(", ".join(names) for names in TURNING_DOF)
-            raise ValueError(f"must be any of x, y, z; or {sets}")
-        return ordered
-
-    @model_validator(mode="after")
-    def _turns_with_inertia(self) -> Self:
-        if self.inertia is None and any(name in self.dof for name in COORDINATES[3:]):
-            raise ValueError(
-                "inertia must be (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2] unless dof has no angles, got none"
-            )
-        locked = [name for name in COORDINATES[3:] if name not in self.dof]
-        if self.home and len(locked) < 3 and any(self.home[COORDINATES.index(name)] for name in locked):
-            angles = ", ".join(f"{self.home[COORDINATES.index(name)]:g}" for name in locked)
-            raise ValueError(f"home must have 0 rad for {', '.join(locked)}, which cannot move, got {angles}")
-        return self
-
-
-class Pulley(Part):
-    """A swivelling pulley: the cable comes up the swivel axis at the anchor, runs over the sheave, leaves tangentially.
-
-    The sheave's plane holds the axis and turns about it so that it also holds the attachment.
-    """
-
-    radius: Positive = Field(description="of the sheave [m]")
-    axis: Vector3 = Field(
-        default=(0.0, 0.0, 1.0), description="swivel axis in the carrier frame, need not be of unit length"
-    )
-
-    @field_validator("axis")
-    @classmethod
-    def _has_a_direction(cls, axis: Vector3) -> Vector3:
-        if not np.linalg.norm(axis) > 0:
-            raise ValueError("must be a direction other than zero")
-        return axis
-
-
-class Winch(Part):
-    """A winch as its cable feels it: an inertia that the motor's force and the tension accelerate, inside limits."""
-
-    inertia: Positive = Field(description="of rotor, gear and drum, as a mass on the cable [kg]")
-    friction: NonNegative = Field(default=0.0, description="dry friction, as a force on the cable [N]")
-    speed_max: Positive = Field(description="largest speed of the cable [m/s]")
-    force_max: Positive = Field(description="largest force of the motor on the cable [N]")
-
-
-class Encoder(Part):
-    """The reading of a winch: the length from anchor to attachment is offset + scale * reading."""
-
-    offset: Finite = Field(default=0.0, description="length of the cable where the reading is 0 [m]")
-    scale: Finite = Field(default=1.0, description="length for each unit of the reading [m], not 0")
-
-    @field_validator("scale")
-    @classmethod
-    def _changes_with_the_reading(cls, scale: float) -> float:
-        if scale == 0:
-            raise ValueError("must be a number other than 0")
-        return scale
-
-
-class Cable(Part):
-    """One cable, from its anchor on a carrier to its attachment on the platform. It pulls and never pushes."""
-
-    carrier: Name = Field(description="name of the carrier that holds its anchor")
-    anchor: Vector3 = Field(description="A_i in the carrier frame [m]")
-    attachment: Vector3 = Field(description="B_i in the platform frame [m]")
-    t_min: NonNegative = Field(description="smallest tension [N]; above zero keeps the cable taut")
-    t_max: Positive = Field(description="largest tension [N]")
-    stiffness: Positive | None = Field(default=None, description="E A [N]; default: the cable does not stretch")
-    damping: NonNegative | None = Field(default=None, description="C [N s/m]")
-    length: Positive | None = Field(
-        default=None,
-        description="[m], where the drive is fixed-length; default there: from anchor to attachment at home",
-    )
-    pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
-    winch: Winch | None = Field(
-        default=None, description="what moves the cable, for simulation; default: its length follows commands exactly"
-    )
-    encoder: Encoder | None = Field(
-        default=None, description="what the winch reports, for calibration; default: the length itself [m]"
-    )
-
-    @model_validator(mode="after")
-    def _limits_in_order(self) -> Self:
-        if self.t_min > self.t_max:
-            raise ValueError(f"t_min must not exceed t_max, {self.t_max:g} N, got {self.t_min:g} N")
-        return self
+from .uncertainty import Uncertainty
 
 
 def _without_default(schema: dict[str, Any]) -> None:
@@ -221,16 +74,22 @@ class Robot(DisplayedRobot):
             if cable.carrier not in names:
                 raise ValueError(f"cables[{index}].carrier must be one of {', '.join(names)}, got {cable.carrier!r}")
         lengths = np.linalg.norm(self.home_anchors - self.home_attachments, axis=1)
-        if (self.drive or usual_drive(self)) == "fixed-length":
-            object.__setattr__(self, "cables", lengths_to_keep(self, lengths))
-        object.__setattr__(self, "drive", self.drive or usual_drive(self))
+        object.__setattr__(
+            self,
+            "drive",
+            self.drive or usual_drive([self.carriers[index] for index in self.carrier_of_cable], self.cables),
+        )
+        if self.drive == "fixed-length":
+            object.__setattr__(self, "cables", lengths_to_keep(self.cables, lengths))
         shortest = int(np.argmin(lengths))
         if not lengths[shortest] > 1e-9:
             raise ValueError(
                 f"cables[{shortest}] must have a length > 0 m at home, got an anchor and an attachment that coincide"
             )
         if self.pulley_radii.any():
-            check_pulleys(self)
+            turned = points.rotations(self.carrier_home[self.carrier_of_cable, 3:])
+            axes = np.einsum("mij,mj->mi", turned, self.pulley_axes)
+            check_pulleys(self.home_attachments - self.home_anchors, axes, self.pulley_radii, self.cables)
         for index, name in enumerate(self.uncertainty.parameters if self.uncertainty else ()):
             try:
                 parameters.locate(name, self.cables)
@@ -246,7 +105,11 @@ class Robot(DisplayedRobot):
         InputError
             If `names` is no list of names, or the robot has no such number.
         """
-        return parameters.values(self, names)  # (p,)
+        if isinstance(names, str) or not isinstance(names, Iterable):
+            raise InputError(f"names must be a list of names of a robot's numbers, got {shown(names)}")
+        numbers = {"anchor": self.anchors, "attachment": self.attachments, "radius": self.pulley_radii[:, None]}
+        found = (parameters.located("names", name, self.cables) for name in names)
+        return np.array([numbers[one.part][one.cable, one.axis] for one in found])  # (p,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Robot:
         """Return the robot with other numbers of its cables [m], by the names of `parameter_values`.
@@ -256,7 +119,18 @@ class Robot(DisplayedRobot):
         InputError
             If `values` is no mapping, the robot has no such number, or a value is not possible.
         """
-        return Robot.model_validate(parameters.changed(self, values))
+        data = self.model_dump()
+        cables = [dict(cable) for cable in data["cables"]]
+        for name, value in required("values", values, Mapping).items():
+            cable, part, axis = parameters.located("keys of values", name, self.cables)
+            new = number(name, value, -LARGEST, LARGEST)
+            if part == "radius":
+                cables[cable]["pulley"] = {**cables[cable]["pulley"], "radius": new}
+            else:
+                point = list(cables[cable][part])
+                point[axis] = new
+                cables[cable][part] = point
+        return Robot.model_validate({**data, "cables": cables})
 
     def drawn(self, count: int, seed: int = 0) -> tuple[Robot, ...]:
         """Draw robots whose numbers differ from the file's as its `uncertainty` states; each one is known exactly.
@@ -273,7 +147,14 @@ class Robot(DisplayedRobot):
         InputError
             If the robot has no uncertainty, an argument is wrong, or so large an error is drawn that no robot has it.
         """
-        return draw(self, count, seed)
+        whole_number("count", count, 1, 1_000_000)
+        whole_number("seed", seed, 0, 2**63 - 1)
+        if self.uncertainty is None:
+            raise InputError("robot.uncertainty must be given to draw robots from it, got none")
+        names = self.uncertainty.parameters
+        exact = self.model_copy(update={"uncertainty": None})
+        numbers = self.parameter_values(names) + self.uncertainty.errors(count, seed)
+        return tuple(exact.with_parameters(dict(zip(names, row.tolist(), strict=True))) for row in numbers)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the robot as a robot file, whole or not at all; `load` reads an equal robot from it.

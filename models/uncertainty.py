@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from ..base.errors import InputError
-from ..base.inputs import whole_number
 from .parameters import locate
 from .part import Finite, Part
 
-if TYPE_CHECKING:
-    from .robot import Robot
-
-__all__ = ["Uncertainty", "draw"]
+__all__ = ["Uncertainty"]
 
 ROUNDING = 1e-9  # of the largest number of the covariance, in its symmetry and in its eigenvalues
 
@@ -93,21 +88,3 @@ class Uncertainty(Part):
         """Draw errors of the parameters, (count, p) [m], the same ones for the same seed."""
         factor = self.factor
         return np.random.default_rng(seed).standard_normal((count, factor.shape[1])) @ factor.T  # (count, p)
-
-
-def draw(robot: Robot, count: int, seed: int) -> tuple[Robot, ...]:
-    """Draw robots from the uncertainty of one, see `Robot.drawn`.
-
-    Raises
-    ------
-    InputError
-        If the robot has no uncertainty, an argument is wrong, or so large an error is drawn that no robot has it.
-    """
-    whole_number("count", count, 1, 1_000_000)
-    whole_number("seed", seed, 0, 2**63 - 1)
-    if robot.uncertainty is None:
-        raise InputError("robot.uncertainty must be given to draw robots from it, got none")
-    names = robot.uncertainty.parameters
-    exact = robot.model_copy(update={"uncertainty": None})
-    numbers = robot.parameter_values(names) + robot.uncertainty.errors(count, seed)
-    return tuple(exact.with_parameters(dict(zip(names, row.tolist(), strict=True))) for row in numbers)

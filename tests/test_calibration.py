@@ -17,7 +17,7 @@ from towline.estimation.calibration.normal_equations import metric
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
 from towline.estimation.calibration.pose_track import PoseTrack
 from towline.estimation.calibration.rotations import from_vectors
-from towline.estimation.calibration.run import length_of, model_of
+from towline.estimation.calibration.solving import length_of, model_of
 from towline.estimation.pose import machine
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points

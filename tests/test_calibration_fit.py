@@ -10,7 +10,7 @@ from towline.estimation.calibration import Measurements, calibrate, starts
 from towline.estimation.calibration.curvature import curvature
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.parameters import OF_CABLE
-from towline.estimation.calibration.run import length_of, model_of
+from towline.estimation.calibration.solving import length_of, model_of
 from towline.models import Dynamics, load
 
 from .robots_as_built import as_built, moved_anchors

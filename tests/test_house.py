@@ -8,76 +8,128 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 
-# From the ground up: a room may import the rooms below its floor, and itself. Rooms of one floor stand apart.
+# From the ground up: a file may import files of its own room and of rooms on lower floors.
 FLOORS = [
+    {"base"},
     {"models", "solvers", "figures"},
-    {"distribution", "robust"},
-    {"calibration", "control", "workspace", "ocp", "embedded"},
-    {"simulation"},
+    {"statics", "plant"},
+    {"workspace", "estimation", "control", "ocp"},
+    {"simulation", "export"},
     {"studies"},
-    {"benchmarks"},
-    {"viewer"},
+    {"benchmarks", "viewer"},
     {"cli"},
 ]
-COMMON = {
-    *(
-        "checkpoint",
-        "declared",
-        "display",
-        "errors",
-        "execution",
-        "inputs",
-        "kernel",
-        "netcdf",
-        "processors",
-        "quiet",
-        "reading",
-        "simd",
-        "simd_llvm",
-        "text",
-        "tolerances",
-        "writing",
-    )
-}
+FLOOR = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
 def rooms():
-    """Folders at the top that are packages, and the modules there that join models and solvers."""
-    return {path.parent.name for path in ROOT.glob("*/__init__.py")} | {"distribution", "robust"}
+    """Folders at the top that are packages."""
+    return {path.parent.name for path in ROOT.glob("*/__init__.py")}
 
 
-def files_of(room):
-    return [*(ROOT / room).rglob("*.py")] or [ROOT / f"{room}.py"]
+def modules(root, tops):
+    """The files of the package by their names without `towline.`; the package itself is the empty name."""
+    files = {root / "__init__.py", *(file for top in tops for file in (root / top).rglob("*.py"))}
+    names = {file: ".".join(file.relative_to(root).with_suffix("").parts) for file in files}
+    return {name.removesuffix("__init__").removesuffix("."): file for file, name in names.items()}
 
 
-def imported_rooms(file):
-    """Top-level parts of towline that a file imports, relative or absolute."""
-    depth = len(file.relative_to(ROOT).parts) - 1
+def imports(name, file, known):
+    """The modules that a file imports anywhere: also inside functions, and under TYPE_CHECKING."""
+    package = name.split(".") if file.name == "__init__.py" else name.split(".")[:-1]
+    package = [part for part in package if part]
     found = set()
     for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.level == depth + 1:
-            found |= {node.module.split(".")[0]} if node.module else {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").startswith("towline."):
-            found.add(node.module.split(".")[1])
+        if isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            parts = [*above, *(node.module.split(".") if node.module else [])]
+            if not node.level and parts[0] != "towline":
+                continue
+            origin = ".".join(parts if node.level else parts[1:])
+            for alias in node.names:
+                member = f"{origin}.{alias.name}".lstrip(".")
+                found.add(member if member in known else origin)
         elif isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("towline.")}
-    return found - COMMON - {"__version__"}
+            found |= {alias.name[8:] for alias in node.names if alias.name.startswith("towline.")}
+    return (found & known) - {name}
 
 
-def test_imports_only_point_down():
-    floor_of = {room: level for level, floor in enumerate(FLOORS) for room in floor}
-    assert rooms() == set(floor_of), "a new room needs its floor in this test"
-    for file in [path for room in rooms() for path in files_of(room)]:
-        room = file.relative_to(ROOT).parts[0].removesuffix(".py")
-        for other in imported_rooms(file) - {room}:
-            assert floor_of[other] < floor_of[room], f"{file.relative_to(ROOT)} imports {other}"
+def graph(root=ROOT, tops=None):
+    """The modules that each module imports."""
+    files = modules(root, rooms() if tops is None else tops)
+    return {name: imports(name, file, set(files)) for name, file in files.items()}
 
 
-def test_the_import_test_can_see():
-    """It would notice: planning does import models and solvers."""
-    seen = {other for path in (ROOT / "ocp").rglob("*.py") for other in imported_rooms(path)}
-    assert {"models", "solvers"} <= seen
+def circles(arrows):
+    """Modules that are on a circle: what can be reached from it reaches it."""
+    left = {name: set(others) for name, others in arrows.items()}
+    while ends := {name for name, others in left.items() if not others}:
+        left = {name: others - ends for name, others in left.items() if name not in ends}
+    return set(left)
+
+
+def test_no_import_goes_up_or_round():
+    arrows = graph()
+    assert rooms() == set(FLOOR), "a new room needs its floor in this test"
+    for name, others in arrows.items():
+        room = name.split(".")[0]
+        for other in others if room else ():
+            target = other.split(".")[0]
+            assert target == room or FLOOR.get(target, len(FLOORS)) < FLOOR[room], f"{name} imports {other}"
+    assert not circles(arrows)
+
+
+def test_the_root_holds_folders():
+    """Beside metadata there are two files at the top: the package's own, and that of its build."""
+    assert {path.name for path in ROOT.glob("*.py")} == {"__init__.py", "setup.py"}
+
+
+def test_the_import_test_can_see(tmp_path):
+    """It sees late imports, those for types only, and circles of three files."""
+    assert "solvers.solve" in graph()["solvers"]
+    lines = {
+        "one": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from .two import b",
+        "two": "def f():\n    from . import three",
+        "three": "import towline.room.one",
+    }
+    (tmp_path / "room").mkdir()
+    for name, text in {"__init__": "", **lines}.items():
+        (tmp_path / "room" / f"{name}.py").write_text(text)
+    (tmp_path / "__init__.py").write_text("from .room.one import a")
+    arrows = graph(tmp_path, ["room"])
+    assert arrows == {
+        "": {"room.one"},
+        "room": set(),
+        "room.one": {"room.two"},
+        "room.two": {"room.three"},
+        "room.three": {"room.one"},
+    }
+    assert {"room.one", "room.two", "room.three"} <= circles(arrows)
+
+
+def test_former_names_can_be_imported():
+    """The public packages that moved, with a warning, and without one where the short name stays."""
+    import importlib
+    import warnings
+
+    import pytest
+
+    from towline.base import former_names
+
+    for old, new in former_names.NOW.items():
+        sys.modules.pop(f"towline.{old}", None)
+        if old in former_names.SHORT:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                module = importlib.import_module(f"towline.{old}")
+        else:
+            with pytest.warns(DeprecationWarning, match=f"towline.{old} is called towline.{new} now"):
+                module = importlib.import_module(f"towline.{old}")
+        assert module is importlib.import_module(f"towline.{new}")
+        assert module.__spec__.name == f"towline.{new}"
+    with pytest.raises(ModuleNotFoundError):
+        importlib.import_module("towline.embedding")
 
 
 def test_only_carriers_know_their_kinds():
@@ -85,7 +137,7 @@ def test_only_carriers_know_their_kinds():
     from towline.models.carriers import _KINDS
 
     classes = {kind.__name__ for kind in _KINDS.values()}
-    for file in {path for room in rooms() for path in files_of(room)} - {ROOT / "models" / "carriers.py"}:
+    for file in {path for room in rooms() for path in (ROOT / room).rglob("*.py")} - {ROOT / "models" / "carriers.py"}:
         for node in ast.walk(ast.parse(file.read_text())):
             named = {getattr(node, "id", None), getattr(node, "attr", None), getattr(node, "name", None)}
             assert not named & classes, f"{file.relative_to(ROOT)} names {named & classes}"

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 from towline.base.errors import InputError
 from towline.export.mjcf import to_mjcf
 from towline.models import Dynamics, Robot, available, load
+from towline.models.cable import Pulley
 from towline.models.part import COORDINATES
-from towline.models.robot import Pulley
 
 mujoco = pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
 

@@ -1,11 +1,12 @@
 """The robot as built: which parameters explain the measured lengths of its cables, and how certain they are."""
 
+from .calibration import Calibration
+from .cross_validation import Compared, HeldOut
 from .design import next_poses
-from .held_out import Compared, HeldOut
 from .log import read_measurements
 from .measurements import Measurements, Sigma
 from .outliers import Outlier, Slip
-from .result import Calibration, Parameter
+from .result import Parameter
 from .run import calibrate
 
 __all__ = [

@@ -13,11 +13,11 @@ from ...base.errors import InputError
 from ...base.inputs import flag, real_array, shown, whole_number
 from ...models.files import as_robot
 from ...models.robot import Robot
+from .calibration import Calibration
 from .measurements import Measurements
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import OF_CABLE, Parameters, check_free
-from .result import Calibration
 
 if TYPE_CHECKING:
     import os

@@ -11,7 +11,7 @@ from ...figures import calibration as pictures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .result import Calibration
+    from .result import CalibrationData
 
 __all__ = ["drawings"]
 
@@ -27,7 +27,7 @@ KINDS = {  # of the parameters of a cable that are lengths, by the end of their 
 }
 
 
-def drawings(result: Calibration) -> dict[str, Figure]:
+def drawings(result: CalibrationData) -> dict[str, Figure]:
     """Draw residuals before and after, anchors with their ellipsoids, and how well each parameter is known.
 
     Ellipsoids are drawn if the measurements determine all anchors.

@@ -12,7 +12,6 @@ import io
 import os
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,10 +21,9 @@ from ...base.errors import InputError
 from ...base.inputs import file_path, printable, shown
 from ...base.netcdf import check_units
 from ...base.reading import read_bytes
-from ...models.part import COORDINATES
 from .measurements import Measurements, Sigma
 
-__all__ = ["read_measurements", "save_measurements"]
+__all__ = ["read_measurements"]
 
 LARGEST_LOG = 1_000_000_000  # [bytes]
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
@@ -260,30 +258,3 @@ def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], sta
         check_units("pose", attributes)
         result["poses"] = _floats(values)
     return result
-
-
-def save_measurements(measurements: Measurements, path: str | os.PathLike[str]) -> Path:
-    """Save measurements as NetCDF, whole or not at all; `read_measurements` reads them.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    from ...base.netcdf import Contents, Variable, save_netcdf
-
-    first = "sample" if measurements.times is None else "time"
-    cable = (first, "cable")
-    about = {"units": "m", "long_name": "readings: lengths from anchor to attachment up to offset and scale"}
-    variables = {"cable_lengths": Variable(cable, measurements.lengths, about)}
-    coordinates = {"cable": Variable(("cable",), np.arange(1, measurements.m + 1))}
-    if measurements.tensions is not None:
-        variables["tensions"] = Variable(cable, measurements.tensions, {"units": "N"})
-    if measurements.poses is not None:
-        about = {"units": "m, rad", "long_name": "of the platform in {G}; nan: not measured"}
-        variables["pose"] = Variable((first, "coordinate"), measurements.poses, about)
-        coordinates["coordinate"] = Variable(("coordinate",), np.array(COORDINATES))
-    if measurements.times is not None:
-        coordinates["time"] = Variable(("time",), measurements.times, {"units": "s"})
-    attributes = {f"sigma_{name}": value for name, value in measurements.sigma._asdict().items()}
-    return save_netcdf(Contents(variables, coordinates, attributes), file_path("path", path))

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from ...base.display import Displayed
 from ...base.errors import InputError
-from ...base.inputs import number, real_array, required, shown
+from ...base.inputs import file_path, number, real_array, required, shown
+from ...base.netcdf import Contents, Variable, save_netcdf
 from ...models import points
-from ...models.part import LARGEST
+from ...models.part import COORDINATES, LARGEST
 from ...models.robot import Robot
 from .rotations import from_quaternions
 
@@ -151,9 +152,21 @@ class Measurements(Displayed):
         InputError
             If the file cannot be written.
         """
-        from .log import save_measurements
-
-        return save_measurements(self, path)
+        first = "sample" if self.times is None else "time"
+        cable = (first, "cable")
+        about = {"units": "m", "long_name": "readings: lengths from anchor to attachment up to offset and scale"}
+        variables = {"cable_lengths": Variable(cable, self.lengths, about)}
+        coordinates = {"cable": Variable(("cable",), np.arange(1, self.m + 1))}
+        if self.tensions is not None:
+            variables["tensions"] = Variable(cable, self.tensions, {"units": "N"})
+        if self.poses is not None:
+            about = {"units": "m, rad", "long_name": "of the platform in {G}; nan: not measured"}
+            variables["pose"] = Variable((first, "coordinate"), self.poses, about)
+            coordinates["coordinate"] = Variable(("coordinate",), np.array(COORDINATES))
+        if self.times is not None:
+            coordinates["time"] = Variable(("time",), self.times, {"units": "s"})
+        attributes = {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
+        return save_netcdf(Contents(variables, coordinates, attributes), file_path("path", path))
 
 
 def check_measurements(robot: Robot, measurements: object) -> Measurements:

@@ -10,7 +10,7 @@ from ...base.text import quantity
 
 if TYPE_CHECKING:
     from ...base.display import Fact
-    from .result import Calibration, Parameter
+    from .result import CalibrationData, Parameter
 
 __all__ = ["report"]
 
@@ -20,7 +20,7 @@ LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually bett
 HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
 
 
-def report(result: Calibration) -> str:
+def report(result: CalibrationData) -> str:
     """Return the result for people: how well lengths fit, the parameters, and what the measurements leave open."""
     lines = [
         headline(result),
@@ -35,14 +35,14 @@ def report(result: Calibration) -> str:
     return "\n".join(lines)
 
 
-def headline(result: Calibration) -> str:
+def headline(result: CalibrationData) -> str:
     """Return in one line what was calibrated, from how many samples, and whether the result can be used."""
     free = ", ".join(result.free) or "the file as it is"
     state = "" if result.converged else ", NOT CONVERGED"
     return f"{result.file.name}: {free} from {len(result.residuals)} samples{state}"
 
 
-def facts(result: Calibration) -> list[Fact]:
+def facts(result: CalibrationData) -> list[Fact]:
     """Return the facts that need no further calibration, with the parameters that changed most."""
     residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
     doubt = [] if result.doubt is None else [("DO NOT USE", result.doubt)]
@@ -61,7 +61,7 @@ def _mm(length: float) -> str:
     return quantity(1e3 * length, "mm", digits=3)
 
 
-def _of_held_out(result: Calibration) -> list[str]:
+def _of_held_out(result: CalibrationData) -> list[str]:
     if result.doubt is not None:
         return []
     held_out = result.held_out
@@ -80,7 +80,7 @@ def _of_held_out(result: Calibration) -> list[str]:
     return lines
 
 
-def _of_noise(result: Calibration) -> list[str]:
+def _of_noise(result: CalibrationData) -> list[str]:
     stated = result.stated_sigma
     lines = []
     if np.isfinite(result.noise) and result.noise > 1.05 * stated:
@@ -96,8 +96,8 @@ def _of_noise(result: Calibration) -> list[str]:
     return lines
 
 
-def _of_parameters(result: Calibration) -> list[str]:
-    from .run import length_of
+def _of_parameters(result: CalibrationData) -> list[str]:
+    from .solving import length_of
 
     lines = ["  parameters, with standard deviations and their change from the file:"]
     length = length_of(result.file)  # on which a scale acts
@@ -123,7 +123,7 @@ def _one(one: Parameter) -> str:
     return f"{one.name:26} {one.value:12.6f} {one.unit:2} +- {sigma:14} change {change}"
 
 
-def _of_exceptions(result: Calibration) -> list[str]:
+def _of_exceptions(result: CalibrationData) -> list[str]:
     lines = [
         f"  winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(abs(slip.size))} "
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
@@ -139,7 +139,7 @@ def _of_exceptions(result: Calibration) -> list[str]:
     return lines
 
 
-def _of_open(result: Calibration) -> list[str]:
+def _of_open(result: CalibrationData) -> list[str]:
     texts = result.not_identifiable
     loose = [one.name for one in result.parameters if one.unit == "m" and LOOSE < one.sigma < np.inf]
     if loose:

@@ -1,38 +1,34 @@
-"""`Calibration`: the robot as measurements show it, and how certain that is."""
+"""`CalibrationData`: the robot as measurements show it, and how certain that is, as numbers."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.display import BLUE, GREY, Displayed, Fact, picture
+from ...base.display import BLUE, GREY, Displayed, picture
 from ...base.errors import InputError
 from ...base.inputs import real_array
 from ...base.text import quantity
 from ...models import points
 from ...models.part import LARGEST
 from ...models.robot import Robot
+from .cross_validation import HeldOut, compare, poses_fitted
+from .normal_equations import metric, state_equations
 from .outliers import Outlier, Slip
+from .solving import Solved, cleaned, covariance_of, inflation_of, lengths_of, noise_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from .held_out import HeldOut
     from .measurements import Measurements
-    from .run import Solved
 
-__all__ = ["Calibration", "Parameter"]
+__all__ = ["CalibrationData", "Parameter"]
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
-EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
 
 
 class Parameter(NamedTuple):
@@ -49,8 +45,8 @@ class Parameter(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration(Displayed):
-    """The result of `calibrate`.
+class CalibrationData(Displayed):
+    """The result of `calibrate`, without figures, files and reports.
 
     Attributes
     ----------
@@ -66,16 +62,6 @@ class Calibration(Displayed):
     free: tuple[str, ...]
     prior: Mapping[str, float]
     doubt: str | None = None
-
-    def _headline(self) -> str:
-        from .report import headline
-
-        return headline(self)
-
-    def _facts(self) -> Iterable[Fact]:
-        from .report import facts
-
-        return facts(self)
 
     def _picture(self) -> str:
         samples = np.arange(len(self.residuals))
@@ -159,12 +145,7 @@ class Calibration(Displayed):
         Directions that the measurements leave open have none. It is multiplied where residuals are larger than stated,
         or alike in neighbouring samples (`noise`, `alike`).
         """
-        from .normal_equations import metric
-
-        model = self._solved.model
-        scale = metric(model)[model.parameters.varies]
-        covariance = self._solved.observability.covariance / scale[:, None] / scale
-        return (covariance + covariance.T) / 2 * self._inflation
+        return covariance_of(self._solved) * self._inflation
 
     @cached_property
     def information(self) -> np.ndarray:
@@ -172,20 +153,15 @@ class Calibration(Displayed):
 
         Its unit is [1/m^2]; it is smaller where the covariance is larger, by `noise` and `alike`.
         """
-        from .normal_equations import metric, state_equations
-
         model = self._solved.model
         return state_equations(model, self._solved.fit.state, metric(model)).S / self._inflation
 
     @property
     def _inflation(self) -> float:
-        excess, alike, _ = self._noise
-        return (excess**2 if excess > 1 + EXCEEDS else 1.0) * alike if np.isfinite(excess) else 1.0
+        return inflation_of(self._noise)
 
     @cached_property
     def _noise(self) -> tuple[float, float, int]:
-        from .run import noise_of
-
         return noise_of(self._solved)
 
     @property
@@ -216,16 +192,11 @@ class Calibration(Displayed):
     @cached_property
     def residuals(self) -> np.ndarray:
         """Return the residuals of the lengths of the calibrated robot, (N, m) [m], wrong readings included."""
-        from .run import lengths_of
-
         return lengths_of(self._solved.model, self._solved.fit.state)
 
     @cached_property
     def residuals_before(self) -> np.ndarray:
         """Return the residuals of the lengths with the file's parameters, (N, m) [m], at poses that fit them best."""
-        from .held_out import poses_fitted
-        from .run import lengths_of
-
         model = self._solved.model
         return lengths_of(*poses_fitted(model, model.parameters.robot))
 
@@ -278,9 +249,6 @@ class Calibration(Displayed):
     @cached_property
     def held_out(self) -> HeldOut:
         """Return how well these parameters, and smaller sets, predict measurements that were left out."""
-        from .held_out import compare
-        from .run import cleaned
-
         return compare(self._solved.model.robot, *cleaned(self._solved), self.free, dict(self.prior), self.clock)
 
     def lengths(self, readings: ArrayLike) -> np.ndarray:
@@ -300,59 +268,6 @@ class Calibration(Displayed):
         for (cable, _), size in zip(of.slips, x[of.clock + 1 :], strict=True):
             offsets[cable] += size
         return offsets + table[:, 7] * values
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save the robot as a robot file (YAML), whole or not at all, and return the path.
-
-        A result that should not be used (`refused`) is not saved; `robot.save` saves it all the same.
-
-        Parameters
-        ----------
-        path
-            Of the file; one of the same name is replaced.
-
-        Raises
-        ------
-        InputError
-            If the result is refused, or the file cannot be written.
-        """
-        if self.refused is not None:
-            raise InputError(f"calibration must be one to use, to be saved, got one refused: {self.refused}")
-        from ...models.parsing import save_yaml
-
-        return save_yaml(self.robot, path, "path")
-
-    def figures(self) -> dict[str, Figure]:
-        """Draw residuals before and after, anchors with ellipsoids, and standard deviations: by name, to show or save.
-
-        Anchors are drawn if the measurements determine all of them.
-        """
-        from .drawings import drawings
-
-        return drawings(self)
-
-    def plot(self, folder: str | os.PathLike[str], format: str = "png") -> list[Path]:
-        """Save the figures in `folder`, and return their paths.
-
-        Parameters
-        ----------
-        format
-            png, pdf or svg.
-
-        Raises
-        ------
-        InputError
-            If the format is another, or a file cannot be written.
-        """
-        from ...figures.style import save_all
-
-        return save_all(self.figures, folder, format)
-
-    def report(self) -> str:
-        """Return the result as text, for people."""
-        from .report import report
-
-        return report(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data, as `towline calibrate --json` prints it."""

@@ -16,7 +16,8 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from .estimate import PoseEstimate
 from .problem import Problem, problem_of
-from .search import search
+from .resting import open_estimates
+from .search import estimates
 
 __all__ = ["SIGMA", "checked_lengths", "checked_sigma", "one_pose", "pose_from_lengths"]
 
@@ -74,29 +75,10 @@ def pose_from_lengths(
     problem = problem_of(robot, each)
     starts = None if start is None else _start(problem, start, batch)
     if problem.open:
-        from .resting import open_estimates
-
         flat = open_estimates(robot, problem, rows, starts, each, deviations)
     else:
         flat = estimates(robot, problem, rows, starts, each, deviations)
     return flat.reshaped(batch, carriers)
-
-
-def estimates(
-    robot: Robot,
-    problem: Problem,
-    lengths: np.ndarray,
-    starts: np.ndarray | None,
-    carriers: np.ndarray | None,
-    sigma: np.ndarray,
-) -> PoseEstimate:
-    """Return the poses that fit lengths (N, m) best; the other arguments are checked ones of `pose_from_lengths`."""
-    if starts is None:
-        best = search(robot, problem, lengths, sigma, carriers)
-        residuals = np.multiply(best.errors, sigma, out=best.errors)
-        return PoseEstimate(robot, best.poses, residuals, best.ended, sigma, carriers, best.ambiguous)
-    poses, errors, converged = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
-    return PoseEstimate(robot, poses, np.multiply(errors, sigma, out=errors), converged, sigma, carriers)
 
 
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:

@@ -11,6 +11,7 @@ from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria, per_length, rest_near
 from .estimate import PoseEstimate
 from .problem import Problem
+from .search import estimates
 
 __all__ = ["open_estimates"]
 
@@ -41,8 +42,6 @@ def open_estimates(
     InputError
         If the robot has no gravity and too few cables: the lengths alone do not decide.
     """
-    from .from_lengths import estimates
-
     places = np.broadcast_to(
         robot.carrier_home if carriers is None else carriers, (len(lengths), *robot.carrier_home.shape)
     )

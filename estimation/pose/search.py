@@ -15,11 +15,11 @@ import numpy as np
 
 from ...models import points
 from ...models.robot import Robot
-from .estimate import EXACT, largest_cost, moved
+from .estimate import EXACT, PoseEstimate, largest_cost, moved
 from .problem import DAMPING, Problem
 from .taut import taut
 
-__all__ = ["APART", "level_platform", "search"]
+__all__ = ["APART", "estimates", "level_platform", "search"]
 
 TURNS = np.radians([45.0, 90.0])
 OBLIQUE = np.radians([60.0, 25.0])  # about an axis between two, for platforms that have many poses with their lengths
@@ -123,3 +123,20 @@ def _starts(problem: Problem, level: np.ndarray):
                     step = np.zeros(6)
                     step[[one, other]] = turn * np.sqrt(0.5) * np.array(signs)
                     yield moved(level, step)
+
+
+def estimates(
+    robot: Robot,
+    problem: Problem,
+    lengths: np.ndarray,
+    starts: np.ndarray | None,
+    carriers: np.ndarray | None,
+    sigma: np.ndarray,
+) -> PoseEstimate:
+    """Return the poses that fit lengths (N, m) best; the other arguments are checked ones of `pose_from_lengths`."""
+    if starts is None:
+        best = search(robot, problem, lengths, sigma, carriers)
+        residuals = np.multiply(best.errors, sigma, out=best.errors)
+        return PoseEstimate(robot, best.poses, residuals, best.ended, sigma, carriers, best.ambiguous)
+    poses, errors, converged = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
+    return PoseEstimate(robot, poses, np.multiply(errors, sigma, out=errors), converged, sigma, carriers)

@@ -25,7 +25,7 @@ from ...base.version import __version__
 from ...base.writing import check_writable, whole_file
 from ...models.parsing import to_yaml
 from ..planner import plan
-from ..result import Plan
+from ..plan import Plan
 from ..tasks.status import MotionStatus
 from .axis import check_figure
 from .cases import Cases

@@ -26,8 +26,8 @@ from pydantic import Field, model_validator
 
 from ...models import Robot
 from ...models.part import Part, Vector3
+from ...models.platform import Aero
 from ...models.rigid_body import com_velocity
-from ...models.robot import Aero
 
 __all__ = ["WindBox", "as_wind", "choices", "decisive_winds", "decisive_winds_at", "inner_winds"]
 

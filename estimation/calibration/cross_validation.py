@@ -7,19 +7,31 @@ estimated again where they were not measured; then the halves change places.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...base.display import Displayed
+from ...base.errors import InputError
 from ...models.robot import Robot
 from .measurements import Measurements
 from .model import Model, State
 from .parameters import Parameters
+from .solving import (
+    Solved,
+    check_enough,
+    cleaned,
+    covariance_of,
+    inflation_of,
+    is_enough,
+    length_of,
+    lengths_of,
+    model_of,
+    noise_of,
+    solve,
+    usual,
+)
 from .starts import fit_from
-
-if TYPE_CHECKING:
-    from .run import Solved
 
 __all__ = ["Compared", "HeldOut", "compare", "poses_fitted", "select"]
 
@@ -121,8 +133,6 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     InputError
         If the measurements are too few even for the offsets.
     """
-    from .run import check_enough, cleaned, is_enough, solve, usual
-
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
     check_enough(robot, measurements, ("offsets",), {})
     if "clock" in usual(robot, measurements):
@@ -138,10 +148,10 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
 
 def _clock_sigma(solved: Solved) -> float:
     """Return the standard deviation of the clock offset [s]."""
-    from .result import Calibration
-
-    parameters = Calibration(solved, solved.model.parameters.groups, {}).parameters
-    return next(one.sigma for one in parameters if one.name == "clock")
+    of = solved.model.parameters
+    at = int(np.flatnonzero(np.flatnonzero(of.varies) == of.clock)[0])
+    variance = inflation_of(noise_of(solved)) * covariance_of(solved)[at, at]
+    return float(np.sqrt(variance)) if solved.observability.determined[at] else np.inf
 
 
 def _compare(
@@ -152,8 +162,6 @@ def _compare(
     prior: dict[str, float],
     clock: float,
 ) -> HeldOut:
-    from .run import model_of
-
     whole = replace(model_of(robot, measurements, (), {}), weights=weights)
     parts = halves(measurements)
     compared = []
@@ -179,9 +187,6 @@ def _predict(
     whole: Model, free: tuple[str, ...], prior: dict[str, float], clock: float, fitted: np.ndarray, left: np.ndarray
 ) -> tuple[float, float] | None:
     """Return the mean squares [m^2] fitted and left out; None with too few samples, or if no fit converged."""
-    from ...base.errors import InputError
-    from .run import check_enough, length_of, model_of
-
     if not (len(fitted) and len(left)):
         return None
 
@@ -210,8 +215,6 @@ def _predict(
 
 def _mean_square(model: Model, state: State) -> float:
     """Return the mean square of the lengths' residuals [m^2], corrected for what unknown poses absorb."""
-    from .run import lengths_of
-
     used = model.weights * model.inside(state) > 0
     squares = float((lengths_of(model, state).T[used] ** 2).sum())
     unknown = int(np.isinf(model.pose_sigmas).sum())
@@ -220,7 +223,5 @@ def _mean_square(model: Model, state: State) -> float:
 
 def poses_fitted(model: Model, robot: Robot) -> tuple[Model, State]:
     """Return the model without parameters that vary, and the poses that fit the lengths best with a robot's file."""
-    from .run import length_of
-
     nothing = replace(model, parameters=Parameters(robot, ()), prior={})
     return nothing, fit_from(nothing, nothing.begin(), length_of(robot))[0].state

@@ -1,0 +1,63 @@
+"""`Calibration`: the robot as measurements show it, with its file, figures and report."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...base.display import Fact
+from ...base.errors import InputError
+from ...figures.drawn import Drawn
+from .report import facts, headline, report
+from .result import CalibrationData
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Calibration"]
+
+
+class Calibration(CalibrationData, Drawn):
+    """The result of `calibrate`; its numbers are those of `CalibrationData`."""
+
+    def _headline(self) -> str:
+        return headline(self)
+
+    def _facts(self) -> Iterable[Fact]:
+        return facts(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Save the robot as a robot file (YAML), whole or not at all, and return the path.
+
+        A result that should not be used (`refused`) is not saved; `robot.save` saves it all the same.
+
+        Parameters
+        ----------
+        path
+            Of the file; one of the same name is replaced.
+
+        Raises
+        ------
+        InputError
+            If the result is refused, or the file cannot be written.
+        """
+        if self.refused is not None:
+            raise InputError(f"calibration must be one to use, to be saved, got one refused: {self.refused}")
+        from ...models.parsing import save_yaml
+
+        return save_yaml(self.robot, path, "path")
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw residuals before and after, anchors with ellipsoids, and standard deviations: by name, to show or save.
+
+        Anchors are drawn if the measurements determine all of them.
+        """
+        from .drawings import drawings
+
+        return drawings(self)
+
+    def report(self) -> str:
+        """Return the result as text, for people."""
+        return report(self)

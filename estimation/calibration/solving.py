@@ -1,0 +1,211 @@
+"""`solve`: fit the parameters of a robot to measurements, without wrong readings and with the slips of winches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...models.robot import Robot
+from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
+from .fit import Fit, fit
+from .measurements import Measurements, measured_poses
+from .model import Model, State
+from .normal_equations import metric, state_equations
+from .observability import Observability, observability
+from .outliers import Outlier, Slip, alike, find_outliers, find_slip
+from .parameters import Parameters
+from .pose_track import PoseTrack
+from .starts import LARGEST_SHARE, fit_from, level_poses
+
+__all__ = [
+    "Solved",
+    "check_enough",
+    "cleaned",
+    "covariance_of",
+    "inflation_of",
+    "is_enough",
+    "length_of",
+    "lengths_of",
+    "model_of",
+    "noise_of",
+    "solve",
+    "usual",
+]
+
+EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
+
+ROUNDS = 30  # of fits, each without the wrong readings of those before
+FEW = 0.02  # of the samples
+MOST_SLIPS = 8
+
+
+class Solved(NamedTuple):
+    """A fit, with wrong readings, slips, and which parameters the measurements determine."""
+
+    model: Model
+    fit: Fit
+    outliers: tuple[Outlier, ...]
+    slips: tuple[Slip, ...]
+    observability: Observability
+
+
+def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
+    """Return the parameters that are found by default: the clock offset among them if a motion was measured."""
+    groups = ("anchors", "offsets", "clock")
+    known = measurements.times is not None and is_enough(robot, measurements, ("clock",))
+    return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
+
+
+def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:
+    """Return whether the measurements are enough for these parameters, without a prior."""
+    try:
+        check_enough(robot, measurements, groups, {})
+    except InputError:
+        return False
+    return True
+
+
+def solve(
+    robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float], outliers: bool
+) -> Solved:
+    """Fit, leave wrong readings out and model slips, until there are no more; arguments are checked."""
+    model = model_of(robot, measurements, groups, prior)
+    length = length_of(robot)
+    state = begin_with_clock(model, length) if "clock" in groups else model.begin()
+    result, fitted = fit_from(model, state, length, outliers)
+    wrong: dict[tuple[int, int], Outlier] = {}
+    slips: list[Slip] = []
+    limit = LARGEST_SHARE * model.weights.size
+    for _ in range(ROUNDS if outliers else 0):
+        found = find_outliers(model, result.state)
+        # Where more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
+        many = len(found) > max(2, FEW * len(measurements))
+        slip = find_slip(model, result.state, length) if (many or not found) and len(slips) < MOST_SLIPS else None
+        if slip is not None:
+            wrong, model = {}, replace(model, weights=np.ones_like(model.weights))
+            slips.append(slip)
+            parameters = replace(model.parameters, slips=(*model.parameters.slips, (slip.cable, slip.sample)))
+            model = replace(model, parameters=parameters)
+            result = fit(model, result.state._replace(x=np.append(result.state.x, slip.size)), length)
+            fitted = model.weights
+            continue
+        if not found or len(wrong) + len(found) > limit:
+            if np.array_equal(fitted, model.weights):
+                break
+            # Readings that looked wrong in the beginning are not.
+            result, fitted = fit(model, result.state, length), model.weights
+            continue
+        wrong |= {(one.cable, one.sample): one for one in found}
+        weights = model.weights.copy()
+        for one in found:
+            weights[one.cable, one.sample] = 0.0
+        model = replace(model, weights=weights)
+        result, fitted = fit(model, result.state, length), model.weights
+    S = state_equations(model, result.state, scale := metric(model)).S
+    seen = observability(S, model.parameters, result.state, scale, length)
+    return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
+
+
+def model_of(
+    robot: Robot,
+    measurements: Measurements,
+    groups: tuple[str, ...],
+    prior: dict[str, float],
+    start: np.ndarray | None = None,
+) -> Model:
+    """Return the model of checked arguments; `start` are poses (N, 6) to begin with, default: level ones."""
+    parameters = Parameters(robot, groups)
+    weights = np.ones((robot.m, len(measurements)))
+    model = Model(parameters, measurements, prior, weights)
+    if "clock" in groups:
+        position, rotation, known = measured_poses(robot, measurements)
+        assert measurements.times is not None
+        rows = np.all(known[:, robot.dof_mask > 0], axis=1)
+        model = replace(model, track=PoseTrack(measurements.times, position, rotation, rows))
+    elif np.isinf(model.pose_sigmas[:, :3]).any():
+        if start is None:
+            table = parameters.table(parameters.first)
+            start = level_poses(robot, table[:, 6] + table[:, 7] * measurements.lengths, "offsets" in groups)
+        model = replace(model, start=start)
+    return model
+
+
+def length_of(robot: Robot) -> float:
+    """Return a length of the robot's cables, as a scale [m]: their mean at home."""
+    return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+
+
+def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> None:
+    """Raise InputError unless there are at least as many equations as unknowns, and times and poses for a clock."""
+    parameters = Parameters(robot, groups)
+    if "clock" in groups:
+        known = measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all(axis=1)
+        if measurements.times is None:
+            raise InputError("measurements.times must be given to find a clock offset, got none")
+        if known.sum() < 4:
+            raise InputError(f"measurements.poses must have at least 4 rows to find a clock offset, got {known.sum()}")
+        if measurements.times[-1] - measurements.times[0] <= 2 * CLOCK_RANGE / 10:
+            raise InputError(
+                f"measurements.times must span more than {CLOCK_RANGE / 5:g} s to find a clock offset, got "
+                f"{measurements.times[-1] - measurements.times[0]:g} s"
+            )
+    model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements))))
+    unknown = np.isinf(model.pose_sigmas) & ("clock" not in groups)
+    spare = robot.m - unknown.sum(axis=1)
+    equations = int(np.maximum(spare, 0).sum())
+    wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
+    if equations < wanted or equations == 0:
+        poses = f" beside {int(unknown.any(axis=1).sum())} unknown poses" if unknown.any() else ""
+        raise InputError(
+            f"measurements must have as many lengths as there are parameters{poses}, {wanted}, or a prior, got "
+            f"{len(measurements)} samples of {robot.m} cables, which leave {equations}"
+        )
+
+
+def noise_of(solved: Solved) -> tuple[float, float, int]:
+    """Return by how much residuals exceed their sigmas, the factor of `alike`, and the redundancy.
+
+    The first is the root of the sum of squares over the redundancy: readings less all that was found with them.
+    """
+    model, state = solved.model, solved.fit.state
+    used = int((model.weights * model.inside(state) > 0).sum())
+    sigmas = model.pose_sigmas[model.poses_vary]
+    priors = np.isfinite(model.prior_sigmas[model.parameters.varies])
+    found = int(np.isfinite(solved.observability.sigmas).sum())
+    redundancy = used + int(np.isfinite(sigmas).sum()) - sigmas.size + int(priors.sum()) - found
+    if redundancy <= 0:
+        return np.nan, 1.0, redundancy
+    excess = float(np.sqrt(solved.fit.cost / redundancy))
+    return excess, alike(model, state, solved.observability.covariance, found, excess), redundancy
+
+
+def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
+    """Return the measurements without their slips, and the weights (m, N): 0 of wrong readings."""
+    model, x = solved.model, solved.fit.state.x
+    parameters, given = model.parameters, model.measurements
+    lengths = given.lengths.copy()
+    for (cable, first), size in zip(parameters.slips, x[parameters.clock + 1 :], strict=True):
+        lengths[first:, cable] += size / parameters.table(x)[cable, 7]
+    return Measurements(lengths, given.poses, None, given.tensions, given.times, given.sigma._asdict()), model.weights
+
+
+def lengths_of(model: Model, state: State) -> np.ndarray:
+    """Return the residuals of the lengths [m], (N, m), all readings included."""
+    every = replace(model, weights=np.ones_like(model.weights))
+    return (every.residuals(state).readings * model.measurements.sigma.lengths).T
+
+
+def inflation_of(noise: tuple[float, float, int]) -> float:
+    """Return the factor of the covariance, from `noise_of`: for residuals larger than stated, or autocorrelated."""
+    excess, alike, _ = noise
+    return (excess**2 if excess > 1 + EXCEEDS else 1.0) * alike if np.isfinite(excess) else 1.0
+
+
+def covariance_of(solved: Solved) -> np.ndarray:
+    """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s], without its inflation."""
+    scale = metric(solved.model)[solved.model.parameters.varies]
+    covariance = solved.observability.covariance / scale[:, None] / scale
+    return (covariance + covariance.T) / 2

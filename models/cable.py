@@ -1,0 +1,90 @@
+"""A cable as data: from its anchor to its attachment, with pulley, winch and encoder."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from .part import (
+    Finite,
+    Name,
+    NonNegative,
+    Part,
+    Positive,
+    Vector3,
+)
+
+__all__ = ["Cable", "Encoder", "Pulley", "Winch"]
+
+
+class Pulley(Part):
+    """A swivelling pulley: the cable comes up the swivel axis at the anchor, runs over the sheave, leaves tangentially.
+
+    The sheave's plane holds the axis and turns about it so that it also holds the attachment.
+    """
+
+    radius: Positive = Field(description="of the sheave [m]")
+    axis: Vector3 = Field(
+        default=(0.0, 0.0, 1.0), description="swivel axis in the carrier frame, need not be of unit length"
+    )
+
+    @field_validator("axis")
+    @classmethod
+    def _has_a_direction(cls, axis: Vector3) -> Vector3:
+        if not np.linalg.norm(axis) > 0:
+            raise ValueError("must be a direction other than zero")
+        return axis
+
+
+class Winch(Part):
+    """A winch as its cable feels it: an inertia that the motor's force and the tension accelerate, inside limits."""
+
+    inertia: Positive = Field(description="of rotor, gear and drum, as a mass on the cable [kg]")
+    friction: NonNegative = Field(default=0.0, description="dry friction, as a force on the cable [N]")
+    speed_max: Positive = Field(description="largest speed of the cable [m/s]")
+    force_max: Positive = Field(description="largest force of the motor on the cable [N]")
+
+
+class Encoder(Part):
+    """The reading of a winch: the length from anchor to attachment is offset + scale * reading."""
+
+    offset: Finite = Field(default=0.0, description="length of the cable where the reading is 0 [m]")
+    scale: Finite = Field(default=1.0, description="length for each unit of the reading [m], not 0")
+
+    @field_validator("scale")
+    @classmethod
+    def _changes_with_the_reading(cls, scale: float) -> float:
+        if scale == 0:
+            raise ValueError("must be a number other than 0")
+        return scale
+
+
+class Cable(Part):
+    """One cable, from its anchor on a carrier to its attachment on the platform. It pulls and never pushes."""
+
+    carrier: Name = Field(description="name of the carrier that holds its anchor")
+    anchor: Vector3 = Field(description="A_i in the carrier frame [m]")
+    attachment: Vector3 = Field(description="B_i in the platform frame [m]")
+    t_min: NonNegative = Field(description="smallest tension [N]; above zero keeps the cable taut")
+    t_max: Positive = Field(description="largest tension [N]")
+    stiffness: Positive | None = Field(default=None, description="E A [N]; default: the cable does not stretch")
+    damping: NonNegative | None = Field(default=None, description="C [N s/m]")
+    length: Positive | None = Field(
+        default=None,
+        description="[m], where the drive is fixed-length; default there: from anchor to attachment at home",
+    )
+    pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
+    winch: Winch | None = Field(
+        default=None, description="what moves the cable, for simulation; default: its length follows commands exactly"
+    )
+    encoder: Encoder | None = Field(
+        default=None, description="what the winch reports, for calibration; default: the length itself [m]"
+    )
+
+    @model_validator(mode="after")
+    def _limits_in_order(self) -> Self:
+        if self.t_min > self.t_max:
+            raise ValueError(f"t_min must not exceed t_max, {self.t_max:g} N, got {self.t_min:g} N")
+        return self

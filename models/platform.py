@@ -1,0 +1,95 @@
+"""The platform of a robot as data: its mass, its aerodynamics and the coordinates in which it moves."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from .part import (
+    COORDINATES,
+    BodyInertia,
+    Coordinate,
+    NonNegative,
+    Part,
+    Pose,
+    Positive,
+    Vector3,
+)
+
+__all__ = ["Aero", "Platform"]
+
+
+# Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
+# or with fewer axes, the reactions of what is locked would enter them.
+TURNING_DOF: tuple[tuple[Coordinate, ...], ...] = (
+    COORDINATES,
+    ("x", "z", "pitch"),
+    ("x", "y", "yaw"),
+    ("y", "z", "roll"),
+    ("x", "y", "z", "yaw"),
+)
+
+
+class Aero(Part):
+    """The force of the air on the platform (paper F, Eq. 25).
+
+    The force acts at the CoM along the axes of {G}: along x and y with the drag coefficient, along z with the lift
+    coefficient; V is the air's velocity relative to the platform.
+    """
+
+    air_density: Positive = Field(description="rho [kg/m^3]")
+    drag: NonNegative = Field(description="drag coefficient C_d [-]")
+    lift: NonNegative = Field(description="lift coefficient C_l [-]")
+    area: Positive = Field(description="largest cross-section S of the platform [m^2]")
+    form: Literal["signed", "printed"] = Field(
+        default="signed", description="signed: V abs(V), as drag acts; printed: V^2, never negative, as in paper F"
+    )
+
+
+class Platform(Part):
+    """The rigid body that the cables pull."""
+
+    mass: Positive = Field(description="[kg]")
+    inertia: BodyInertia | None = Field(
+        default=None,
+        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
+        "required unless the platform cannot turn",
+    )
+    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
+    home: Pose | None = Field(
+        default=None,
+        description="pose in {G} to start from and to diagnose at [m, rad]; default: level, amid or below the anchors",
+    )
+    dof: tuple[Coordinate, ...] = Field(
+        default=COORDINATES,
+        min_length=1,
+        description="coordinates that can move; a point mass has x, y, z. The cables balance only the rows of these",
+    )
+    aero: Aero | None = Field(
+        default=None, description="how the air pushes the platform; default: without it no wind can be given"
+    )
+
+    @field_validator("dof")
+    @classmethod
+    def _in_order(cls, dof: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
+        if len(set(dof)) != len(dof):
+            raise ValueError("must name each coordinate once")
+        ordered: tuple[Coordinate, ...] = tuple(name for name in COORDINATES if name in dof)
+        turning = [name for name in ordered if name in COORDINATES[3:]]
+        if turning and ordered not in TURNING_DOF:
+            sets = "; ".join(", ".join(names) for names in TURNING_DOF)
+            raise ValueError(f"must be any of x, y, z; or {sets}")
+        return ordered
+
+    @model_validator(mode="after")
+    def _turns_with_inertia(self) -> Self:
+        if self.inertia is None and any(name in self.dof for name in COORDINATES[3:]):
+            raise ValueError(
+                "inertia must be (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2] unless dof has no angles, got none"
+            )
+        locked = [name for name in COORDINATES[3:] if name not in self.dof]
+        if self.home and len(locked) < 3 and any(self.home[COORDINATES.index(name)] for name in locked):
+            angles = ", ".join(f"{self.home[COORDINATES.index(name)]:g}" for name in locked)
+            raise ValueError(f"home must have 0 rad for {', '.join(locked)}, which cannot move, got {angles}")
+        return self
