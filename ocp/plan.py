@@ -17,18 +17,14 @@ from ..base.writing import whole_file
 from ..figures.drawn import Filmed
 from .reports.report import as_text, facts_at_once, headline
 from .result import PlanData
-from .tasks.paths import Motion
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
     from ..figures.animation import Scene
-    from ..statics.robust import RobotShare
 
 __all__ = ["Plan"]
-
-DRAWN_AT = 200  # times at which drawn robots are checked
 
 
 class Plan(PlanData, Filmed):
@@ -39,32 +35,6 @@ class Plan(PlanData, Filmed):
 
     def _facts(self) -> Iterable[Fact]:
         return facts_at_once(self)
-
-    def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
-        """Draw robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
-
-        Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
-        own wrench matrices, and the exact solver decides.
-
-        Parameters
-        ----------
-        count
-            How many robots.
-        seed
-            Of the random numbers.
-
-        Raises
-        ------
-        InputError
-            If an argument is wrong, or the robot has no uncertainty.
-        """
-        from ..statics.robust import share_of_robots
-
-        audit, scenario = self.audit, self.scenario
-        rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))
-        motion, carriers = (Motion(*(part[rows] for part in each)) for each in (audit.motion, audit.carriers))
-        w = scenario.required_wrench(audit.times[rows], motion, carriers, scenario.wind)
-        return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
 
     @cached_property
     def trajectory(self) -> xr.Dataset:

@@ -11,12 +11,14 @@ import numpy as np
 
 from ..base.display import Displayed, tensions_over_time
 from ..solvers import Certificate
+from ..statics.robust import RobotShare, share_of_robots
 from .audits.audit import Audit
 from .audits.infeasible_spans import infeasible_spans
 from .audits.phase_summary import PhaseSummary, summaries
 from .audits.planner_step import PlannerStep
 from .audits.waypoint_distance import WaypointDistance, waypoint_distance
 from .tasks.deviation import Deviation
+from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
 from .warnings.inside_bodies import into_places
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PlanData", "Relaxed"]
 
+DRAWN_AT = 200  # times at which drawn robots are checked
 MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twice as many
 
 
@@ -181,6 +184,30 @@ class PlanData(Displayed):
     def phases(self) -> tuple[PhaseSummary, ...]:
         """Return name, times, load, tensions and ground reaction of each phase; empty for a task without phases."""
         return summaries(self.scenario, self.audit)
+
+    def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
+        """Draw robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
+
+        Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
+        own wrench matrices, and the exact solver decides.
+
+        Parameters
+        ----------
+        count
+            How many robots.
+        seed
+            Of the random numbers.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the robot has no uncertainty.
+        """
+        audit, scenario = self.audit, self.scenario
+        rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))
+        motion, carriers = (Motion(*(part[rows] for part in each)) for each in (audit.motion, audit.carriers))
+        w = scenario.required_wrench(audit.times[rows], motion, carriers, scenario.wind)
+        return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""

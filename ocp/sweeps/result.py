@@ -24,8 +24,8 @@ from ...base.text import column, quantity
 from ...base.version import __version__
 from ...base.writing import check_writable, whole_file
 from ...models.parsing import to_yaml
-from ..planner import plan
 from ..plan import Plan
+from ..planner import plan
 from ..tasks.status import MotionStatus
 from .axis import check_figure
 from .cases import Cases
