@@ -28,7 +28,7 @@ __all__ = ["Certificate", "CertificateText", "certificate_along", "certify", "sh
 Indices = NDArray[np.intp]
 
 
-_EPSILON = float(np.finfo(np.float64).eps)
+_UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2  # of one operation
 _NONE = np.zeros(0, dtype=np.intp)
 _LEAST_PART = 0.05  # of a direction of length one: a smaller force or moment is left out of its description
 _VERTICAL = 0.99  # cosine from which on a force is called vertical
@@ -298,6 +298,6 @@ def _support(problem: TensionProblem, direction: Array) -> tuple[float, float, I
     if (np.abs(pull[~known]) > ORTHOGONAL * problem.column_norms[~known]).any():
         return np.inf, np.inf, _NONE, _NONE
     support = float(pull[known] @ limit[known])
-    rounding = (problem.n + problem.m + 2) * _EPSILON * float(terms[known] @ np.abs(limit[known]))
+    rounding = (problem.n + problem.m + 2) * _UNIT_ROUNDOFF * float(terms[known] @ np.abs(limit[known]))
     small = NEGLIGIBLE * problem.column_norms
     return support, rounding, np.flatnonzero(pull > small), np.flatnonzero(pull < -small)

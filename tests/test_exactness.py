@@ -78,7 +78,7 @@ def test_small_pulls_of_cables_without_a_limit_void_a_certificate():
 # to eight digits, whose noise was taken for limits, at a multiple of the least cost; a matrix of lower rank that the
 # lanes took for full; an optimum that the exact search ended short of; a certificate that was not found.
 ONCE_WRONG = {
-    "singular": (505187, 6674, 744035),
+    "singular": (505187, 6674, 744035, 468858),
     "infeasible": (996016,),
     "optimal": (125707, 168932, 189143, 194569, 374783, 408856, 471049, 549114, 627900, 761470, 637458, 843508),
 }
@@ -89,6 +89,13 @@ def test_what_rounding_once_decided(status, seed):
     report = check(range(seed, seed + 1))
     assert report.wrong == []
     assert {word.split(" to ")[0] for word in report.statuses} == {status}
+
+
+def test_the_core_sees_that_limits_exclude_each_other_where_their_normals_are_known_to_five_digits():
+    """What rounding left of a normal that the others span counted as a way out, so that the core was unsure."""
+    p = exact_problem(412526)
+    solution = solve(TensionProblem(p.A, p.w, p.t_min, p.t_max, p.t_ref, p.weights, p.length))
+    assert (solution.status, solution.backend) == ("infeasible", "c")
 
 
 def test_every_solver_is_right_and_says_the_same(steps):

@@ -20,6 +20,7 @@
 #include "internal.h"
 
 #define STEPS(columns) (10 * (columns) + 20)
+#define SPANNED 16 /* roundings of a normal that the active ones span, over the shortest of what each adds to these */
 
 typedef struct {
     int count;               /* active slabs */
@@ -84,7 +85,7 @@ static outcome enter(form *f, active_set *set, int p, real side) {
     const int k = f->k, width = f->width;
     real own = 0;
     for (;;) {
-        real r[CABLES], beyond = 0;
+        real r[CABLES], beyond = 0, least = 1;
         real *along = f->basis + set->count * width; /* what of n_p the active normals do not span, once rotated */
         f->inner++;
         for (int c = set->count + 1; c < k; c++) {
@@ -100,6 +101,7 @@ static outcome enter(form *f, active_set *set, int p, real side) {
                 total -= set->side[set->active[e]] * row[set->active[e]] * r[e];
             }
             r[j] = set->side[set->active[j]] * total / row[set->active[j]];
+            least = smaller(least, magnitude(row[set->active[j]]));
         }
         real length = (real)INFINITY;
         int leaving = -1;
@@ -109,7 +111,8 @@ static outcome enter(form *f, active_set *set, int p, real side) {
                 leaving = j;
             }
         }
-        const int independent = beyond > f->parallel * f->parallel;
+        const real rounding = larger(f->parallel, SPANNED * UNIT_ROUNDOFF / least);
+        const int independent = beyond > rounding * rounding;
         if (!independent && leaving < 0) {
             f->push[p] = -side;
             for (int j = 0; j < set->count; j++) {
