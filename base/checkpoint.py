@@ -152,7 +152,7 @@ def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool
 
 
 def begin(target: Path, content: bytes) -> bool:
-    """Create a new file, whole or not at all; return False if it exists by now, and leave it as it is."""
+    """Create a new file atomically; return False if it exists by now, and leave it as it is."""
     temporary = target.with_name(f".{uuid.uuid4().hex}")
     target.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -65,7 +65,7 @@ class Contents(NamedTuple):
 
 
 def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()) -> Path:
-    """Save contents as NetCDF 4, whole or not at all; `xarray.load_dataset` reads them.
+    """Save contents as NetCDF 4 atomically; `xarray.load_dataset` reads them.
 
     Equal contents are equal files. The variables named by `compressed` are compressed.
 

@@ -1,4 +1,4 @@
-"""Write files and folders whole or not at all."""
+"""Write files and folders atomically: complete or not at all."""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@
 
 Each robot flies at rest in gusts, with elastic cables and a controller every millisecond. Three tables: how long the
 steps of each controller take, whole steps from state to command; how long each solver takes for the programs that
-predictive control had in such a flight, in turns of a few programs; and how far each controller lets the platform go.
+predictive control had in such a flight, alternating every few programs; and how far each controller lets the platform
+go.
 """
 
 from __future__ import annotations
@@ -181,7 +182,7 @@ def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
 
 
 def _programs(task: Task, robot: Robot, steps: int) -> list[Row]:
-    """Solve the programs of one flight with each solver, in turns."""
+    """Solve the programs of one flight with all solvers, alternating."""
     try:
         programs = record(task, robot, steps)
     except InputError:

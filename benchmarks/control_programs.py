@@ -1,4 +1,4 @@
-"""Measure solvers at the programs of a predictive controller: in turns, beside the best solution that is known."""
+"""Measure solvers at the programs of a predictive controller, alternating, against the best solution that is known."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Row:
 
 
 def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:
-    """Measure contenders at the programs of one flight, in turns of a few; `TOWLINE` and `REFERENCE` among them."""
+    """Measure contenders at the programs of one flight, alternating every few; `TOWLINE` and `REFERENCE` among them."""
     times = {each.name: np.full(len(programs), np.nan) for each in contenders}
     errors, residuals = ({each.name: np.full(len(programs), np.nan) for each in contenders} for _ in range(2))
     solvers = {each.name: each.prepare(programs[0]) for each in contenders}

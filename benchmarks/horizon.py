@@ -2,9 +2,9 @@
 
     python -m towline.benchmarks.horizon [--steps 40] [--turns 3] [--check COUNT]
 
-Each task is a closed loop of `--steps` problems, which every contender solves one after the other, in turns; the loop's
-states are those of exact solutions. A ratio is to condensing and `daqp.solve`, condensing included, in the same turn.
-`--check` solves random problems instead, and prints how many converged, by kind; the exit code is 1 if a bound is
+Each task is a closed loop of `--steps` problems, which every contender solves one after the other, alternating; the
+loop's states are those of exact solutions. A ratio is to condensing and `daqp.solve`, condensing included, in the same
+turn. `--check` solves random problems instead, and prints how many converged, by kind; the exit code is 1 if a bound is
 broken, or if less than 99.9 % of those that are not unstable converged.
 """
 

@@ -38,7 +38,7 @@ def calibrate(
         typer.Option(
             metavar="NAME=SIGMA,...",
             help="Standard deviations about the file's values [m], of scales [1], of the clock [s], as "
-            "'anchors=0.02,offsets=0.05'; default: what the log leaves open changes least.",
+            "'anchors=0.02,offsets=0.05'; default: what the log does not determine changes least.",
         ),
     ] = None,
     sigma: Annotated[

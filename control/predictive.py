@@ -39,7 +39,7 @@ __all__ = ["Predictive"]
 
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
-NEARLY = 0.1  # residuals of an iterate that the next step goes on from, though it is not used
+NEARLY = 0.1  # residuals of an iterate with which the next step begins, though it is not used
 GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
 USUAL_REACH = 0.06  # of the cables' mean length
 LEAST_REACH = 0.02  # the same for cables of fixed length: with less, errors of the load are not corrected

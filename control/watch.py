@@ -56,7 +56,7 @@ class Watch:
     ripple
         Tensions that are commanded for unit rates of the pose, over the room that tensions have inside their limits,
         (m, 6) [s/m, s/rad]. Noise of the rates makes commands that limits cut off, on one side more than on the other,
-        and `OFTEN` standard deviations that have no room are a reason to hand over. None: whatever the noise.
+        and `OFTEN` standard deviations that have no room are a reason to hand over. Default: no noise is.
     """
 
     def __init__(self, scale: np.ndarray, usual: float, ripple: np.ndarray | None = None):

@@ -41,7 +41,7 @@ def to_yaml(model: BaseModel) -> str:
 
 
 def save_yaml(model: BaseModel, file: str | os.PathLike[str], argument: str = "file") -> Path:
-    """Save the YAML text of a model, whole or not at all, and return the path; errors name the `argument`.
+    """Save the YAML text of a model atomically, and return the path; errors name the `argument`.
 
     Raises
     ------

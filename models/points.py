@@ -14,7 +14,7 @@ __all__ = ["anchors", "angles", "attachments", "default_home", "in_frame", "plac
 
 
 class WithPoints(Protocol):
-    """What is read of a robot: its anchors in the carriers' frames, its attachments in that of the platform."""
+    """Robots as far as points need them: anchors in the carriers' frames, attachments in that of the platform."""
 
     @property
     def carrier_of_cable(self) -> np.ndarray: ...  # (m,)

@@ -157,7 +157,7 @@ class Robot(DisplayedRobot):
         return tuple(exact.with_parameters(dict(zip(names, row.tolist(), strict=True))) for row in numbers)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the robot as a robot file, whole or not at all; `load` reads an equal robot from it.
+        """Save the robot as a robot file atomically; `load` reads an equal robot from it.
 
         Raises
         ------

@@ -47,7 +47,7 @@ class Plan(PlanData, Filmed):
         return trajectory(self).dataset()
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the trajectory as NetCDF, whole or not at all; `xarray.load_dataset` reads it.
+        """Save the trajectory as NetCDF atomically; `xarray.load_dataset` reads it.
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Plan(PlanData, Filmed):
         return as_text(self)
 
     def save_report(self, file: str | os.PathLike[str]) -> Path:
-        """Write the report as one HTML file with its figures inside, whole or not at all.
+        """Write the report as one HTML file with its figures inside, atomically.
 
         The file loads nothing from anywhere, so that it can be mailed and kept. This is a method of its own, not an
         argument of `report`: what returns text writes no files.

@@ -145,7 +145,7 @@ class Planner(Displayed):
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
-        self._flown: Plan | Replanner | None = None  # what `replan` goes on from
+        self._flown: Plan | Replanner | None = None  # what `replan` continues from
 
     @property
     def interrupted(self) -> Plan | None:
@@ -218,7 +218,7 @@ class Planner(Displayed):
         Returns
         -------
         Plan
-            As of `plan`. One that is not feasible does not count: the next call goes on from the plan before.
+            As of `plan`. One that is not feasible does not count: the next call continues from the plan before.
 
         Raises
         ------

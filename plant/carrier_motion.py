@@ -86,7 +86,7 @@ def _leads_on(row, reference, after, period):
 def _go_on(row, reference, command, polynomial, state, at, period):
     """Write by how much a carrier is away from its reference, and how much faster, for each coordinate of a polynomial.
 
-    Return whether it goes on from where it is: False if it is on its reference, or jumps there.
+    Return whether it continues from where it is: False if it is on its reference, or jumps there.
     """
     w, x, y, z = (
         state[at + QUATERNION],

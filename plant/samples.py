@@ -1,4 +1,4 @@
-"""Motion of carriers that commands leave open: from the poses that a sequence of commands has."""
+"""Motion of carriers that commands leave free: from the poses that a sequence of commands has."""
 
 from __future__ import annotations
 

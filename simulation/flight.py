@@ -138,7 +138,7 @@ class Flight(FlightData, Filmed):
         return Contents(variables, coordinates, attributes)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the flight as NetCDF, whole or not at all; the same seed gives the same bytes.
+        """Save the flight as NetCDF atomically; the same seed gives the same bytes.
 
         Raises
         ------

@@ -27,7 +27,7 @@ TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_
 
 @dataclass(frozen=True, eq=False)
 class FlightData(Displayed):
-    """What a robot did along a reference, without figures, files and reports.
+    """Numbers of what a robot did along a reference, without figures, files and reports.
 
     Attributes
     ----------

@@ -147,7 +147,7 @@ def report(dataset: xr.Dataset) -> str:
 
 
 def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save the numbers of many flights as NetCDF, whole or not at all; the same seeds give the same bytes.
+    """Save the numbers of many flights as NetCDF atomically; the same seeds give the same bytes.
 
     Raises
     ------

@@ -45,7 +45,7 @@ class Mesh(Displayed):
         return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6.0)
 
     def save(self, path: str | Path) -> Path:
-        """Save as binary STL in metres, whole or not at all; raise InputError if it cannot be written."""
+        """Save as binary STL in metres atomically; raise InputError if it cannot be written."""
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         sizes = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -51,7 +51,7 @@ def dataset(counts: Counts, domain: Domain, keep: str, method: str, refinement: 
 
 
 def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save a result of `sample`, whole or not at all: as NetCDF, or as a Zarr folder if the path ends in .zarr.
+    """Save a result of `sample` atomically: as NetCDF, or as a Zarr folder if the path ends in .zarr.
 
     `xarray.load_dataset` reads the one, `xarray.open_zarr` the other (extra `cluster`). Attributes of the run, such as
     the seconds it took, are left out: equal results are equal NetCDF files.

@@ -3,7 +3,7 @@
 Compiled code is kept in the user's cache, so that the next process loads it in a fraction of the time: under
 `$TOWLINE_CACHE`, else `$XDG_CACHE_HOME/towline`, else `~/.cache/towline`, a folder for each kernel, named by a hash of
 everything that decides on the machine code. Where nothing can be written, kernels are compiled without it. Files are
-written whole or not at all, and a seal, the hash of them, reveals later damage: Numba would run it as it is.
+written atomically, and a seal, the hash of them, reveals later damage: Numba would run it as it is.
 """
 
 from __future__ import annotations

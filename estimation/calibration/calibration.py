@@ -29,7 +29,7 @@ class Calibration(CalibrationData, Drawn):
         return facts(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save the robot as a robot file (YAML), whole or not at all, and return the path.
+        """Save the robot as a robot file (YAML) atomically, and return the path.
 
         A result that should not be used (`refused`) is not saved; `robot.save` saves it all the same.
 

@@ -140,7 +140,7 @@ class Measurements(Displayed):
         return Measurements(self.lengths, self.poses, None, self.tensions, self.times, sigma)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save as NetCDF, whole or not at all, and return the path; `read_measurements` reads the file.
+        """Save as NetCDF atomically, and return the path; `read_measurements` reads the file.
 
         Parameters
         ----------

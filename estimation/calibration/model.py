@@ -6,8 +6,8 @@ With the reading y of a cable, its length l at the pose, offset o, scale s and t
     e = (s0 / s (f l - o) - s0 y) / sigma            if any pose is unknown
 
 The second is in the units of the reading: the first would shrink with the robot, and a robot without size would fit
-best. With poses that are known the first is a linear regression, which readings that hardly change leave open. f is 1
-unless tensions were measured: 1 / (1 + t / (E A)), since readings are of the cable without strain.
+best. With poses that are known the first is a linear regression, which readings that hardly change do not determine. f
+is 1 unless tensions were measured: 1 / (1 + t / (E A)), since readings are of the cable without strain.
 
 The pose of sample k is that measured at t_k + clock, or one to start from, changed by a shift and a small turn in {G},
 which vary where the pose was measured with an error, and where it was not measured.

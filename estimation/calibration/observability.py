@@ -1,4 +1,4 @@
-"""`Observability`: what the measurements determine of the parameters, and by name what they leave open.
+"""`Observability`: what the measurements determine of the parameters, and by name what they do not.
 
 A direction of the parameters is open where poses can move along without any length changing (a gauge, as that of {G}
 itself if no pose was measured), or where the measured poses differ too little. Gauges are known by their generators:

@@ -21,7 +21,7 @@ HELPS = 1.05  # by which errors left out must be larger before a smaller set is 
 
 
 def report(result: CalibrationData) -> str:
-    """Return the result for people: how well lengths fit, the parameters, and what the measurements leave open."""
+    """Return the result for people: how well lengths fit, the parameters, and what is not determined."""
     lines = [
         headline(result),
         f"  residual of the lengths {_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)",

@@ -142,8 +142,8 @@ class CalibrationData(Displayed):
     def covariance(self) -> np.ndarray:
         """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
 
-        Directions that the measurements leave open have none. It is multiplied where residuals are larger than stated,
-        or alike in neighbouring samples (`noise`, `alike`).
+        Directions that the measurements do not determine have none. It is multiplied where residuals are larger than
+        stated, or alike in neighbouring samples (`noise`, `alike`).
         """
         return covariance_of(self._solved) * self._inflation
 
@@ -186,7 +186,7 @@ class CalibrationData(Displayed):
 
     @property
     def not_identifiable(self) -> tuple[str, ...]:
-        """Return what the measurements leave open, one text for each direction of the parameters."""
+        """Return what the measurements do not determine, one text for each direction of the parameters."""
         return self._solved.observability.open
 
     @cached_property

@@ -43,7 +43,7 @@ def calibrate(
         measurements left out nearly as well as any (`select`), none if that is the file.
     prior
         Standard deviations about the file's values by the names of `free`, [m], of scales [1], of the clock [s], such
-        as {"anchors": 0.02}. Default: none; what the measurements leave open changes as little as possible.
+        as {"anchors": 0.02}. Default: none; what the measurements do not determine changes as little as possible.
     outliers
         Whether to look for wrong readings, which are left out, and for slipped winches, whose cable gets another offset
         from there on.

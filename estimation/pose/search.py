@@ -1,10 +1,10 @@
 """Poses from lengths without a start: descents from several attitudes until one fits.
 
 A level platform with the given lengths is often near the true one, and home often is, so these come first; those that
-do not fit exactly go on from the level platform turned by 45 and 90 degrees about one axis. Of several poses that fit
-the likeliest is taken, if angles from home are spread by 30 degrees. With as many cables as coordinates many poses
-fit, so that six cables go on from turns about oblique axes; a pose in which the cables can hold the weight comes before
-those in which they cannot, which make it ambiguous all the same, since CoM and load are not exact.
+do not fit exactly continue from the level platform turned by 45 and 90 degrees about one axis. Of several poses that
+fit the likeliest is taken, if angles from home are spread by 30 degrees. With as many cables as coordinates many poses
+fit, so that six cables continue from turns about oblique axes; a pose in which the cables can hold the weight comes
+before those in which they cannot, which make it ambiguous all the same, since CoM and load are not exact.
 """
 
 from __future__ import annotations

@@ -171,7 +171,7 @@ def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:
     deviation_scale = objective.deviation or _tenth_of_tube(scenario)
     cost = ca.sumsqr(robot.force_scale * x[layout.tensions] / tension_scale)
     if layout.winds:
-        # Enough to choose among those that spare cables leave open.
+        # Enough to choose among those that spare cables leave free.
         cost += WIND_COST / layout.winds * ca.sumsqr(robot.force_scale * x[layout.wind_tensions] / tension_scale)
     cost += SUPPORT_COST * ca.sumsqr(x[layout.supports])
     q, a = x[layout.q], x[layout.a]

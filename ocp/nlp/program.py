@@ -1,7 +1,7 @@
 """Build the nonlinear program of a scenario: inverse dynamics at the points of a scheme, integrated between them.
 
 Unknown at each point k are the free coordinates q_k, their rates v_k and accelerations a_k, and the tensions t_k; the
-duration T too where the task leaves it open:
+duration T too where the task leaves it free:
 
     min   mean over time of sum |quantity / what costs one|^2  (+ T / time - margin)   (`task.Objective`)
     s.t.  A(q_k) t_k + S n_k = w(q_k, v_k, a_k)                         at every point that the scheme selects

@@ -199,7 +199,7 @@ class Search:
         """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""
         start, self.mesh = time.perf_counter(), mesh
         known = self._solvers.get(mesh)
-        again = known is not None and guess is None and known.has_solution  # goes on from there, with its own rows
+        again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
         if known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
             self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
         solver = self._solvers[mesh]

@@ -78,7 +78,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
 
 
 def _timed(robot: Robot, task: Task) -> Task:
-    """Choose the timing of a line that leaves it open: smoother where balance then determines the motion of a team."""
+    """Choose the timing of a line that leaves it free: smoother where balance then determines the motion of a team."""
     path = task.path
     if not isinstance(path, LinePath) or path.timing is not None:
         return task

@@ -61,7 +61,7 @@ class Scenario(Displayed):
     carrier_free: list[tuple[int, int]]
     limits: Limits
     carrier_paths: dict[int, AnyPath] = field(repr=False)
-    duration: float  # [s]; of a task that leaves it open: where the planner starts, then what it chose
+    duration: float  # [s]; of a task that leaves it free: where the planner starts, then what it chose
     phases: Phases = field(default_factory=Phases, repr=False)
     tightened: np.ndarray | None = None
 

@@ -38,7 +38,7 @@ class Tube(Part):
     ends: Literal["free", "rest", "exact"] | None = Field(
         default=None,
         description="free: anywhere in the tube; rest: position on the path at start and end, without speed and "
-        "acceleration (with few cables or fixed lengths angular acceleration is left open); exact: no deviation of "
+        "acceleration (with few cables or fixed lengths angular acceleration is free); exact: no deviation of "
         "position and speed there, whatever the acceleration; default: rest if a path of another kind than rest goes "
         "from rest to rest and no carrier moves as given, else free",
     )
@@ -93,7 +93,7 @@ class FreeBase(Part):
     ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
         default=None,
         description="free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
-        "cables or fixed lengths it is left open); periodic: the end equals the start; exact: start and end as in "
+        "cables or fixed lengths it is free); periodic: the end equals the start; exact: start and end as in "
         "`around`; default: rest if `tube.ends` is rest, given or by default, else free",
     )
 

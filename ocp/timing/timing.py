@@ -208,7 +208,7 @@ class Timing(Displayed):
         }
 
     def save_task(self, file: str | os.PathLike[str], name: str = "timed") -> Path:
-        """Save `task`, with this `name`, as a task file (YAML), whole or not at all: `towline plan` and `plan` read it.
+        """Save `task`, with this `name`, as a task file (YAML) atomically: `towline plan` and `plan` read it.
 
         Raises
         ------

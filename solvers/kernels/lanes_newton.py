@@ -45,7 +45,8 @@ def newton_size(n, m):
 def newton_in_lanes(soft, steps, again, n, m, W, V):
     """Take `steps` steps at the prepared problems.
 
-    `soft` is 1/rho. The multipliers are in the first n rows of V: with `again` those to go on from, then those reached.
+    `soft` is 1/rho. The multipliers are in the first n rows of V: with `again` those to continue from, then those
+    reached.
     """
     y, step, r, pull, change, free, _ = _rows(n, m)
     size = splat(0.0)

@@ -31,7 +31,7 @@ class Verdict(StrEnum):
     """The computed result is another, or the paper contradicts itself."""
 
     IMPOSSIBLE = "impossible"
-    """No choice of what the paper leaves open gives the printed result."""
+    """No choice of what the paper does not state gives the printed result."""
 
     NOT_DETERMINED = "not determined"
     """The paper does not print what is needed to decide."""
@@ -146,7 +146,7 @@ def undetermined(
     unit: str = "",
     figure: str | None = None,
 ) -> Claim:
-    """Return a claim that the paper leaves open; `missing` states what it does not print and what was assumed."""
+    """Return a claim that the paper does not decide; `missing` states what it does not print and what was assumed."""
     return Claim(id, place, statement, printed, computed, Verdict.NOT_DETERMINED, missing, unit, figure)
 
 

@@ -16,7 +16,7 @@ __all__ = ["write"]
 def write(account: Account, folder: Path, form: str = "png") -> list[Path]:
     """Write report (Markdown and HTML), errata, claims (JSON) and figures into `folder`; return their paths.
 
-    Each file is written whole or not at all.
+    Each file is written atomically.
 
     Raises
     ------
