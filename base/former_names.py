@@ -26,10 +26,10 @@ NOW = {
     "robust": "statics.robust",
 }
 MOVED = {  # names that packages are still asked for
-    ("models", "PoseEstimate"): "estimation.pose",
-    ("models", "PoseTracker"): "estimation.pose",
-    ("models", "branches"): "estimation.pose",
-    ("models", "pose_from_lengths"): "estimation.pose",
+    ("models", "PoseEstimate"): "estimation",
+    ("models", "PoseTracker"): "estimation",
+    ("models", "branches"): "estimation",
+    ("models", "pose_from_lengths"): "estimation",
 }
 SHORT = {"calibration", "errors"}  # these two remain, as short names
 
