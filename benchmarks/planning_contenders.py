@@ -1,15 +1,15 @@
 """Paper F's circle with the base free, as each contender of `benchmarks.planning` writes it.
 
 All have the same task: the platform on the circle and level, every tension inside its limits, the base's acceleration
-at most 3 m/s^2, the last state and the base's last acceleration equal to the first, and the same costs; a base
-acceleration that is constant in each interval has no jerk to pay for. All use IPOPT with
-the same tolerances, scaled unknowns and exact Hessians; they start from a guess on the path, and again from their own
-solution and its multipliers. What only the second solve needs is made before its time is taken.
+at most 3 m/s^2 and linear in each interval, the last state and the base's last acceleration equal to the first, and the
+same costs. All use IPOPT with the same tolerances, scaled unknowns and exact Hessians; they start from a guess on the
+path, and again from their own solution and its multipliers. What only the second solve needs is made before its time is
+taken.
 
 - towline: `Planner`, which makes its own guess.
 - CasADi, direct and mapped: the same inverse dynamics written out in CasADi, for this robot and this task alone.
 - Opti and rockit: as their manuals do it, multiple shooting with RK4 of the platform's forward dynamics, tensions and
-  base acceleration constant in each interval. The step is an SX function: to expand the whole program makes an
+  base jerk constant in each interval. The step is an SX function: to expand the whole program makes an
   iteration a tenth faster and the first solve four times slower.
 """
 
@@ -28,7 +28,6 @@ from ..ocp import Planner, Task
 from ..ocp.audits.audit import Audit, audit
 from ..ocp.tasks.deviation import Deviation
 from ..ocp.tasks.lay_out import lay_out
-from ..ocp.tasks.scheme import SCHEMES
 from ..studies.flying.circle import HOVER, tasks
 
 __all__ = ["CONTENDERS", "Run", "circle"]
@@ -175,8 +174,8 @@ def _node(robot: Robot) -> ca.Function:
 class _Shooting:
     """Hold what both peers need: a step of the dynamics, the path, costs and a guess.
 
-    x = (position, angles, velocity and body rates of the platform, position and velocity of the base), u = (tensions
-    over the weight, acceleration of the base).
+    x = (position, angles, velocity and body rates of the platform, position, velocity and acceleration of the base),
+    u = (tensions over the weight, jerk of the base).
     """
 
     def __init__(self, robot: Robot, steps: int) -> None:
@@ -188,38 +187,28 @@ class _Shooting:
         self.step = _step(robot, self.seconds / steps)
 
     def guess(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return states (18, N + 1) and controls (9, N): on the path, the base above it, the weight shared out."""
+        """Return states (21, N + 1) and controls (9, N): on the path, the base above it, the weight shared out."""
         base = self.path.pose[:, :3] - self.path.pose[:, :3].mean(axis=0) + HOVER[:3]
-        states = np.hstack([self.path.pose, self.path.velocity, base, self.path.velocity[:, :3]]).T
-        tensions = np.full((self.steps, 6), 1 / 6)
-        return states, np.hstack([tensions, self.path.acceleration[:-1, :3]]).T
+        acceleration = self.path.acceleration[:, :3]
+        states = np.hstack([self.path.pose, self.path.velocity, base, self.path.velocity[:, :3], acceleration]).T
+        jerk = np.diff(acceleration, axis=0) * self.steps / self.seconds
+        return states, np.hstack([np.full((self.steps, 6), 1 / 6), jerk]).T
 
     def cost(self, u: Any, x: Any) -> Any:
-        """Return the running cost: that of the others without the jerk, which a constant acceleration does not have."""
-        return ca.sumsqr(u) + ca.sumsqr(x[12:15] - ca.DM(HOVER[:3])) / OFFSET**2
+        """Return the running cost."""
+        moved = ca.sumsqr(x[18:]) + ca.sumsqr(x[12:15] - ca.DM(HOVER[:3])) / OFFSET**2
+        return ca.sumsqr(u[:6]) + ca.sumsqr(u[6:]) / JERK**2 + moved
 
     def audited(self, x: ca.DM, u: ca.DM) -> Audit:
-        """Audit the base's motion of a solution: x (18, N + 1), u (9, N)."""
-        states, a = x.full()[12:18].T, u.full()[6:9].T
-        h = self.seconds / self.steps
-        nodes = np.linspace(0.0, self.seconds, 2 * self.steps + 1)
-        q, v, accelerations = (np.zeros((len(nodes), 3)) for _ in range(3))
-        # The scheme has its accelerations in the middle of each interval.
-        q[::2], v[::2] = states[:, :3] - HOVER[:3], states[:, 3:]
-        q[1::2] = q[:-1:2] + h / 2 * v[:-1:2] + h**2 / 8 * a
-        v[1::2] = v[:-1:2] + h / 2 * a
-        accelerations[1::2] = a
-        accelerations[:-1:2], accelerations[-1] = a, a[-1]
-        tensions = self.robot.force_scale * np.repeat(u.full()[:6].T, 2, axis=0)
-        tensions = np.vstack([tensions, tensions[-1]])
-        task = self.task.model_copy(update={"scheme": "constant"})
-        deviation = Deviation(nodes, q, v, accelerations, tensions, SCHEMES["constant"])
-        return audit(lay_out(self.robot, task), deviation)
+        """Audit the base's motion of a solution: x (21, N + 1), u (9, N)."""
+        q, v, a = np.hsplit(x.full()[12:].T, 3)
+        tensions = self.robot.force_scale * np.vstack([u.full()[:6].T, u.full()[:6, -1]])
+        return audit(lay_out(self.robot, self.task), Deviation(self.nodes, q - HOVER[:3], v, a, tensions))
 
 
 def _step(robot: Robot, h: float) -> ca.Function:
     """Return (x, u) -> x after h [s], by RK4 of Newton's and Euler's equations for a CoM in the platform's origin."""
-    x, u = ca.SX.sym("x", 18), ca.SX.sym("u", 9)
+    x, u = ca.SX.sym("x", 21), ca.SX.sym("u", 9)
     R, rates, inertia = rotation(x[3:6]), x[9:12], ca.DM(robot.inertia)
     force, moment = robot.platform.mass * ca.DM(robot.gravity), ca.SX.zeros(3)
     for i in range(robot.m):
@@ -230,7 +219,7 @@ def _step(robot: Robot, h: float) -> ca.Function:
         moment += ca.cross(arm, pull)
     turning = ca.inv(inertia) @ (R.T @ moment - ca.cross(rates, inertia @ rates))
     moving = [x[6:9], inverse_rate_matrix(x[3:6]) @ rates, force / robot.platform.mass, turning]
-    f = ca.Function("f", [x, u], [ca.vertcat(*moving, x[15:18], u[6:9])])
+    f = ca.Function("f", [x, u], [ca.vertcat(*moving, x[15:], u[6:])])
     k1 = f(x, u)
     k2 = f(x + h / 2 * k1, u)
     k3 = f(x + h / 2 * k2, u)
@@ -243,16 +232,15 @@ def opti(steps: int) -> Run:
 
     def write(problem: _Shooting, ipopt: dict[str, Any]) -> ca.Function:
         nlp = ca.Opti()
-        X, U = nlp.variable(18, steps + 1), nlp.variable(9, steps)
+        X, U = nlp.variable(21, steps + 1), nlp.variable(9, steps)
         cost = 0.0
         for k in range(steps):
             nlp.subject_to(X[:, k + 1] == problem.step(X[:, k], U[:, k]))
             nlp.subject_to(nlp.bounded(problem.low, U[:6, k], problem.high))
-            nlp.subject_to(ca.sumsqr(U[6:9, k]) / MOST**2 <= 1)
+            nlp.subject_to(ca.sumsqr(X[18:, k]) / MOST**2 <= 1)
             nlp.subject_to(X[:6, k + 1] == problem.path.pose[k + 1])
             cost += problem.cost(U[:, k], X[:, k]) / steps
         nlp.subject_to(X[:, 0] == X[:, -1])
-        nlp.subject_to(U[6:9, 0] == U[6:9, -1])
         nlp.minimize(cost)
         nlp.solver("ipopt", _options(ipopt))
         return nlp.to_function("opti", [X, U, nlp.lam_g], [X, U, nlp.lam_g])
@@ -267,15 +255,14 @@ def rockit(steps: int) -> Run:
     def write(problem: _Shooting, ipopt: dict[str, Any]) -> Solve:
         make: Any = Ocp  # by its types T is a whole number and a state may be None
         ocp = make(T=problem.seconds)
-        x, u = ocp.state(18), ocp.control(9)
+        x, u = ocp.state(21), ocp.control(9)
         place = ocp.parameter(6, grid="control+")
         ocp.set_value(place, problem.path.pose.T)
         ocp.set_next(x, problem.step(x, u))
         ocp.subject_to(problem.low <= (u[:6] <= problem.high))
-        ocp.subject_to(ca.sumsqr(u[6:9]) / MOST**2 <= 1)
+        ocp.subject_to(ca.sumsqr(x[18:]) / MOST**2 <= 1)
         ocp.subject_to(x[:6] == place, include_first=False)
         ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
-        ocp.subject_to(ocp.at_t0(u[6:9]) == ocp.at_tf(u[6:9]))
         ocp.add_objective(ocp.sum(problem.cost(u, x)) / steps)
         ocp.solver("ipopt", _options(ipopt))
         ocp.method(MultipleShooting(N=steps))

@@ -134,7 +134,7 @@ def test_a_program_with_more_equations_than_unknowns_is_an_answer_without_a_warn
     """Quadrotors that hold their places give no force across their thrust: few motions do without, or none."""
     path = {"kind": "line", "start": [0, 0, 0], "end": [0.03, -0.04, 0.02]}
     tube = {"position": 0.05, "attitude": 0.1}
-    held = plan("flycrane", {"path": path, "duration": 1, "steps": 4, "scheme": "gauss", "tube": tube})
+    held = plan("flycrane", {"path": path, "duration": 1, "steps": 4, "tube": tube})
     assert held.status is MotionStatus.NOT_FOUND
     assert capfd.readouterr() == ("", "")
 

@@ -33,7 +33,6 @@ TASKS = {
     ),
     "margin": ("ipanema-1", {"path": LINE, "duration": 3, "tube": {"position": 0.1}, "objective": {"margin": 5.0}}),
     "team": ("multi-quadrotor-3", TEAM),
-    "gauss": ("ipanema-1", {"path": LINE, "duration": 3, "tube": {"position": 0.1}, "scheme": "gauss"}),
 }
 
 

@@ -13,7 +13,7 @@ import time
 from towline import load, plan
 
 line = {"kind": "line", "start": [0.0, 0, 1], "end": [0.3, 0, 1]}
-plan("ipanema-1", {"path": line, "duration": 3, "steps": 20, "tube": {"position": "free"}, "solver": "fatrop"})
+plan("ipanema-1", {"path": line, "duration": 3, "steps": 20, "tube": {"position": "free"}})
 home = load("multi-quadrotor-3").home.tolist()
 path = {"kind": "line", "start": home, "end": [2.0, *home[1:]]}
 task = {"path": path, "duration": 4, "tube": {"position": "free"}, "base": {"kind": "free"}, "steps": 100}

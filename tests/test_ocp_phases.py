@@ -293,8 +293,6 @@ def test_a_load_that_changes_in_the_air_makes_tensions_jump():
     jump = np.abs(planned.audit.tensions[row] - planned.audit.tensions[row - 1]).max()
     assert jump > 50
     assert f"by up to {jump:.1f} N at t = 2.000 s" in planned.report()
-    free = plan(COGIRO, {"phases": IN_THE_AIR, "tube": {"position": 0.05}, "scheme": "gauss", "steps": 12})
-    assert free.feasible
 
 
 def changed(**fields):
@@ -326,12 +324,10 @@ def phase(index, **fields):
         (changed(duration=5), "duration must be left out with phases"),
         (changed(path={"kind": "rest", "pose": LOW}), "path must be left out with phases"),
         (changed(steps=20), "steps must be at least 4 for each phase, 24, got 20"),
-        (changed(solver="fatrop"), "solver must be ipopt with phases, got fatrop"),
         (
             changed(tube={"position": 0.1}, scheme="spline"),
-            "scheme must be one of constant, linear, hermite, gauss with phases, got",
+            "scheme must be one of linear, hermite with phases, got",
         ),
-        (changed(tube={"position": 0.1}, scheme="gauss"), "scheme must be one of linear, hermite with a phase on the"),
         (changed(tube={"position": 0.1, "waypoints": "exact"}), "tube.waypoints must be free with phases"),
         ({"phases": TAKE_OFF, "objective": {"margin": 5}}, "phases.ground.slack must be false with a margin to choose"),
         ({"phases": TAKE_OFF, "initial": {"pose": [0, 0, 1, 0, 0, 0]}}, "initial must be left out if the first phase"),
@@ -339,7 +335,7 @@ def phase(index, **fields):
             {"phases": IN_THE_AIR, "limits": {"tension_rate": 500}},
             "limits.tension_rate must be left out since the",
         ),
-        ({"phases": IN_THE_AIR, "tube": {"position": 0.1}}, "scheme must be one of constant, gauss since the load"),
+        ({"phases": IN_THE_AIR, "tube": {"position": 0.1}}, "tube and base must fix the motion since the load"),
         ({}, "path is missing"),
     ],
 )

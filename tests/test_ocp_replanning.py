@@ -221,10 +221,6 @@ def test_what_does_not_fit_is_one_line(change, message):
         ({"final": {"velocity": [0] * 6}}, "final.velocity must be left out without final.pose"),
         ({"final": {"pose": [1, 0, 1, 0, 0, 0]}}, "final must have the x of the platform"),
         ({"final": {"carrier_pose": [[0] * 6] * 2}}, "final.carrier_pose must have a row"),
-        (
-            {"initial": {"pose": [0, 0, 1, 0, 0, 0], "tensions": [1] * 8}, "scheme": "gauss"},
-            "initial.tensions must be left",
-        ),
     ],
 )
 def test_tasks_whose_ends_do_not_fit_are_refused(change, message):

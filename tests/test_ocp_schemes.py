@@ -36,11 +36,6 @@ def drawn(scheme, seed=3, steps=4):
     h = starts[1]
     a = rng.normal(size=(len(nodes), 2))
     jerk = rng.normal(size=(len(nodes), 2)) if scheme.smooth else None
-    if not scheme.continuous:
-        # The acceleration at a node is that of the interval to come.
-        for k in range(steps):
-            inner = a[k * scheme.size + 1 : (k + 1) * scheme.size]
-            a[k * scheme.size] = fitted(scheme, scheme.inner, inner, 0)
 
     def acceleration(time):
         k = min(int(time / h), steps - 1)
@@ -50,8 +45,7 @@ def drawn(scheme, seed=3, steps=4):
             hermite = np.array([1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3])
             slopes = h * np.array([s - 2 * s**2 + s**3, s**3 - s**2])
             return hermite @ at + slopes @ jerk[k : k + 2]
-        places, at = ([0, *scheme.inner, 1], at) if scheme.continuous else (scheme.inner, at[1:-1])
-        return fitted(scheme, places, at, s)
+        return fitted(scheme, [0, *scheme.inner, 1], at, s)
 
     def integral(first, time):
         breaks = starts[(starts > 0) & (starts < time)]
@@ -106,14 +100,14 @@ def test_mean_squares_are_quadratures(name):
     assert weights.sum() == pytest.approx(1)
 
 
-def test_a_spline_is_smooth_and_a_constant_is_constant():
-    """What each name promises, seen in plans: continuity of acceleration, jerk and snap, or jumps."""
-    for name, continuous, smooth in (("constant", False, False), ("linear", True, False), ("spline", True, True)):
+def test_accelerations_are_continuous_and_a_spline_is_smooth():
+    """What each name promises, seen in plans: continuity of the acceleration, and of its derivative."""
+    for name, smooth in (("linear", False), ("hermite", False), ("spline", True)):
         deviation = plan(load("ipanema-1"), {**CRANE, "scheme": name, "steps": 20}).deviation
         nodes = deviation.nodes[:: SCHEMES[name].size][1:-1]
         after, before = deviation.evaluate(nodes), deviation.evaluate(nodes - 1e-9)
-        assert (np.abs(after[2] - before[2]).max() < 1e-6) == continuous
-        assert (np.abs(after[3] - before[3]).max() < 1e-4) == (smooth or name == "constant")
+        assert np.abs(after[2] - before[2]).max() < 1e-6
+        assert (np.abs(after[3] - before[3]).max() < 1e-4) == smooth
 
 
 CRANE = {
@@ -156,9 +150,9 @@ def test_least_square_acceleration_is_the_cubic(name):
         errors.append(float(np.trapezoid(tensions**2, times) / duration - least))
     rate = np.log2(errors[0] / errors[-1]) / 2
     assert min(errors) >= -1e-6
-    assert errors[0] < {"constant": 4e-3, "linear": 1e-3, "spline": 3e-4}.get(name, 1e-4)
-    assert rate > {"hermite": 4, "gauss": 1}.get(name, 1.8)
-    assert errors[-1] < {"constant": 2e-4}.get(name, 1e-5)
+    assert errors[0] < {"linear": 1e-3, "spline": 3e-4}.get(name, 1e-4)
+    assert rate > {"hermite": 4}.get(name, 1.8)
+    assert errors[-1] < 1e-5
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -182,17 +176,17 @@ def test_more_balances_miss_less_between_them():
     """Paper C's three cables cannot follow any motion exactly: what is missing falls with the scheme's order."""
     robot = towing_plans.robot("wang-ctmrts", "variable-length")
     missing = {}
-    for name in ("constant", "linear", "hermite"):
+    for name in ("linear", "hermite"):
         for steps in (20, 40):
             task = towing_plans.task(robot, "effort").model_copy(update={"scheme": name})
             scenario = lay_out(robot, task)
             outcome = Solver(build(scenario, Mesh(steps))).solve(None)
             assert outcome.success
             missing[name, steps] = audit(scenario, outcome.deviation).violation.max()
-    orders = {name: np.log2(missing[name, 20] / missing[name, 40]) for name in ("constant", "linear", "hermite")}
+    orders = {name: np.log2(missing[name, 20] / missing[name, 40]) for name in ("linear", "hermite")}
     assert orders["linear"] > 1.7
     assert orders["hermite"] > orders["linear"] + 0.5
-    assert missing["hermite", 20] < 0.1 * missing["linear", 20] < missing["constant", 20]
+    assert missing["hermite", 20] < 0.1 * missing["linear", 20]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -209,7 +203,7 @@ def test_limits_hold_between_the_points_of_every_scheme(name):
 def test_waypoints_and_resampled_starts_know_the_scheme():
     path = {"kind": "waypoints", "points": [[0, 0, 1], [0.2, 0, 1.1], [0, 0.2, 1.2], [0, 0, 1]]}
     tube = {"position": 0.1, "ends": "exact", "waypoints": "exact"}
-    for name in ("hermite", "gauss", "spline"):
+    for name in ("hermite", "spline"):
         task = {"path": path, "duration": 4, "steps": 17, "tube": tube, "scheme": name}
         found = plan(load("ipanema-1"), task)
         assert found.feasible, (name, found.report())
@@ -220,10 +214,10 @@ def test_waypoints_and_resampled_starts_know_the_scheme():
         assert again.feasible
 
 
-def test_a_rate_of_tensions_that_jump_is_refused():
-    task = Task.model_validate({**CRANE, "scheme": "gauss", "limits": {"tension_rate": 100}})
-    with pytest.raises(InputError, match=r"limits\.tension_rate must be left out with the scheme 'gauss'") as caught:
-        lay_out(load("ipanema-1"), task)
-    assert "\n" not in str(caught.value)
+def test_schemes_and_solvers_that_there_are_not():
+    """Files of earlier versions name the one solver that is left."""
+    assert Task.model_validate({**CRANE, "solver": "ipopt"}) == Task.model_validate(CRANE)
+    with pytest.raises(InputError, match="solver"):
+        plan(load("ipanema-1"), {**CRANE, "solver": "fatrop"})
     with pytest.raises(InputError, match=r"scheme must be .* got 'cubic'"):
         plan(load("ipanema-1"), {**CRANE, "scheme": "cubic"})

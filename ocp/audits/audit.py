@@ -164,8 +164,8 @@ def other_tensions_may_pass(scenario: Scenario, audit: Audit) -> bool:
 
 def other_tensions_exist(scenario: Scenario, audit: Audit) -> bool:
     """Return whether the cables can give a motion's wrenches by tensions other than the audited ones."""
-    if scenario.phases.jumps and scenario.scheme.continuous:
-        return False  # none that a program with this scheme has: they jump where the load changes
+    if scenario.phases.jumps:
+        return False  # none that a program has: they jump where the load changes
     A = scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
     values = np.linalg.svd(scaled(scenario, A), compute_uv=False)
     return scenario.robot.m > values.shape[1] or bool((values[:, -1] < INDEPENDENT * values[:, 0]).any())

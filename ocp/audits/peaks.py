@@ -36,11 +36,10 @@ def _corners(scenario: Scenario, seen: Instants) -> np.ndarray:
     """Return the instants at corners of the motion, and just before those at which it or its load may jump, (k,)."""
     nodes = np.zeros(0) if seen.deviation is None else seen.deviation.nodes
     boundaries, duration = scenario.phases.boundaries, float(seen.times[-1])
-    jumps = boundaries if scenario.scheme.continuous else np.concatenate([boundaries, nodes[:: scenario.scheme.size]])
     corners = np.unique(np.concatenate([nodes, boundaries]))
     step = seen.times[1] - seen.times[0]
     corners = corners[np.abs(corners - np.round(corners / step) * step) > APART * step]
-    corners = np.concatenate([corners, np.unique(jumps) - BESIDE * duration])
+    corners = np.concatenate([corners, np.unique(boundaries) - BESIDE * duration])
     return np.unique(corners[(corners > 0.0) & (corners < duration)])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..tasks.scheme import Scheme
 from .derivatives import Mapped
-from .stages import Unknowns
+from .unknowns import Unknowns
 
 __all__ = ["Columns"]
 
@@ -40,9 +40,7 @@ class Columns:
         intervals: ca.DM | ca.MX,
     ):
         X, given, size = unknowns.columns, references, scheme.size
-        self.nodes = scheme.balance_points(intervals.shape[1])
-        nodes = self.nodes.tolist()
-        self._of_nodes = {"x": X[:, nodes], "p": given[:, nodes], "carried": ca.DM(carried)}
+        self._of_nodes = {"x": X, "p": given, "carried": ca.DM(carried)}
         self._of_intervals = {
             "x": _groups(X, size),
             "x_end": unknowns.ends,
@@ -50,12 +48,9 @@ class Columns:
             "p_end": given[:, size::size],
             "grid": intervals,
         }
-        self._at_nodes: np.ndarray | None = None
-        self._between: np.ndarray | None = None
-        if (where := unknowns.where) is not None:
-            self._at_nodes = where[:, nodes]
-            grouped = where[:, :-1].T.reshape(-1, len(where) * size).T
-            self._between = np.vstack([grouped, where[:, size::size]])
+        where = unknowns.where
+        self._at_nodes = where
+        self._between = np.vstack([where[:, :-1].T.reshape(-1, len(where) * size).T, where[:, size::size]])
 
     def at_nodes(self, function: ca.Function, chosen: np.ndarray | None = None) -> Mapped:
         """Return a function of nodes at those `chosen` among them; default: at all."""
@@ -66,11 +61,11 @@ class Columns:
         return _mapped(function, self._of_intervals, self._between, chosen)
 
 
-def _mapped(function: ca.Function, columns: dict[str, Any], places: np.ndarray | None, chosen: Any) -> Mapped:
+def _mapped(function: ca.Function, columns: dict[str, Any], places: np.ndarray, chosen: Any) -> Mapped:
     inputs = [columns[name] for name in function.name_in()]
     if chosen is not None:
         inputs = [each[:, chosen.tolist()] for each in inputs]
-        places = None if places is None else places[:, chosen]
+        places = places[:, chosen]
     return Mapped(function, inputs, places)
 
 

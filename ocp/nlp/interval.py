@@ -33,7 +33,6 @@ from .rows import (
 from .thin import swept
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
-JUMP = 0.05  # of an interval: how long a jump of the acceleration counts
 
 __all__ = ["Interval", "Points", "interval_of", "points"]
 
@@ -56,20 +55,15 @@ class Interval(Displayed):
         (x, x_end, grid) -> cost, with `Grid`'s numbers of the interval.
     function
         (x, x_end, p, p_end, grid) -> values, with the reference motions p at the same points.
-    flow
-        (x, x_end, grid) -> the end's motion that integration gives, from what is free at the end: its acceleration, or
-        its snap; and what all nodes share.
     rows
-        Names and bounds of `values`. The first are `gaps` equations: the end is what `flow` gives.
+        Names and bounds of `values`.
     local
         Index of each local limit, its function (x, x_end, p, p_end) -> values, and its rows.
     """
 
     cost: ca.Function
     function: ca.Function
-    flow: ca.Function
     rows: list[Row]
-    gaps: int
     local: list[tuple[int, ca.Function, list[Row]]]
 
 
@@ -104,11 +98,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     _chain_rows(layout, h, given, columns, own, values, rows)
     values.append(x_end[layout.shared] - x[layout.shared])
     rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
-    flow = ca.Function("flow", [x, x_end, numbers], [_end(layout, h, given, columns, own)])
-    gaps = len(rows)
-
     _inner_rows(scenario, layout, h, columns, own, values, rows)
-    cost = _jerk_cost(scenario, h, own, x_end[layout.a])
+    cost = _jerk_cost(scenario, h, own)
     cost += _rate_cost(scenario, layout, h, columns, take_up)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
@@ -140,7 +131,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     function = ca.Function("interval", inputs, [ca.vertcat(*values)], names, ["values"], differentiated(5, 2))
     names = ["x", "x_end", "grid"]
     costs = ca.Function("interval_cost", [x, x_end, numbers], [cost], names, ["cost"], differentiated(3, 2))
-    return Interval(costs, function, flow, rows, gaps, local)
+    return Interval(costs, function, rows, local)
 
 
 def _numbers(grid: np.ndarray) -> tuple[ca.SX, list[ca.SX]]:
@@ -177,18 +168,6 @@ def _chain_rows(
         rows += [Row("acceleration", 0.0, 0.0)] * n + [Row("jerk", 0.0, 0.0)] * n
 
 
-def _end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points) -> ca.SX:
-    """Return the end's column: motion from the integration, what is free there as it is, zeros elsewhere."""
-    x_end = ca.SX.zeros(layout.width)
-    x_end[layout.motion] = columns[-1][layout.motion]
-    x_end[layout.tensions] = columns[-1][layout.tensions]
-    x_end[layout.shared] = columns[0][layout.shared]
-    x_end[layout.q], x_end[layout.v] = own.position[-1], own.speed[-1]
-    if layout.derivatives > 3:
-        x_end[layout.a], x_end[layout.jerk] = _smooth_end(layout, h, given, columns)
-    return x_end
-
-
 def _inner_rows(
     scenario: Scenario,
     layout: Layout,
@@ -198,7 +177,7 @@ def _inner_rows(
     values: list[ca.SX],
     rows: list[Row],
 ) -> None:
-    """Add rows: inner points lie on the polynomials, with equal shared unknowns; so does the start if a jumps there."""
+    """Add rows: inner points lie on the polynomials, with equal shared unknowns."""
     n = layout.n
     for share, column in zip(scenario.scheme.inner, columns[1:-1], strict=True):
         values += [column[layout.q] - bernstein.value(own.position, share)]
@@ -206,26 +185,12 @@ def _inner_rows(
         values.append(column[layout.shared] - columns[0][layout.shared])
         rows += [Row("position", 0.0, 0.0)] * n + [Row("velocity", 0.0, 0.0)] * n
         rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
-    if not scenario.scheme.continuous:
-        values.append(columns[0][layout.a] - own.acceleration[0])
-        rows += [Row("acceleration", 0.0, 0.0)] * n
 
 
-def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points, a_end: ca.SX) -> ca.SX:
-    """Return the mean square of the jerk in units of the objective's.
-
-    A jump is spread over an interval where there is no other jerk, else over a small part of one: otherwise a motion
-    would jump by half and climb by half, at half the cost.
-    """
+def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points) -> ca.SX:
+    """Return the mean square of the jerk in units of the objective's."""
     scale = scenario.task.objective.jerk
-    cost, took = ca.SX(0), 1.0
-    if scenario.scheme.degree:
-        took = JUMP
-        jerk = [point / scale for point in bernstein.derivative(h, own.acceleration)]
-        cost += bernstein.mean_square(jerk, ca.dot)
-    if not scenario.scheme.continuous:
-        cost += ca.sumsqr((a_end - own.acceleration[-1]) / h / scale) / took
-    return cost
+    return bernstein.mean_square([point / scale for point in bernstein.derivative(h, own.acceleration)], ca.dot)
 
 
 def _rate_cost(

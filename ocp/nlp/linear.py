@@ -29,7 +29,7 @@ class LinearDistances:
     Parameters
     ----------
     program
-        The true program; not one in stages.
+        The true program.
 
     Attributes
     ----------

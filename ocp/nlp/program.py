@@ -4,17 +4,16 @@ Unknown at each point k are the free coordinates q_k, their rates v_k and accele
 duration T too where the task leaves it free:
 
     min   mean over time of sum |quantity / what costs one|^2  (+ T / time - margin)   (`task.Objective`)
-    s.t.  A(q_k) t_k + S n_k = w(q_k, v_k, a_k)                         at every point that the scheme selects
+    s.t.  A(q_k) t_k + S n_k = w(q_k, v_k, a_k)                         at every point
           (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
           t_min + margin <= t_k <= t_max - margin
           the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
           n_k >= 0, platform at rest on its path                        on the ground, else n_k = 0 (`tasks.phases`)
-          the limits of `limits`                                        at every point that the scheme selects
+          the limits of `limits`                                        at every point
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
 
 What holds at one point is in `node`, what binds an interval's in `interval`. Tensions are in units of
-`Robot.force_scale`, the weight, moments over `Robot.length`. Which solver it is for decides how the same unknowns and
-rows are put in order (`stages`).
+`Robot.force_scale`, the weight, moments over `Robot.length`.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ from .layout import DURATION, MARGIN, Layout
 from .near import Near
 from .node import Node, node_of
 from .rows import Mesh, Row, stretch
-from .stages import Stages, all_at_once, put_in_order, stage_by_stage
+from .unknowns import stacked, unknowns_of
 
 __all__ = ["Program", "build"]
 
@@ -57,16 +56,12 @@ class Program(Displayed):
         {"x", "f", "g"} for `casadi.nlpsol`.
     lower, upper, lower_g, upper_g
         Bounds of x and g.
-    order
-        The place of each unknown among the entries of the points' columns, one column after the other.
-    stages
-        Sizes of its stages; None if it is not ordered by stages.
     near
         Where it has the rows of local limits.
     costs
         What the objective sums but for linear terms, and the weights of their sets.
     blocks
-        The rows of g, in their order if the program is not ordered by stages.
+        The rows of g, in their order.
     local
         How many of the first blocks are of local limits.
     parameters
@@ -82,8 +77,6 @@ class Program(Displayed):
     upper: np.ndarray
     lower_g: np.ndarray
     upper_g: np.ndarray
-    order: np.ndarray
-    stages: Stages | None
     near: Near
     costs: list[tuple[Mapped, np.ndarray]]
     blocks: list[Block]
@@ -98,14 +91,11 @@ class Program(Displayed):
         times = self.shares * scenario.duration
         lower, upper = _simple_bounds(scenario, self.mesh, self.layout, times)
         parameters = _values(_parameters(scenario, times), scenario.duration / self.mesh.steps)
-        bounds = {"lower": lower[self.order], "upper": upper[self.order]}
-        return replace(self, scenario=scenario, parameters=parameters, **bounds)
+        return replace(self, scenario=scenario, parameters=parameters, lower=lower, upper=upper)
 
     def columns(self, x: np.ndarray) -> np.ndarray:
-        """Return the unknowns of each point, one row per point, zero where a point does not have one."""
-        padded = np.zeros(len(self.shares) * self.layout.width)
-        padded[self.order] = x
-        return padded.reshape(-1, self.layout.width)
+        """Return the unknowns of each point, one row per point."""
+        return x.reshape(-1, self.layout.width)
 
     def duration(self, x: np.ndarray) -> float:
         """Return the duration of a solution x [s]."""
@@ -115,10 +105,7 @@ class Program(Displayed):
     def read(self, x: np.ndarray) -> Deviation:
         """Return the deviation of a solution x."""
         layout, columns, scheme = self.layout, self.columns(x), self.scenario.scheme
-        at_nodes = scheme.balance_points(self.mesh.steps)
-        tensions = columns[at_nodes, layout.tensions] * self.scenario.robot.force_scale
-        if len(at_nodes) < len(columns):
-            tensions = np.stack([np.interp(self.shares, self.shares[at_nodes], t) for t in tensions.T], axis=1)
+        tensions = columns[:, layout.tensions] * self.scenario.robot.force_scale
         q, v, a = (columns[:, part] for part in (layout.q, layout.v, layout.a))
         jerk = columns[:, layout.jerk] / self._step if scheme.smooth else None
         return Deviation(self.shares * self.duration(x), q, v, a, tensions, scheme, jerk)
@@ -135,9 +122,7 @@ class Program(Displayed):
 
     @cached_property
     def derivatives(self) -> dict[str, ca.Function]:
-        """Return options of `casadi.nlpsol`: Jacobian and Hessian; none of a program in stages."""
-        if self.stages is not None:
-            return {}
+        """Return options of `casadi.nlpsol`: Jacobian and Hessian."""
         x = self.problem["x"]
         return derivatives(x, self.problem.get("p", ca.MX.sym("p", 0, 1)), self.costs, self.blocks)
 
@@ -167,7 +152,7 @@ class Program(Displayed):
         columns[:, layout.supports] = self.scenario.phases.resting(deviation.nodes)[:, None] / max(layout.grounds, 1)
         if (place := layout.at(DURATION)) is not None:
             columns[:, place] = deviation.nodes[-1] / self.scenario.duration
-        return columns.ravel()[self.order]
+        return columns.ravel()
 
 
 def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: bool = False) -> Program:
@@ -176,10 +161,10 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
     A `movable` one has the references and the length of the intervals as parameters (`Program.of`).
     """
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
-    grid, at_nodes = Grid.of(scenario, steps), scheme.balance_points(steps)
+    grid = Grid.of(scenario, steps)
     near = near or Near.everywhere(scenario, grid.shares)
     times = grid.shares * scenario.duration
-    references, carried = _parameters(scenario, times), _carried(scenario, times[at_nodes])
+    references, carried = _parameters(scenario, times), _carried(scenario, times)
     p, given, intervals = None, ca.DM(references), ca.DM(grid.intervals)
     shown, lengths = references, grid.intervals
     if movable:
@@ -187,12 +172,11 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         shown, lengths = _made_to_vary(scenario, references), np.hstack([lengths, lengths * [[2.0], [1.0]]])
     node = node_of(scenario, mesh, layout, shown, carried)
     interval = interval_of(scenario, mesh, layout, shown, lengths)
-    arrange = stage_by_stage if scenario.task.solver == "fatrop" else all_at_once
-    unknowns = arrange(scenario, layout, grid, interval.flow)
+    unknowns = unknowns_of(scenario, layout, steps)
     X, X_end = unknowns.columns, unknowns.ends
     columns = Columns(unknowns, scheme, given, carried, intervals)
     costs = [
-        (columns.at_nodes(node.cost), grid.weights[at_nodes]),
+        (columns.at_nodes(node.cost), grid.weights),
         (columns.between(interval.cost), grid.steps / scenario.duration),
     ]
     objective = _shared_cost(scenario, layout, X)
@@ -200,15 +184,14 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         objective += ca.dot(cost.values, ca.DM(weights).T)
 
     everywhere, between = columns.at_nodes(node.function), columns.between(interval.function)
-    first = interval.gaps if unknowns.gaps is not None else 0  # a program in stages has those as its gaps
     local = _near_rows(near, scheme, node, interval, columns)
     blocks = [
         *local,
-        Block(everywhere.values, node.rows, at_nodes // scheme.size, everywhere),
-        Block(between.values[first:, :], interval.rows[first:], np.arange(steps), between),
+        Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
+        Block(between.values, interval.rows, np.arange(steps), between),
         *_single_rows(scenario, layout, X, X_end, grid.steps),
     ]
-    g, bounds, stages = put_in_order(unknowns, blocks, grid)
+    g, bounds = stacked(blocks, grid)
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
     return Program(
         scenario=scenario,
@@ -216,12 +199,10 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         layout=layout,
         shares=grid.shares,
         problem={"x": unknowns.x, "f": objective, "g": g} | ({} if p is None else {"p": p}),
-        lower=np.where(unknowns.copies, -np.inf, lower[unknowns.order]),
-        upper=np.where(unknowns.copies, np.inf, upper[unknowns.order]),
+        lower=lower,
+        upper=upper,
         lower_g=bounds[:, 0],
         upper_g=bounds[:, 1],
-        order=unknowns.order,
-        stages=stages,
         near=near,
         costs=costs,
         blocks=blocks,
@@ -303,11 +284,6 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, len
         picked = [block * layout.n + i for block in range(layout.derivatives) for i in carriers]
         rows: list[Row] = [Row("periodic", 0.0, 0.0)] * len(picked)
         blocks.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
-    if not scenario.scheme.continuous and layout.n:
-        k = steps - 1
-        left = _polynomials(scenario, layout, X, X_end, lengths, k).acceleration[-1]
-        rows = [Row("acceleration", 0.0, 0.0)] * layout.n
-        blocks.append(Block(X_end[layout.a, k] - left, rows, np.array([k])))
     if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
         # Values at the nodes leave a cubic spline one freedom at each end, which would be used where nobody looks.
         rows = [Row("snap", 0.0, 0.0)] * len(ending)

@@ -1,4 +1,4 @@
-"""Run IPOPT or fatrop on a program, from a guess, a motion or the last solution: `Solver`."""
+"""Run IPOPT on a program, from a guess, a motion or the last solution: `Solver`."""
 
 from __future__ import annotations
 
@@ -84,11 +84,8 @@ _STARTS: dict[str, dict[str, Any]] = {
 }
 
 
-FATROP_STATUS = {0: "Solve_Succeeded", 1: "Maximum_Iterations_Exceeded"}  # fatrop's numbers in IPOPT's words
-
-
 class Solver:
-    """IPOPT or fatrop for one program, to be run from several guesses, or from its own last solution."""
+    """IPOPT for one program, to be run from several guesses, or from its own last solution."""
 
     def __init__(self, program: Program, max_iterations: int = 400):
         self.program = program
@@ -118,14 +115,12 @@ class Solver:
     def _make(self, start: dict[str, Any]) -> ca.Function:
         # What its check of the inputs warns of, more equations than unknowns, is an answer here: no solution.
         common = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
-        name = self.program.scenario.task.solver
-        options = self._fatrop(start) if name == "fatrop" else self._ipopt(start)
-        made = wait_for(lambda: _checked(ca.nlpsol, "planner", name, self.program.problem, common | options))
-        if name == "ipopt":
-            run_in_one_thread()
+        options = common | self._options(start)
+        made = wait_for(lambda: _checked(ca.nlpsol, "planner", "ipopt", self.program.problem, options))
+        run_in_one_thread()
         return made
 
-    def _ipopt(self, start: dict[str, Any]) -> dict[str, Any]:
+    def _options(self, start: dict[str, Any]) -> dict[str, Any]:
         quiet = {"print_level": 0, "sb": "yes"}
         accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
         scenario = self.program.scenario
@@ -133,24 +128,6 @@ class Solver:
         linear = TEAM if thrusts and scenario.count > MANY else {}
         options = {"ipopt": quiet | accuracy | linear | start, "iteration_callback": self._watch}
         return options | self.program.derivatives
-
-    def _fatrop(self, start: dict[str, Any]) -> dict[str, Any]:
-        program = self.program
-        if program.stages is None:
-            raise SolverError("planner: fatrop needs a program in stages")
-        stages = program.stages
-        # Of what `start` says it knows this much, by names of its own.
-        words = {"mu_init": "mu_init", "warm_start_bound_push": "bound_push", "warm_start_bound_frac": "bound_frac"}
-        warm = {words[key]: value for key, value in start.items() if key in words}
-        return {
-            "structure_detection": "manual",
-            "N": len(stages.rows) - 1,
-            "nx": stages.states,
-            "nu": stages.controls,
-            "ng": stages.rows,
-            "equality": (program.lower_g == program.upper_g).tolist(),
-            "fatrop": {"print_level": 0, "tol": 1e-8, "max_iter": self._max_iterations} | warm,
-        }
 
     def solve(
         self,
@@ -164,7 +141,7 @@ class Solver:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
         A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
-        with the best that it has; fatrop does not. A run without a solution is a result, not an error. `parameters` are
+        with the best that it has. A run without a solution is a result, not an error. `parameters` are
         those of the program, if it has any; default: its own. A guess that is `near` the last solution starts with its
         multipliers.
 
@@ -173,7 +150,7 @@ class Solver:
         SolverError
             If CasADi or IPOPT break.
         KeyboardInterrupt
-            If an interrupt arrives; the solver's thread ends at its next iteration, fatrop's when it is through.
+            If an interrupt arrives; the solver's thread ends at its next iteration.
         """
         program, watch = self.program, self._watch
         start: dict[str, Any] = {
@@ -206,10 +183,6 @@ class Solver:
         x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
         objective = float(result["f"])
         message = statistics["return_status"]
-        if isinstance(message, int):
-            message = FATROP_STATUS.get(message, f"fatrop's status {message}")
-            if progress is not None:  # it reports no iterations while it solves
-                progress(iterations, objective, watch.infeasibility(result["g"].full().ravel()))
         met = program.violation(x, result["g"].full().ravel()) <= MET
         if watch.settled or watch.late:
             message = TIME_LIMIT if watch.late else SETTLED

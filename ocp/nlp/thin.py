@@ -18,10 +18,9 @@ def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     """Return the limits that the program keeps between nodes rather than at them, and their functions.
 
     They are distances from places that are thinner than a few steps of the reference motion. The result is
-    empty for teams, since four quadrotors took four times as long through a slot, and for fatrop, whose iterations
-    hardly advance with them.
+    empty for teams, since four quadrotors took four times as long through a slot.
     """
-    if scenario.count > MANY or scenario.task.solver == "fatrop":
+    if scenario.count > MANY:
         return {}
     thin = [limit for limit in scenario.limits if limit.thickness < STEPS * _step(scenario, mesh)]
     functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}

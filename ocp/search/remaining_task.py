@@ -111,7 +111,7 @@ def _completed(initial: Initial, last: Plan, at: np.ndarray, carriers: Motion) -
     robot, audit = last.scenario.robot, last.audit
     if initial.tensions is None and initial.acceleration is None and is_agile(robot):
         planned = [float(np.interp(at[0], audit.times, its)) for its in audit.tensions.T]
-        fields["tensions"] = tuple(planned) if last.scenario.scheme.continuous else None
+        fields["tensions"] = tuple(planned)
     return initial.model_copy(update=fields) if fields else initial
 
 

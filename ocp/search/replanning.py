@@ -84,9 +84,7 @@ class Replanner:
     def _by_last_solution(self, search: Search, guess: Deviation | None) -> Plan | None:
         """Plan with the program that has parameters; None if that is not possible, or leads to none."""
         scenario, mesh = search.scenario, Mesh(search.scenario.task.steps, RESERVE * search.scenario.robot.force_scale)
-        scheme = scenario.scheme
-        has_parameters = scheme.continuous and not scheme.smooth and scenario.task.solver == "ipopt"
-        if guess is None or not has_parameters:
+        if guess is None or scenario.scheme.smooth:
             return None
         if mesh not in self._solvers:
             wait_for(lambda: _load_kernels(scenario))

@@ -165,7 +165,7 @@ class Search:
         """
         slower = "" if scenario is None else f", in {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario
-        if not has_places(scenario) or scenario.task.solver == "fatrop" or self.seconds_left <= 0:
+        if not has_places(scenario) or self.seconds_left <= 0:
             return None
         with self.stage(f"program with linear distances, {mesh.steps} steps{slower}") as stage:
             start = time.perf_counter()

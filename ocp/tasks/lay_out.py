@@ -14,7 +14,6 @@ from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
 from ...models.ranges import PositiveRange
 from ..limits.clearance import point_outside
-from ..limits.limit import Rate
 from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
 from .ends import carrier_ends
@@ -23,7 +22,6 @@ from .lay_out_phases import lay_out_phases
 from .limit_list import limit_list
 from .paths import LinePath, WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
-from .scheme import SCHEMES
 from .task import FreeBase, GivenBase, HoldBase, Task
 from .task_limits import OF_CARRIERS
 from .wind_set import WindBox
@@ -169,28 +167,8 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
 
 def _check_transcription(task: Task, limits: Limits, where: str) -> None:
     """Refuse what the scheme or the solver cannot do."""
-    if task.solver == "fatrop" and carrier_ends(task) == "periodic":
-        raise InputError(
-            f"{where}: solver must be ipopt if base.ends is periodic, got fatrop, which cannot couple the "
-            "last stage to the first"
-        )
     if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
         raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
-    if task.initial is not None and task.initial.tensions is not None and not SCHEMES[task.scheme].continuous:
-        raise InputError(
-            f"{where}: initial.tensions must be left out with the scheme {task.scheme!r}, which has none at the start"
-        )
-    if SCHEMES[task.scheme].continuous:
-        return
-    rates = [(f"limits.{limit.name}", limit.high, limit.unit) for limit in limits if isinstance(limit, Rate)]
-    if (rate := task.objective.tension_rate) is not None:
-        rates.append(("objective.tension_rate", rate, "N/s"))
-    for name, rate, unit in rates:
-        accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if scheme.continuous)
-        raise InputError(
-            f"{where}: {name} must be left out with the scheme {task.scheme!r}, whose tensions jump at the nodes, got "
-            f"{rate:g} {unit}; schemes without jumps: {accepted}"
-        )
 
 
 def _check_start_and_end(scenario: Scenario, where: str) -> None:

@@ -3,11 +3,11 @@
 Inverse dynamics makes the differential equation a chain of integrators, which every scheme integrates exactly: position
 and speed at the nodes are no approximation. Schemes differ in two choices only:
 
-    constant   acceleration constant, jumps at the nodes; balance in the middle of each interval
-    linear     acceleration linear and continuous; balance at the nodes
-    hermite    acceleration quadratic and continuous; balance at the nodes and in the middle (Hermite-Simpson)
-    gauss      acceleration quadratic, jumps at the nodes; balance at the three Gauss points of each interval
+    linear     acceleration linear; balance at the nodes
+    hermite    acceleration quadratic; balance at the nodes and in the middle (Hermite-Simpson)
     spline     acceleration a cubic B-spline, twice continuously differentiable; balance at the nodes
+
+With all of them the acceleration is continuous.
 
 A robot with enough cables has tensions between those points too, wherever its limits permit; one with few cables has
 them only as exactly as the polynomial follows a motion that is possible. There the order counts: the error of two
@@ -31,7 +31,7 @@ Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 __all__ = ["LINEAR", "SCHEMES", "Scheme", "SchemeName"]
 
-SchemeName = Literal["constant", "linear", "hermite", "gauss", "spline"]
+SchemeName = Literal["linear", "hermite", "spline"]
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,6 @@ class Scheme(Displayed):
         Further points inside an interval, as shares of it.
     weights
         Weights of the quadrature over an interval, at its points from start to end.
-    continuous
-        Whether the acceleration is continuous: then A t = w is required at the nodes too, else only at inner points.
     smooth
         Whether jerk and snap, the next two derivatives, are unknowns at the nodes as well.
     """
@@ -59,7 +57,6 @@ class Scheme(Displayed):
     degree: int
     inner: tuple[float, ...]
     weights: tuple[float, ...]
-    continuous: bool = True
     smooth: bool = False
 
     @property
@@ -77,11 +74,6 @@ class Scheme(Displayed):
         starts = np.arange(steps)[:, None] + np.array([0.0, *self.inner])
         return np.append(starts.ravel(), steps) / steps
 
-    def balance_points(self, steps: int) -> np.ndarray:
-        """Return the indices of the points at which A t = w and the limits are required."""
-        points = np.arange(steps * self.size + 1)
-        return points if self.continuous else points[points % self.size != 0]
-
     def quadrature(self, steps: int) -> np.ndarray:
         """Return the weights of the mean over the duration at all points, (steps * size + 1,)."""
         weights = np.zeros(steps * self.size + 1)
@@ -91,9 +83,8 @@ class Scheme(Displayed):
 
     @cached_property
     def _to_points(self) -> np.ndarray:
-        """Return the matrix from values at the balance points to the Bernstein points of their polynomial."""
-        places = (0.0, *self.inner, 1.0) if self.continuous else self.inner
-        inverse = np.linalg.inv(bernstein.basis(self.degree, places))
+        """Return the matrix from values at the points to the Bernstein points of their polynomial."""
+        inverse = np.linalg.inv(bernstein.basis(self.degree, (0.0, *self.inner, 1.0)))
         return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)
 
     @property
@@ -119,10 +110,7 @@ class Scheme(Displayed):
             rise = (end - start) / 3 if jerk is None else None
             first, last = (rise, rise) if jerk is None else (h / 3 * jerk[0], h / 3 * jerk[1])
             return [start, start + first, end - last, end]
-        values = list(a) if self.continuous else list(a[1:-1])
-        return [
-            sum(float(w) * value for w, value in zip(row, values, strict=True) if w != 0) for row in self._to_points
-        ]
+        return [sum(float(w) * value for w, value in zip(row, a, strict=True) if w != 0) for row in self._to_points]
 
     def evaluate(
         self, nodes: np.ndarray, values: Motion, jerk: np.ndarray | None, times: np.ndarray
@@ -130,7 +118,6 @@ class Scheme(Displayed):
         """Return position, velocity, acceleration and jerk at `times` (k,), (k, n) each.
 
         `values` are (q, v, a) at the points `nodes` of all intervals, (points, n) each; `jerk` is (points, n) or None.
-        At a node where the acceleration jumps it is that of the next interval.
         """
         size = self.size
         starts = nodes[::size]
@@ -140,7 +127,7 @@ class Scheme(Displayed):
         acceleration = self.acceleration(h, a, None if jerk is None else (jerk[:-1], jerk[1:]))
         speed = bernstein.integral(h, v, acceleration)
         position = bernstein.integral(h, q, speed)
-        change = bernstein.derivative(h, acceleration) if self.degree else [np.zeros_like(v)]
+        change = bernstein.derivative(h, acceleration)
         index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 2)
         shares = (times - starts[index]) / h[index, 0]
         motion = []
@@ -169,15 +156,11 @@ def _snap_share(steps: int) -> np.ndarray:
     return weights
 
 
-_GAUSS = 0.5 * np.sqrt(0.6)
-
 SCHEMES: dict[str, Scheme] = {
     scheme.name: scheme
     for scheme in (
-        Scheme("constant", 0, (0.5,), (0.0, 1.0, 0.0), continuous=False),
         Scheme("linear", 1, (), (0.5, 0.5)),
         Scheme("hermite", 2, (0.5,), (1 / 6, 2 / 3, 1 / 6)),
-        Scheme("gauss", 2, (0.5 - _GAUSS, 0.5, 0.5 + _GAUSS), (0.0, 5 / 18, 8 / 18, 5 / 18, 0.0), continuous=False),
         Scheme("spline", 3, (), (0.5, 0.5), smooth=True),
     )
 }

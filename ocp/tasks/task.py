@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
@@ -177,21 +178,26 @@ class Task(Part):
     steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
     scheme: SchemeName = Field(
         default="linear",
-        description="acceleration within an interval: constant; linear; hermite and gauss: quadratic, with more points "
-        "at which A t = w is required; spline: a cubic B-spline, smooth",
-    )
-    solver: Literal["ipopt", "fatrop"] = Field(
-        default="ipopt", description="solver of the nonlinear program; fatrop does not accept periodic ends"
+        description="acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
+        "spline: a cubic B-spline, smooth",
     )
     objective: Objective = Objective()
     time_limit: Positive = Field(
         default=600.0,
         description="time for the whole search [s]; after it the best motion so far is audited and taken. A step that "
-        "is under way is finished, and fatrop can be stopped only between its runs",
+        "is under way is finished",
     )
     output_rate: Positive = Field(
         default=100.0, description="samples per second of the saved trajectory, all of them audited [1/s]"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_solver(cls, data: Any) -> Any:
+        """Accept `solver: ipopt`, which files of earlier versions have: there was another one."""
+        if isinstance(data, Mapping) and data.get("solver") == "ipopt":
+            return {key: value for key, value in data.items() if key != "solver"}
+        return data
 
     @model_validator(mode="after")
     def _one_path(self) -> Self:
