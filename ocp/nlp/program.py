@@ -236,10 +236,10 @@ def _near_rows(near: Near, scheme: Scheme, node: Node, interval: Interval, colum
     """Return the rows of local limits where they are near, at nodes and between them."""
     blocks = []
     for index, function, rows in node.local:
-        chosen = np.flatnonzero(near.chosen[index, columns.nodes])
+        chosen = np.flatnonzero(near.chosen[index])
         if len(chosen):
             mapped = columns.at_nodes(function, chosen)
-            blocks.append(Block(mapped.values, rows, columns.nodes[chosen] // scheme.size, mapped))
+            blocks.append(Block(mapped.values, rows, chosen // scheme.size, mapped))
     for index, function, rows in interval.local:
         inside = np.lib.stride_tricks.sliding_window_view(near.chosen[index], scheme.size + 1)[:: scheme.size]
         chosen = np.flatnonzero(inside.any(axis=1))
