@@ -25,7 +25,7 @@ from towline.solvers import solve
 from towline.viewer import read, save_page, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import at_rest
-from towline.viewer.posing import home_at_rest
+from towline.viewer.posing import opening_pose
 from towline.workspace import StaticEquilibrium, sample, save
 
 from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
@@ -202,7 +202,7 @@ def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_
     robot = subject.robot
     with serve(subject, port=0) as url:
         open_viewer(page, url, 1600, 1000)
-        pose = home_at_rest(robot) if subject.replay is None else subject.replay.at(0).pose
+        pose = opening_pose(robot, Geometry(robot)) if subject.replay is None else subject.replay.at(0).pose
         points = at_rest(Dynamics(robot), Geometry(robot), pose, robot.carrier_home).points
         for width, height in ((1600, 1000), (400, 800)):
             page.set_viewport_size({"width": width, "height": height})

@@ -22,7 +22,7 @@ from .geometry import Geometry
 from .instant import at_rest
 from .page import aside, camera
 from .panel import Panel
-from .posing import home_at_rest
+from .posing import opening_pose
 from .stage import ALONG, Stage
 from .subject import Subject
 
@@ -80,7 +80,8 @@ def _served(subject: Subject, host: str, port: int) -> Iterator[str]:
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     """Write a subject as one HTML file that loads nothing and needs no server; a failure leaves no partial file.
 
-    A plan plays; a robot is shown at home with its tensions, with the points of its workspace if there are any.
+    A plan plays; a robot is shown with its tensions at the pose of `opening_pose`, with the points of its workspace if there
+    are any.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def _page(subject: Subject) -> str:
         replay = subject.replay
         if replay is None:
             robot = subject.robot
-            frames = [at_rest(Dynamics(robot), geometry, home_at_rest(robot), robot.carrier_home)]
+            frames = [at_rest(Dynamics(robot), geometry, opening_pose(robot, geometry), robot.carrier_home)]
         else:
             frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
         stage.show(frames[0], subject.other_at(frames[0]))
