@@ -4,7 +4,6 @@ Screenshots are left in pytest's temporary folder.
 """
 
 import re
-import shutil
 import threading
 from http.server import ThreadingHTTPServer
 from importlib.metadata import version
@@ -28,23 +27,14 @@ from towline.viewer.instant import at_rest
 from towline.viewer.posing import opening_pose
 from towline.workspace import StaticEquilibrium, sample, save
 
+from .chromium import PATIENCE, chromium, playwright
 from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-if CHROMIUM is None:
-    pytest.skip("no browser is installed; to run these: apt-get install chromium", allow_module_level=True)
-playwright = pytest.importorskip("playwright.sync_api", reason="to run these: pip install playwright")
-
-PATIENCE = 30_000  # [ms] drawing is in software here
-WEBGL = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 @pytest.fixture(scope="module")
 def browser():
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=list(WEBGL))
-        yield chromium
-        chromium.close()
+    with chromium() as opened:
+        yield opened
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import viser
 
     from ..models import Robot
+    from .frames import Frames
 
 HANDLE = 0.13  # of the robot's size
 NOTHING = "nothing"
@@ -36,6 +37,8 @@ class Posing:
     ----------
     server
         Its panel gets sliders, its scene handles.
+    frames
+        The marks of instants on it.
     robot, geometry
         The robot, and its geometry.
     show, refuse
@@ -45,12 +48,13 @@ class Posing:
     def __init__(
         self,
         server: viser.ViserServer,
+        frames: Frames,
         robot: Robot,
         geometry: Geometry,
         show: Callable[[Instant], None],
         refuse: Callable[[str], None],
     ):
-        self._server, self._robot, self._geometry = server, robot, geometry
+        self._server, self._frames, self._robot, self._geometry = server, frames, robot, geometry
         self._show, self._refuse = show, refuse
         self._dynamics, self._settings = Dynamics(robot), sliders(robot, geometry)
         self._busy, self._latest = threading.Lock(), 0
@@ -172,7 +176,7 @@ class Posing:
             except TowlineError as error:
                 refused = str(error)
             self._pose, self._carriers = pose.copy(), carriers.copy()
-            with self._server.atomic():
+            with self._frames.instant():
                 for slider, setting in zip(self._sliders, self._settings, strict=True):
                     if slider is not held or self._hang.value:
                         slider.value = self._value(setting)
@@ -215,9 +219,9 @@ def few_cables(robot: Robot) -> bool:
 
 
 def opening_pose(robot: Robot, geometry: Geometry) -> np.ndarray:
-    """Return the pose (6,) of `home_at_rest`, or if no tensions inside the limits hold it there, the nearest at which some do.
+    """Return the pose (6,) at which a view opens: that of `home_at_rest`, or the feasible pose nearest to it.
 
-    If the search finds none, it is that of `home_at_rest`.
+    If the search finds no feasible pose, it is that of `home_at_rest`.
     """
     home = home_at_rest(robot)
     if few_cables(robot):
