@@ -36,7 +36,7 @@ WATCH = """async (count) => {
     });
     drawn = { platform: viewer.nodeRefFromName["/platform"].matrix.elements.slice(12, 15), cable };
   };
-  const text = (name) => document.querySelector(name)?.innerText, frames = [], until = performance.now() + 30000;
+  const text = (name) => document.querySelector(name)?.innerText, frames = [], until = performance.now() + 120000;
   const probe = document.body.appendChild(document.createElement("div"));
   probe.style = "position:fixed;height:1px;width:1px";
   await new Promise((done) => {
@@ -79,7 +79,7 @@ def page():
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOAD)]
     try:
         with chromium() as browser:
-            opened = browser.new_page(viewport={"width": 800, "height": 480})
+            opened = browser.new_page(viewport={"width": 640, "height": 400})
             opened.set_default_timeout(2 * PATIENCE)
             opened.add_init_script("window.nativeFrame = requestAnimationFrame.bind(window)")
             yield opened
