@@ -68,7 +68,7 @@ pictures: .venv/core.stamp
 	cd build && ../$(BIN)/towline workspace cogiro --samples 20000 --figure ../docs/pictures/cogiro-workspace.png
 
 clean:
-	rm -rf .venv towline-demo build site *.egg-info solvers/core/*.so
+	rm -rf .venv .editable towline-demo build site *.egg-info solvers/core/*.so
 
 .venv/venv.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'

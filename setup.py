@@ -2,8 +2,12 @@
 
 The extension is optional: without a compiler towline is installed without it. The description is README.md, whose links
 lead to files of the repository; an index has none of these, so there they lead to the repository as of this version.
+
+An editable installation gets a folder that has the package under its name, because the repository's root is the package
+whatever its folder is called: type checkers and editors then find it as Python does.
 """
 
+import os
 import re
 
 CORE = "solvers/core/"
@@ -17,6 +21,7 @@ SOURCES = (
     "standard_form",
     "towline_core",
 )
+EDITABLE = ".editable"
 HEADERS = ("internal.h", "tolerances.h", "towline_core.h", "towline_types.h")
 
 
@@ -34,6 +39,22 @@ def with_addresses(readme: str, repository: str, version: str) -> str:
     return PATH.sub(address, readme)
 
 
+def linked(folder: str, name: str) -> bool:
+    """Make `folder`/`name` a link to the folder above, and return whether it is one.
+
+    It is none where something else has that name, or where links are not permitted, as on most Windows machines.
+    """
+    link = os.path.join(folder, name)
+    try:
+        os.makedirs(folder, exist_ok=True)
+        if os.path.islink(link) and os.readlink(link) != os.pardir:
+            os.unlink(link)
+        os.symlink(os.pardir, link, target_is_directory=True)
+    except OSError:  # among them that there is one
+        pass
+    return os.path.islink(link) and os.readlink(link) == os.pardir
+
+
 def main() -> None:
     """Run setuptools on pyproject.toml with the extension and the description."""
     import sys
@@ -41,6 +62,15 @@ def main() -> None:
     from pathlib import Path
 
     from setuptools import Extension, setup
+    from setuptools.command.editable_wheel import editable_wheel
+
+    class Editable(editable_wheel):
+        """An editable installation by a path, or by setuptools' import hook where there can be no link."""
+
+        def finalize_options(self) -> None:
+            if linked(EDITABLE, "towline"):
+                self.distribution.package_dir = {"": EDITABLE}
+            super().finalize_options()
 
     project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
     readme = Path("README.md").read_text(encoding="utf-8")
@@ -59,6 +89,7 @@ def main() -> None:
     setup(
         script_name="setup.py",
         ext_modules=[core],
+        cmdclass={"editable_wheel": Editable},
         options={"bdist_wheel": {"py_limited_api": "cp311"}},
         long_description=with_addresses(readme, project["urls"]["Repository"], project["version"]),
         long_description_content_type="text/markdown",

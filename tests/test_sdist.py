@@ -59,6 +59,9 @@ def sdist(tracked, tmp_path_factory):
     for name in LEFT_BEHIND:
         (clone / name).parent.mkdir(parents=True, exist_ok=True)
         (clone / name).write_text(str(clone))
+    if sys.platform != "win32":  # where a link needs permission
+        (clone / ".editable").mkdir()
+        (clone / ".editable" / "towline").symlink_to(os.pardir, target_is_directory=True)
     with tarfile.open(build("sdist", clone)) as archive:
         archive.extractall(unpacked, filter="data")
     return unpacked / f"towline-{PROJECT['project']['version']}"

@@ -409,9 +409,8 @@ def test_the_page_lists_the_tensions_of_each_instant(folder, tmp_path):
     saved = xr.load_dataset(folder / "line.nc")
     page = save_page(read(str(folder / "line.nc")), tmp_path / "line.html").read_text()
     frames = json.loads(re.search(r"const FRAMES = (\{.*?\});\n", page)[1])
-    np.testing.assert_allclose(frames["times"], saved["time"], atol=1e-9)
+    assert frames["clocks"] == [f"t = {time:.2f} s" for time in saved["time"]]
     np.testing.assert_allclose(frames["tensions"], saved["tensions"], atol=0.0051)
-    assert frames["clocks"][-1] == "t = 2.00 s"
     assert page.count('class="towline-tension"') == 6
     infeasible = save_page(read(str(folder / "hover.nc")), tmp_path / "hover.html").read_text()
     frames = json.loads(re.search(r"const FRAMES = (\{.*?\});\n", infeasible)[1])

@@ -4,7 +4,6 @@ Screenshots are left in pytest's temporary folder.
 """
 
 import re
-import shutil
 import threading
 from http.server import ThreadingHTTPServer
 from importlib.metadata import version
@@ -25,26 +24,17 @@ from towline.statics.distribution import pose_problem
 from towline.viewer import read, save_page, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.instant import at_rest
-from towline.viewer.posing import home_at_rest
+from towline.viewer.posing import opening_pose
 from towline.workspace import StaticEquilibrium, sample, save
 
+from .chromium import PATIENCE, chromium, playwright
 from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-if CHROMIUM is None:
-    pytest.skip("no browser is installed; to run these: apt-get install chromium", allow_module_level=True)
-playwright = pytest.importorskip("playwright.sync_api", reason="to run these: pip install playwright")
-
-PATIENCE = 30_000  # [ms] drawing is in software here
-WEBGL = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 @pytest.fixture(scope="module")
 def browser():
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=list(WEBGL))
-        yield chromium
-        chromium.close()
+    with chromium() as opened:
+        yield opened
 
 
 @pytest.fixture
@@ -202,7 +192,7 @@ def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_
     robot = subject.robot
     with serve(subject, port=0) as url:
         open_viewer(page, url, 1600, 1000)
-        pose = home_at_rest(robot) if subject.replay is None else subject.replay.at(0).pose
+        pose = opening_pose(robot, Geometry(robot)) if subject.replay is None else subject.replay.at(0).pose
         points = at_rest(Dynamics(robot), Geometry(robot), pose, robot.carrier_home).points
         for width, height in ((1600, 1000), (400, 800)):
             page.set_viewport_size({"width": width, "height": height})

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.figures import style
-from towline.models import Dynamics, load
+from towline.models import Dynamics, available, load
 from towline.solvers import capacity_margin
 from towline.statics.distribution import pose_problem, tensions
 from towline.viewer import read, serve
 from towline.viewer.geometry import Geometry
-from towline.viewer.posing import at_rest_with, home_at_rest
+from towline.viewer.posing import at_rest_with, home_at_rest, opening_pose
 from towline.viewer.sliders import sliders, whole_steps
 from towline.viewer.stage import Stage
 from towline.workspace import Condition, Places, StaticEquilibrium, sample, save
@@ -115,6 +115,32 @@ def test_home_of_a_robot_with_few_cables_is_a_pose_at_rest(name):
     lengths = Dynamics(robot).cable_lengths(away, robot.carrier_home)
     hung = at_rest_with(robot, lengths, away, robot.carrier_home)
     np.testing.assert_allclose(Dynamics(robot).cable_lengths(hung, robot.carrier_home), lengths, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", available())
+def test_every_robot_of_the_library_opens_at_a_pose_that_tensions_inside_its_limits_hold(name):
+    robot = load(name)
+    pose = opening_pose(robot, Geometry(robot))
+    t = tensions(robot, pose).tensions
+    assert ((t >= robot.t_min * (1 - 1e-9)) & (t <= robot.t_max * (1 + 1e-9))).all()
+    held = robot.dof_mask.astype(bool)
+    wrench = Dynamics(robot).wrench_matrix(pose, robot.carrier_home) @ t
+    weight = Dynamics(robot).required_wrench(pose, np.zeros(6), np.zeros(6), robot.carrier_home)
+    np.testing.assert_allclose(wrench[held], np.asarray(weight)[held], atol=1e-5 * max(robot.weight, 1.0))
+
+
+@pytest.mark.parametrize("wire", ["fast"], indirect=True)
+def test_a_robot_that_cannot_rest_at_home_opens_level_above_it(wire):
+    """FAST balances only above 138 m, where its smallest tensions lift no more than its weight."""
+    robot = load("fast")
+    assert not tensions(robot, robot.home).feasible
+    settle(wire)
+    assert "optimal" in wire.readout()
+    np.testing.assert_allclose(pose(wire), [0, 0, 138, 0, 0, 0], atol=0.5)
+    wire.set(True, label="Home")
+    settle(wire)
+    assert "infeasible" in wire.readout()
+    np.testing.assert_array_equal(pose(wire), robot.home)
 
 
 def test_the_nearest_feasible_pose_is_on_the_edge_and_no_other_is_much_nearer():

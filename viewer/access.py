@@ -19,6 +19,8 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
+from .frames import add_script
+
 if TYPE_CHECKING:
     from websockets.datastructures import Headers
 
@@ -75,7 +77,10 @@ def guarded(listening: str) -> Iterator[list[bool]]:
 
 
 def _checked(answer: Callable[..., Any], listening: str) -> Callable[..., Any]:
-    """Return viser's `process_request` with the check before it, and headers that keep its page out of others."""
+    """Return viser's `process_request` with the check before it, and headers that keep its page out of others.
+
+    The page gets the script of `frames` too.
+    """
 
     def process_request(connection: Any, request: Any) -> Any:
         reason = refusal(request.headers, listening)
@@ -85,6 +90,7 @@ def _checked(answer: Callable[..., Any], listening: str) -> Callable[..., Any]:
         if response is not None:
             response.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
             response.headers["X-Content-Type-Options"] = "nosniff"
+            add_script(response)
         return response
 
     return process_request

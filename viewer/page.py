@@ -16,16 +16,13 @@ if TYPE_CHECKING:
     from ..models import Robot
     from .subject import Subject
 
-# The player has no events: its clock, the first input of the page, is read as often as the page plays.
+# Each frame of the scene is one of FRAMES, in order; `frames.ATOMIC` reports its number, from 1, before it is drawn.
 SCRIPT = """
 const box = document.querySelector("aside details"), all = (name) => box.querySelectorAll(".towline-" + name);
 if (innerWidth < innerHeight) box.open = false;
 let shown = 0;
-if (FRAMES.times.length > 1) setInterval(() => {
-  const clock = document.querySelector("input"), time = clock ? parseFloat(clock.value) : NaN;
-  if (!(time >= 0)) return;
-  let k = FRAMES.times.findIndex((at) => at > time + 1e-6);
-  k = k < 0 ? FRAMES.times.length - 1 : Math.max(k - 1, 0);
+if (FRAMES.clocks.length > 1) addEventListener("towline-instant", (event) => {
+  const k = event.detail - 1;
   if (k === shown) return;
   shown = k;
   all("status")[0].textContent = FRAMES.statuses[k];
@@ -35,7 +32,7 @@ if (FRAMES.times.length > 1) setInterval(() => {
     all("bar")[i].style.width = FRAMES.widths[k][i] + "%";
     all("bar")[i].style.background = FRAMES.colours[k][i];
   });
-}, 40);
+});
 """
 
 
@@ -84,9 +81,7 @@ def _data(robot: Robot, frames: list[Instant]) -> dict[str, Any]:
     """Return what the table of each frame has."""
     tensions = np.array([frame.tensions for frame in frames])
     places = place(tensions, robot.t_min, robot.t_max)
-    times = [0.0 if frame.time is None else frame.time - (frames[0].time or 0.0) for frame in frames]
     return {
-        "times": times,
         "clocks": [f"t = {frame.time or 0.0:.2f} s" for frame in frames],
         "statuses": [frame.status for frame in frames],
         "tensions": [[round(t, 2) if np.isfinite(t) else None for t in row] for row in tensions.tolist()],

@@ -12,6 +12,7 @@ from ..workspace.surface import Surface
 from ..workspace.surface import surface as surface_of
 from . import words
 from .film import film
+from .frames import Frames
 from .geometry import FARTHEST
 from .posing import Posing
 from .sliders import whole_steps
@@ -41,11 +42,12 @@ class Panel:
         self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
+        frames = Frames(server)
         self._gui.add_html(words.NARROW)
         if subject.replay is None:
-            self._posing = Posing(server, subject.robot, geometry, self._show, self._refuse)
+            self._posing = Posing(server, frames, subject.robot, geometry, self._show, self._refuse)
         else:
-            self._time_line = TimeLine(server, subject.replay, self._show, subject.other)
+            self._time_line = TimeLine(server, frames, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
@@ -135,11 +137,10 @@ class Panel:
         self._readout.content = words.refusal(reason)
 
     def _show(self, instant: Instant) -> None:
-        """Draw an instant in scene and panel, in one update, so that both agree in every frame."""
+        """Draw an instant in scene and panel."""
         other = self._subject.other_at(instant)
-        with self._server.atomic():
-            self._stage.show(instant, other)
-            self._readout.content = words.readout(instant, self._subject.robot, other)
+        self._stage.show(instant, other)
+        self._readout.content = words.readout(instant, self._subject.robot, other)
 
 
 def _send_picture(client: viser.ClientHandle | None, name: str) -> None:

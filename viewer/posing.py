@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import viser
 
     from ..models import Robot
+    from .frames import Frames
 
 HANDLE = 0.13  # of the robot's size
 NOTHING = "nothing"
@@ -36,6 +37,8 @@ class Posing:
     ----------
     server
         Its panel gets sliders, its scene handles.
+    frames
+        The marks of instants on it.
     robot, geometry
         The robot, and its geometry.
     show, refuse
@@ -45,17 +48,18 @@ class Posing:
     def __init__(
         self,
         server: viser.ViserServer,
+        frames: Frames,
         robot: Robot,
         geometry: Geometry,
         show: Callable[[Instant], None],
         refuse: Callable[[str], None],
     ):
-        self._server, self._robot, self._geometry = server, robot, geometry
+        self._server, self._frames, self._robot, self._geometry = server, frames, robot, geometry
         self._show, self._refuse = show, refuse
         self._dynamics, self._settings = Dynamics(robot), sliders(robot, geometry)
         self._busy, self._latest = threading.Lock(), 0
         self._home = home_at_rest(robot)
-        self._pose, self._carriers = self._home.copy(), robot.carrier_home.copy()
+        self._pose, self._carriers = opening_pose(robot, geometry), robot.carrier_home.copy()
         self._lengths = self._dynamics.cable_lengths(self._pose, self._carriers)
         gui: Any = server.gui
         owners = list(dict.fromkeys(setting.carrier for setting in self._settings))
@@ -78,7 +82,8 @@ class Posing:
             hint="Cables keep their lengths, and the platform comes to rest. Moving the platform sets their lengths.",
         )
         nearest = gui.add_button("Nearest feasible pose", disabled=few_cables(robot))
-        home = gui.add_button("Home")
+        moved = (self._pose != self._home).any()
+        home = gui.add_button("Home", hint="No tensions inside the limits hold the platform there." if moved else None)
         drag = gui.add_dropdown("drag", (*names.values(), NOTHING), initial_value=names[owners[0]])
         self._handles = {owner: self._handle(owner, owner == owners[0]) for owner in owners}
         for slider, setting in zip(self._sliders, self._settings, strict=True):
@@ -171,7 +176,7 @@ class Posing:
             except TowlineError as error:
                 refused = str(error)
             self._pose, self._carriers = pose.copy(), carriers.copy()
-            with self._server.atomic():
+            with self._frames.instant():
                 for slider, setting in zip(self._sliders, self._settings, strict=True):
                     if slider is not held or self._hang.value:
                         slider.value = self._value(setting)
@@ -211,6 +216,18 @@ class Posing:
 def few_cables(robot: Robot) -> bool:
     """Return whether the cables leave some motion of the platform free, so that it can rest only at certain poses."""
     return robot.m < int(robot.dof_mask.sum()) and robot.weight > 0
+
+
+def opening_pose(robot: Robot, geometry: Geometry) -> np.ndarray:
+    """Return the pose (6,) at which a view opens: that of `home_at_rest`, or the feasible pose nearest to it.
+
+    If the search finds no feasible pose, it is that of `home_at_rest`.
+    """
+    home = home_at_rest(robot)
+    if few_cables(robot):
+        return home
+    found = nearest_feasible(robot, StaticEquilibrium(), home, robot.carrier_home, geometry.extent.size)
+    return home if found is None else found
 
 
 def home_at_rest(robot: Robot) -> np.ndarray:

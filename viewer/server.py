@@ -18,11 +18,12 @@ from ..base.quiet import quiet
 from ..base.writing import whole_file
 from ..models import Dynamics
 from .access import guarded
+from .frames import Frames, with_script
 from .geometry import Geometry
 from .instant import at_rest
 from .page import aside, camera
 from .panel import Panel
-from .posing import home_at_rest
+from .posing import opening_pose
 from .stage import ALONG, Stage
 from .subject import Subject
 
@@ -80,7 +81,8 @@ def _served(subject: Subject, host: str, port: int) -> Iterator[str]:
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     """Write a subject as one HTML file that loads nothing and needs no server; a failure leaves no partial file.
 
-    A plan plays; a robot is shown at home with its tensions, with the points of its workspace if there are any.
+    A plan plays; a robot is shown with its tensions at home, or at the feasible pose nearest to it, and with the points
+    of its workspace if there are any.
 
     Parameters
     ----------
@@ -110,15 +112,18 @@ def _page(subject: Subject) -> str:
         replay = subject.replay
         if replay is None:
             robot = subject.robot
-            frames = [at_rest(Dynamics(robot), geometry, home_at_rest(robot), robot.carrier_home)]
+            frames = [at_rest(Dynamics(robot), geometry, opening_pose(robot, geometry), robot.carrier_home)]
         else:
             frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
-        stage.show(frames[0], subject.other_at(frames[0]))
+        marks = Frames(server)
+        with marks.instant():
+            stage.show(frames[0], subject.other_at(frames[0]))
         recording = server.get_scene_serializer()
         for before, instant in pairwise(frames):
             recording.insert_sleep((instant.time or 0.0) - (before.time or 0.0))
-            stage.show(instant, subject.other_at(instant))
-        document = recording.as_html()
+            with marks.instant():
+                stage.show(instant, subject.other_at(instant))
+        document = with_script(recording.as_html())
     finally:
         _stop(server)
     title = escape(subject.title)

@@ -15,6 +15,7 @@ from .instant import Instant
 if TYPE_CHECKING:
     import viser
 
+    from .frames import Frames
     from .replay import Replay
 
 RATE = 25.0  # [1/s] of playing
@@ -29,6 +30,8 @@ class TimeLine:
     ----------
     server
         Its panel gets the controls, its command palette the keys.
+    frames
+        The marks of instants on it.
     replay
         The motion to play.
     show
@@ -38,9 +41,14 @@ class TimeLine:
     """
 
     def __init__(
-        self, server: viser.ViserServer, replay: Replay, show: Callable[[Instant], None], other: Replay | None = None
+        self,
+        server: viser.ViserServer,
+        frames: Frames,
+        replay: Replay,
+        show: Callable[[Instant], None],
+        other: Replay | None = None,
     ):
-        self._server, self._replay, self._show = server, replay, show
+        self._frames, self._replay, self._show = frames, replay, show
         self._playing, self._closed, self._busy = threading.Event(), threading.Event(), threading.Lock()
         self._index = -1
         gui: Any = server.gui
@@ -101,7 +109,7 @@ class TimeLine:
                 return
             index = min(max(index, 0), len(self._replay.times) - 1)
             instant = self._replay.at(index)
-            with self._server.atomic():
+            with self._frames.instant():
                 self._now.value = float(self._replay.times[index]) if at is None else at
                 if index != self._index:
                     self._index = index

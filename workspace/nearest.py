@@ -42,6 +42,8 @@ def nearest_feasible(
         return np.linalg.norm((poses - pose)[:, free] / unit[free], axis=1)
 
     directions = rng.normal(size=(SCATTERED, 6)) * unit
+    # Half of them keep the attitude: far away, random turns are large, and few platforms permit these.
+    directions[::2, 3:] = 0.0
     directions /= np.linalg.norm(directions[:, free] / unit[free], axis=1, keepdims=True)
     reach = size * np.geomspace(NEAREST, 1.0, SCATTERED)[:, None]
     best = holding(np.vstack([pose, robot.home, pose + reach * directions]))[:1]
@@ -50,6 +52,7 @@ def nearest_feasible(
     spread = float(distances(best)[0])
     for _ in range(ROUNDS):
         near = best + spread * rng.normal(size=(AROUND, 6)) / np.sqrt(free.sum()) * unit
+        near[::2, 3:] = best[:, 3:]
         best = holding(np.vstack([best, near]))[:1]
         # The end of the line is `best` but for rounding, which may be too much for a thin feasible set.
         best = holding(np.vstack([best, pose + np.linspace(0.0, 1.0, BETWEEN)[:, None] * (best - pose)]))[:1]

@@ -1,0 +1,22 @@
+"""A headless Chromium that draws in software; tests that import this are skipped where there is none."""
+
+import contextlib
+import shutil
+
+import pytest
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+if CHROMIUM is None:
+    pytest.skip("no browser is installed; to run these: apt-get install chromium", allow_module_level=True)
+playwright = pytest.importorskip("playwright.sync_api", reason="to run these: pip install playwright")
+
+PATIENCE = 30_000  # [ms] drawing is in software here
+WEBGL = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@contextlib.contextmanager
+def chromium():
+    with playwright.sync_playwright() as started:
+        opened = started.chromium.launch(executable_path=CHROMIUM, args=list(WEBGL))
+        yield opened
+        opened.close()
