@@ -254,7 +254,7 @@ class ComputedTorque(Controller):
             raise InputError(f"state must be a State, got {shown(state)}")
         if not isinstance(reference, Reference):
             raise InputError(f"reference must be a Reference, got {shown(reference)}")
-        if not isinstance(time, Real) or not abs(time) <= LATEST:
+        if isinstance(time, np.timedelta64) or not isinstance(time, Real) or not abs(time) <= LATEST:
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
         rows = 1 if np.ndim(state.pose) == 1 else len(state.pose)
         if rows != len(self._wanted):

@@ -68,7 +68,7 @@ def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_uses_the_public_interface(path):
     """Notebooks import the front door, and modules that the README names; they store nothing of this machine."""
-    packages = ("control", "models", "models.statics", "solvers", "workspace")
+    packages = ("control", "estimation", "models", "solvers", "statics.equilibria", "workspace")
     allowed = {"towline", *(f"towline.{package}" for package in packages)}
     text = path.read_text()
     assert set(re.findall(r"from (towline[\w.]*) import", text)) <= allowed

@@ -15,7 +15,7 @@ from towline.ocp import MotionStatus, Task, plan, read_task
 from towline.ocp.audits.audit import audit
 from towline.ocp.audits.excess import Excess
 from towline.ocp.audits.violation import relative_violation
-from towline.ocp.search.search import search
+from towline.ocp.search import search
 from towline.ocp.tasks.deviation import Deviation
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.paths import CirclePath, LinePath, RestPath, SamplePath, WaypointPath

@@ -11,8 +11,8 @@ from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan, time_along
 from towline.ocp.audits.cost import cost
 from towline.ocp.proofs.durations import durations
-from towline.ocp.search.search.start import deviation_from
-from towline.ocp.search.search.time_law import fastest
+from towline.ocp.search.start import deviation_from
+from towline.ocp.search.time_law import fastest
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 from towline.solvers import capacity_margin

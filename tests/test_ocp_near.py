@@ -10,7 +10,7 @@ from towline.ocp.nlp.near import Near, is_local
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.planner import Planner
-from towline.ocp.search.search import search
+from towline.ocp.search import search
 
 PLATFORM = {"platform": 0.05, "cables": None, "carriers": None}
 BALL = {"kind": "sphere", "name": "ball", "centre": [0.32, 0.12, 1.2], "radius": 0.25, **PLATFORM}

@@ -8,7 +8,7 @@ import pytest
 from towline.models import load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
-from towline.ocp.search.search import relaxations
+from towline.ocp.search import relaxations
 
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}

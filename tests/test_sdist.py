@@ -96,7 +96,7 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     assert {name for name in files if name.endswith(".py")} == modules
     robots = {name for name in tracked if re.fullmatch(r"models/library/[^/]*\.(yaml|json)", name)}
     assert len(robots) > 20
-    step = {name for name in tracked if name.startswith("embedded/template/")} | {
+    step = {name for name in tracked if name.startswith("export/step/template/")} | {
         "benchmarks/step_rows.c",
         "benchmarks/step_distribution.c",
         "benchmarks/step_osqp.c",
