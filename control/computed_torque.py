@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from math import ceil
 from numbers import Real
 from typing import Any
 
@@ -23,7 +24,7 @@ from .authority import uncontrolled
 from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command
 from .controller import Controller
-from .machine import mechanics, thrusts
+from .machine import mechanics, move_on, thrusts
 from .mechanics import (
     CARRIERS,
     DISTURBANCE,
@@ -32,6 +33,7 @@ from .mechanics import (
     IS_CUT,
     KD,
     KI,
+    KNOWN,
     KP,
     LAST,
     MEASURED,
@@ -39,8 +41,10 @@ from .mechanics import (
     OBSERVER,
     PULLS,
     SOMETHING,
+    THEN,
     WINCHES,
 )
+from .pending import Pending
 from .reference import Reference
 from .state import State
 from .tension_loop import TensionLoop
@@ -50,7 +54,9 @@ __all__ = ["ComputedTorque", "positive", "reach_of"]
 
 SLOW = 20.0  # [rad/s], see `mechanics.know`
 SHORTEST_LAG = 0.005  # [s]
+ROUNDING = 1e-9  # [s]
 LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
+OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
 
@@ -202,7 +208,11 @@ class ComputedTorque(Controller):
     def _begin(self, rows: int) -> None:
         """Make the memory of one robot, or of as many as a batch has rows."""
         m, count = self.robot.m, len(self.robot.carriers)
-        self._time: float | None = None
+        self._time = self._first = None
+        self._seen, self._commanded = 0.0, Pending(2 * OLDEST)
+        self._commanded.reset(rows * m)
+        self._accelerations = np.zeros((rows, count, 6))  # of carriers, as ordered last
+        self._of_now = np.zeros((0, 1 + count, 12))
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
         self._pulls, self._integrates = np.zeros((rows, PULLS, m)), np.ones(rows, dtype=bool)
         self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
@@ -213,7 +223,7 @@ class ComputedTorque(Controller):
         self._others = np.zeros((rows, count, OTHERS, 3))
         self._problems = InPlace(rows, 6, m, self.robot.length)
         self._heard = np.zeros((rows, HEARD, m))
-        given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._heard)
+        given = (self._wanted, self._problems.t_ref, self._pulls, self._heard)
         results = (self._carriers, self._problems.A, self._problems.w, self._problems.bounds)
         self._arrays = (*given, self._integrates, self._memory, self._reactions, *results)
         if self._loop is not None:
@@ -265,9 +275,48 @@ class ComputedTorque(Controller):
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
         self._take(state, reference)
-        mechanics()(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
+        since, late = self._move_on(float(time), state, dt)
+        settings = self._robot, self._gains, self._limits, self._reach, self._patience
+        mechanics()(*settings, dt, since, late, self._measured, *self._arrays)
+        self._first = float(time) if self._time is None else self._first
         self._time, self._elapsed = float(time), dt
         return dt
+
+    def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray]:
+        """Make the measured state that of now; return how long after the last it was measured [s], and itself if late.
+
+        The observers compare it as it was measured: with one that is predicted they would correct what they predict,
+        and be unstable from the inverse of their bandwidth on.
+        """
+        pulls, measured = self._pulls, self._measured
+        seen = time if state.time is None else state.time
+        if not isinstance(seen, Real) or not -LATEST <= seen <= time + ROUNDING:
+            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
+        age, since = time - float(seen), 0.0 if self._time is None else float(seen) - self._seen
+        otherwise, self._seen = pulls[:, KNOWN] - pulls[:, THEN], float(seen)
+        first = dt > 0 and self._time == self._first  # whose command is taken for that of the time before
+        for lasted in (OLDEST, dt) if first else (dt,):
+            self._commanded.add(pulls[:, LAST].ravel())
+            self._commanded.wait(lasted)
+        if age <= ROUNDING and since == dt:
+            pulls[:, THEN] = pulls[:, LAST]
+        elif dt > 0:
+            window = since if since > 0 else dt
+            pulls[:, THEN] = self._commanded.means(age + window, 1, window).reshape(len(pulls), -1)
+        if not self._senses:
+            pulls[:, MEASURED] = pulls[:, THEN]
+        if age <= ROUNDING:
+            return since, self._of_now
+        late = measured.copy()
+        if age > OLDEST:
+            measured[:] = np.nan
+        else:
+            parts = ceil(age / PART)
+            tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
+            disturbance = np.ascontiguousarray(self._memory[:, DISTURBANCE])
+            given = disturbance, np.maximum(tensions, 0.0), self._accelerations, measured
+            move_on()(self._robot, age / parts, *given)
+        return since, late
 
     def _command(
         self,
@@ -288,6 +337,7 @@ class ComputedTorque(Controller):
                 stay_inside(own, *self._boxes)
             own = own[0] if alone else own
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
+        self._accelerations[:] = carriers[2]
         actuation = None
         if self._flies:
             given = self._measured, self._carriers, tensions, self._pulls, self._held, self._others
@@ -307,7 +357,7 @@ class ComputedTorque(Controller):
         if self._loop is None:
             return wanted
         reports = self._pulls[:, MEASURED] if self._senses else None
-        return self._loop.sent(self._elapsed, wanted, reports, self.cut)
+        return self._loop.sent(self._elapsed, wanted, self._pulls[:, THEN], reports, self.cut)
 
     def _take(self, state: State, reference: Reference) -> None:
         """Copy a state and a reference to where the kernel reads them."""
@@ -321,7 +371,8 @@ class ComputedTorque(Controller):
                     self._carriers[:, :, order] = reference[3 + order]
             self._problems.t_ref[:] = 0.0 if reference.tensions is None else reference.tensions
             self._senses = state.tensions is not None
-            pulls[:, MEASURED] = pulls[:, LAST] if state.tensions is None else state.tensions
+            if self._senses:
+                pulls[:, MEASURED] = state.tensions
         except (ValueError, TypeError):
             raise InputError(self._misfit(state, reference)) from None
 
@@ -330,6 +381,8 @@ class ComputedTorque(Controller):
         m, count = self.robot.m, len(self.robot.carriers)
         for given in (state, reference):
             for name, value in given._asdict().items():
+                if name == "time":
+                    continue
                 core = (m,) if name == "tensions" else (count, 6) if name.startswith("carrier") else (6,)
                 shape = np.shape(value) if value is not None else core
                 if shape[-len(core) :] != core or shape[: -len(core)] not in ((), (len(self._wanted),)):

@@ -62,7 +62,7 @@ class Predictive(ComputedTorque):
 
     The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. Where a tenth
     of the weight is left unexplained, in the mean of some 50 ms, or there is no solution for that long, or noise of the
-    velocity asks for more tension than there is room for, or carriers turn too late (see `Turning`), this
+    velocity requires more tension than limits permit, or carriers turn too late (see `Turning`), this
     `ComputedTorque` controls the robot until `reset` ("not as modelled"). It does from the start, with a warning, where
     the loop is unstable at home with carriers that turn before they accelerate: with cables that begin below their CoM.
 
@@ -207,7 +207,7 @@ class Predictive(ComputedTorque):
         return A[0], B[0]
 
     def _ripple(self) -> np.ndarray | None:
-        """Return tensions that unit rates ask for, over the room for tensions at home, (m, 6) [s/m]."""
+        """Return tensions that unit rates require, over their distance from limits at home, (m, 6) [s/m]."""
         low, high = self._limits[LOWEST], self._limits[HIGHEST]
         best = tensions_at(self.robot, self.robot.home, method="largest-margin")
         if best.tensions is None:
@@ -308,6 +308,7 @@ class Predictive(ComputedTorque):
     def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
         """Let another controller of the same robot know what one has sent as if it were its own."""
         other._pulls[:, LAST], other._held = sender._pulls[:, LAST], sender._held
+        other._accelerations[:] = sender._accelerations
 
     @property
     @override

@@ -62,7 +62,7 @@ def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensio
     tensions
         (N, m) [N], as commanded.
     pulls
-        (N, 3, m), whose row KNOWN has the tensions since the last step [N].
+        (N, 4, m), whose row KNOWN has the tensions since the last step [N].
     given
         (N, c, a), the actuators' commands since then.
     memory
