@@ -48,7 +48,8 @@ from .pending import Pending
 from .reference import Reference
 from .state import State
 from .tension_loop import TensionLoop
-from .thrusts import OTHER, OTHERS
+from .thrusts import OTHER, OTHERS, TURN, TURNS
+from .turning import Turning
 
 __all__ = ["ComputedTorque", "positive", "reach_of"]
 
@@ -97,7 +98,8 @@ class ComputedTorque(Controller):
     carrier_bandwidth, carrier_acceleration
         Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
-        Bandwidths of the loops of flying carriers [rad/s], see `thrusts`.
+        Bandwidths of the loops of flying carriers [rad/s], see `thrusts`. Where carriers turn so late after their
+        orders that the attitude loop would be unstable (see `Turning`), it goes on with the inverse of that lag.
     patience
         How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
         others do without it. It is commanded its least tension then, and counts again once it reports some. Cables of a
@@ -173,6 +175,7 @@ class ComputedTorque(Controller):
         self._moves_carriers = self._flies or len(self._reach) > 0
         if self._flies:
             thrusts()
+        self._turning = Turning(self._loops[1]) if self._flies else None
         self._begin(1)
 
     @override
@@ -220,6 +223,10 @@ class ComputedTorque(Controller):
         self._carriers = np.zeros((rows, count if self._moves_carriers else 0, 3, 6))
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
+        self._stable, self._lags = np.tile(self._loops, (rows, 1)), np.zeros(rows)
+        self._ordered = np.zeros((rows, count, 3))
+        if self._turning is not None:
+            self._turning.reset()
         self._others = np.zeros((rows, count, OTHERS, 3))
         self._problems = InPlace(rows, 6, m, self.robot.length)
         self._heard = np.zeros((rows, HEARD, m))
@@ -341,16 +348,27 @@ class ComputedTorque(Controller):
         actuation = None
         if self._flies:
             given = self._measured, self._carriers, tensions, self._pulls, self._held, self._others
-            thrusts()(self._robot, self._loops, self._inverses, self._forces, self._elapsed, *given, self._actuation)
+            thrusts()(self._robot, self._stable, self._inverses, self._forces, self._elapsed, *given, self._actuation)
             # A state that is no state leaves its actuators as they were.
             inside = np.clip(self._actuation, *self._actuators)
             actuation = self._held = np.where(np.isfinite(inside), inside, self._held)
+            self._slow_down()
         tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
             return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)
         pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
+
+    def _slow_down(self) -> None:
+        """Lower the bandwidth of attitudes where carriers turn too late for it."""
+        if self._turning is not None:
+            self._lags = self._turning.lag(self._elapsed, self._ordered, self._others[:, :, TURNS])
+            if self._lags.any():
+                longest = np.maximum(self._lags, 1.0 / self._loops[1])
+                self._stable[:, 1] = np.minimum(self._stable[:, 1], 1.0 / longest)
+        inside = (self._actuation == self._held).all(axis=2, keepdims=True)
+        self._ordered = np.where(inside, self._others[:, :, TURN], np.nan)
 
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
         """Return what winches are sent so that tensions are as wanted, (N, m) [N]."""

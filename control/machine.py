@@ -24,7 +24,7 @@ _OF_ROWS = (
 )
 _OF_AGE = f"void({_ROBOT}, float64, float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 _OF_THRUSTS = (
-    f"void({_ROBOT}, float64[::1], float64[:, :, ::1], float64[:, :, ::1], float64, float64[:, :, ::1], "
+    f"void({_ROBOT}, float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64, float64[:, :, ::1], "
     "float64[:, :, :, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, :, ::1], "
     "float64[:, :, ::1])"
 )

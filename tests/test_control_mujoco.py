@@ -6,8 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from towline import simulate
 from towline.benchmarks.control_mujoco import TEAMS, WINCHES, Task, cogiro, fly, team, wang_flying
-from towline.control import ANSWERS, ComputedTorque, Predictive
+from towline.benchmarks.mujoco_plant import Hardware
+from towline.control import ANSWERS, ComputedTorque, Predictive, Reference
 from towline.control.turning import Turning
+from towline.distribution import tensions
 from towline.models import Robot, load
 
 OTHERWISE, SOFT = ANSWERS.index("not as modelled"), ANSWERS.index("soft wrench")
@@ -148,7 +150,7 @@ def test_the_lag_of_rotors_is_measured(lag, delay, found):
         bend = order if lag == 0 else bend + (1 - np.exp(-dt / lag)) * (order - bend)
         rate = rate + dt * bend
         measured.append(rate + 1e-2 * rng.normal(size=(2, 3)))
-    results = [turning.lag(dt, orders[k], measured[k]) for k in range(400)]
+    results = [turning.lag(dt, orders[None, k], measured[k][None])[0] for k in range(400)]
     assert results[-1] == pytest.approx(found, rel=0.1)
     assert found or not any(results[200:])
 
@@ -164,6 +166,21 @@ def test_rotors_that_are_too_late_are_reported_before_they_do_harm(load_on_three
             measured = float(controller.handed_over.reason.split(" ms of 50")[0].split()[-1])
             assert controller.handed_over.time < 0.25
             assert measured == pytest.approx(60, rel=0.2)
+
+
+def test_an_attitude_loop_is_slowed_down_before_late_rotors_make_it_unstable():
+    """A team at rest in gusts, which 40 rad/s leave 128 mm off after 1.5 s, and growing: 40 x 60 ms are more than 2."""
+    pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
+    robot = load("multi-quadrotor-3")
+    still = np.zeros_like(robot.carrier_home)
+    pulls = tensions(robot, robot.home, method="soft-wrench").tensions
+    rest = Reference(robot.home, *np.zeros((2, 6)), robot.carrier_home, still, still, pulls)
+    task = Task(robot, [rest] * 1500, None, Hardware(stiffness=2e4, damping=50.0), (2, 1.5, 0.3), 1.0, 0.1)
+    controller = ComputedTorque(robot)
+    assert fly(task, controller, **TEAMS["rotor lag 60 ms"]).error.max() < 0.05
+    assert controller._stable[0, 1] < 28
+    fly(shorter(task, 500), controller, **TEAMS["rotor lag 30 ms"])
+    assert controller._stable[0, 1] == 40
 
 
 def hooked_below(depth):
