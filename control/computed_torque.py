@@ -211,7 +211,8 @@ class ComputedTorque(Controller):
     def _begin(self, rows: int) -> None:
         """Make the memory of one robot, or of as many as a batch has rows."""
         m, count = self.robot.m, len(self.robot.carriers)
-        self._time = self._first = None
+        self._time: float | None = None
+        self._first: float | None = None  # time of the first step
         self._seen, self._commanded = 0.0, Pending(2 * OLDEST)
         self._commanded.reset(rows * m)
         self._accelerations = np.zeros((rows, count, 6))  # of carriers, as ordered last
