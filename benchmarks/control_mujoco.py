@@ -143,12 +143,23 @@ WINCHES = {
     "gain 0.9, no tension sensor": {"gain": 0.9, "sensor": None},
     "sensor reads 0.9": {"sensor": 0.9},
     "50 Hz, 30 ms late": {"held": 0.02, "delay": 0.03},
+    "delay 5 ms, with times": {"delay": 0.005, "stamped": True},
+    "50 Hz, 30 ms late, with times": {"held": 0.02, "delay": 0.03, "stamped": True},
 }
 ALL = {"mass": 1.1, "delay": 0.005, "friction": 1.0, "resolution": (1e-4, 2e-4)}
 WINCHES |= {
     "all, source": {**ALL, "lag": 0.02},
     "all, winch loop": {**ALL, "winch": "loop", "lag": 0.02, "stretch": 0.8},
     "all, source, no tension sensor": {**ALL, "lag": 0.02, "sensor": None},
+    "no encoder, winch loop, gain 0.9, with times": {
+        **ALL,
+        "resolution": (0.0, 0.0),
+        "winch": "loop",
+        "lag": 0.02,
+        "stretch": 0.8,
+        "gain": 0.9,
+        "stamped": True,
+    },
     "length winch": {"winch": "lengths", "lag": 0.02},
 }
 TEAMS = {
@@ -159,6 +170,7 @@ TEAMS = {
     "load +50 %": {"mass": 1.5},
     "delay 5 ms": {"delay": 0.005},
     "delay 20 ms": {"delay": 0.02},
+    "delay 20 ms, with times": {"delay": 0.02, "stamped": True},
     "mocap 1 mm": {"noise": (1e-3, 1e-3)},
     "sensor reads 0.9": {"sensor": 0.9},
     "wind on quadrotors": {"air_of_carriers": 0.02},

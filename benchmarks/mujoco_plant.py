@@ -54,6 +54,8 @@ class Hardware:
         What a tension sensor reports over what pulls; None without sensors.
     delay, held
         How late all sensors are [s], and how long each report is held [s].
+    stamped
+        Whether reports come with the time at which they were made.
     resolution
         Of the measured position [m] and attitude [rad]: steps, with the rates as differences over 10 ms; zeros: exact.
     noise
@@ -75,6 +77,7 @@ class Hardware:
     sensor: float | None = 1.0
     delay: float = 0.0
     held: float = 0.0
+    stamped: bool = False
     resolution: tuple[float, float] = (0.0, 0.0)
     noise: tuple[float, float] = (0.0, 0.0)
     rotor_lag: float = 0.0
@@ -122,9 +125,9 @@ class World:
         self._started, self._time = False, 0.0
         self.pulls = self._pull.copy()  # mean of the last period at the platform [N]
         self._rng = np.random.default_rng([seed, 11])
-        self._reports: deque[tuple[np.ndarray, np.ndarray]] = deque()
+        self._reports: deque[tuple[np.ndarray, np.ndarray, float]] = deque()
         self._window: deque[np.ndarray] = deque(maxlen=max(2, round(0.01 / period) + 1))
-        self._kept: tuple[np.ndarray, np.ndarray] | None = None
+        self._kept: tuple[np.ndarray, np.ndarray, float] | None = None
         self._next = 0.0
 
     def _put(self, body: int, motion: np.ndarray) -> None:
@@ -177,7 +180,7 @@ class World:
                 change[3:] -= 2 * np.pi * np.rint(change[3:] / (2 * np.pi))
                 motion[0, 6:] = change / (self._period * (len(self._window) - 1))
         pulls = self.pulls * (1.0 if has.sensor is None else has.sensor)
-        self._reports.append((motion, pulls.copy()))
+        self._reports.append((motion, pulls.copy(), self._time))
         late = round(has.delay / self._period)
         while len(self._reports) > late + 1:
             self._reports.popleft()
@@ -186,10 +189,10 @@ class World:
             if self._kept is None or self._time >= self._next - 1e-9:
                 self._kept, self._next = report, self._time + has.held
             report = self._kept
-        motion, pulls = report
+        motion, pulls, made = report
         return State(
             motion[0, :6].copy(), motion[0, 6:].copy(), motion[1:, :6].copy(), motion[1:, 6:].copy(),
-            None if has.sensor is None else pulls.copy(),
+            None if has.sensor is None else pulls.copy(), made if has.stamped else None,
         )  # fmt: skip
 
     def run(self, command: Command, wrench: np.ndarray, forces: np.ndarray | None = None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from math import ceil
 from numbers import Real
 from typing import Any
 
@@ -23,7 +24,7 @@ from .authority import uncontrolled
 from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command
 from .controller import Controller
-from .machine import mechanics, thrusts
+from .machine import mechanics, move_on, thrusts
 from .mechanics import (
     CARRIERS,
     DISTURBANCE,
@@ -32,6 +33,7 @@ from .mechanics import (
     IS_CUT,
     KD,
     KI,
+    KNOWN,
     KP,
     LAST,
     MEASURED,
@@ -39,18 +41,23 @@ from .mechanics import (
     OBSERVER,
     PULLS,
     SOMETHING,
+    THEN,
     WINCHES,
 )
+from .pending import Pending
 from .reference import Reference
 from .state import State
 from .tension_loop import TensionLoop
-from .thrusts import OTHER, OTHERS
+from .thrusts import OTHER, OTHERS, TURN, TURNS
+from .turning import Turning
 
 __all__ = ["ComputedTorque", "positive", "reach_of"]
 
 SLOW = 20.0  # [rad/s], see `mechanics.know`
 SHORTEST_LAG = 0.005  # [s]
+ROUNDING = 1e-9  # [s]
 LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
+OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
 
@@ -91,7 +98,8 @@ class ComputedTorque(Controller):
     carrier_bandwidth, carrier_acceleration
         Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
-        Bandwidths of the loops of flying carriers [rad/s], see `thrusts`.
+        Bandwidths of the loops of flying carriers [rad/s], see `thrusts`. Where carriers turn so late after their
+        orders that the attitude loop would be unstable (see `Turning`), it goes on with the inverse of that lag.
     patience
         How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
         others do without it. It is commanded its least tension then, and counts again once it reports some. Cables of a
@@ -167,6 +175,7 @@ class ComputedTorque(Controller):
         self._moves_carriers = self._flies or len(self._reach) > 0
         if self._flies:
             thrusts()
+        self._turning = Turning(self._loops[1]) if self._flies else None
         self._begin(1)
 
     @override
@@ -203,6 +212,11 @@ class ComputedTorque(Controller):
         """Make the memory of one robot, or of as many as a batch has rows."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
+        self._first: float | None = None  # time of the first step
+        self._seen, self._commanded = 0.0, Pending(2 * OLDEST)
+        self._commanded.reset(rows * m)
+        self._accelerations = np.zeros((rows, count, 6))  # of carriers, as ordered last
+        self._of_now = np.zeros((0, 1 + count, 12))
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
         self._pulls, self._integrates = np.zeros((rows, PULLS, m)), np.ones(rows, dtype=bool)
         self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
@@ -210,10 +224,14 @@ class ComputedTorque(Controller):
         self._carriers = np.zeros((rows, count if self._moves_carriers else 0, 3, 6))
         self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
         self._held = np.zeros_like(self._actuation)
+        self._stable, self._lags = np.tile(self._loops, (rows, 1)), np.zeros(rows)
+        self._ordered = np.zeros((rows, count, 3))
+        if self._turning is not None:
+            self._turning.reset()
         self._others = np.zeros((rows, count, OTHERS, 3))
         self._problems = InPlace(rows, 6, m, self.robot.length)
         self._heard = np.zeros((rows, HEARD, m))
-        given = (self._measured, self._wanted, self._problems.t_ref, self._pulls, self._heard)
+        given = (self._wanted, self._problems.t_ref, self._pulls, self._heard)
         results = (self._carriers, self._problems.A, self._problems.w, self._problems.bounds)
         self._arrays = (*given, self._integrates, self._memory, self._reactions, *results)
         if self._loop is not None:
@@ -265,9 +283,48 @@ class ComputedTorque(Controller):
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
         self._take(state, reference)
-        mechanics()(self._robot, self._gains, self._limits, self._reach, self._patience, dt, *self._arrays)
+        since, late = self._move_on(float(time), state, dt)
+        settings = self._robot, self._gains, self._limits, self._reach, self._patience
+        mechanics()(*settings, dt, since, late, self._measured, *self._arrays)
+        self._first = float(time) if self._time is None else self._first
         self._time, self._elapsed = float(time), dt
         return dt
+
+    def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray]:
+        """Make the measured state that of now; return how long after the last it was measured [s], and itself if late.
+
+        The observers compare it as it was measured: with one that is predicted they would correct what they predict,
+        and be unstable from the inverse of their bandwidth on.
+        """
+        pulls, measured = self._pulls, self._measured
+        seen = time if state.time is None else state.time
+        if not isinstance(seen, Real) or not -LATEST <= seen <= time + ROUNDING:
+            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
+        age, since = time - float(seen), 0.0 if self._time is None else float(seen) - self._seen
+        otherwise, self._seen = pulls[:, KNOWN] - pulls[:, THEN], float(seen)
+        first = dt > 0 and self._time == self._first  # whose command is taken for that of the time before
+        for lasted in (OLDEST, dt) if first else (dt,):
+            self._commanded.add(pulls[:, LAST].ravel())
+            self._commanded.wait(lasted)
+        if age <= ROUNDING and since == dt:
+            pulls[:, THEN] = pulls[:, LAST]
+        elif dt > 0:
+            window = since if since > 0 else dt
+            pulls[:, THEN] = self._commanded.means(age + window, 1, window).reshape(len(pulls), -1)
+        if not self._senses:
+            pulls[:, MEASURED] = pulls[:, THEN]
+        if age <= ROUNDING:
+            return since, self._of_now
+        late = measured.copy()
+        if age > OLDEST:
+            measured[:] = np.nan
+        else:
+            parts = ceil(age / PART)
+            tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
+            disturbance = np.ascontiguousarray(self._memory[:, DISTURBANCE])
+            given = disturbance, np.maximum(tensions, 0.0), self._accelerations, measured
+            move_on()(self._robot, age / parts, *given)
+        return since, late
 
     def _command(
         self,
@@ -288,13 +345,15 @@ class ComputedTorque(Controller):
                 stay_inside(own, *self._boxes)
             own = own[0] if alone else own
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
+        self._accelerations[:] = carriers[2]
         actuation = None
         if self._flies:
             given = self._measured, self._carriers, tensions, self._pulls, self._held, self._others
-            thrusts()(self._robot, self._loops, self._inverses, self._forces, self._elapsed, *given, self._actuation)
+            thrusts()(self._robot, self._stable, self._inverses, self._forces, self._elapsed, *given, self._actuation)
             # A state that is no state leaves its actuators as they were.
             inside = np.clip(self._actuation, *self._actuators)
             actuation = self._held = np.where(np.isfinite(inside), inside, self._held)
+            self._slow_down()
         tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
@@ -302,12 +361,22 @@ class ComputedTorque(Controller):
         pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
 
+    def _slow_down(self) -> None:
+        """Lower the bandwidth of attitudes where carriers turn too late for it."""
+        if self._turning is not None:
+            self._lags = self._turning.lag(self._elapsed, self._ordered, self._others[:, :, TURNS])
+            if self._lags.any():
+                longest = np.maximum(self._lags, 1.0 / self._loops[1])
+                self._stable[:, 1] = np.minimum(self._stable[:, 1], 1.0 / longest)
+        inside = (self._actuation == self._held).all(axis=2, keepdims=True)
+        self._ordered = np.where(inside, self._others[:, :, TURN], np.nan)
+
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
         """Return what winches are sent so that tensions are as wanted, (N, m) [N]."""
         if self._loop is None:
             return wanted
         reports = self._pulls[:, MEASURED] if self._senses else None
-        return self._loop.sent(self._elapsed, wanted, reports, self.cut)
+        return self._loop.sent(self._elapsed, wanted, self._pulls[:, THEN], reports, self.cut)
 
     def _take(self, state: State, reference: Reference) -> None:
         """Copy a state and a reference to where the kernel reads them."""
@@ -321,7 +390,8 @@ class ComputedTorque(Controller):
                     self._carriers[:, :, order] = reference[3 + order]
             self._problems.t_ref[:] = 0.0 if reference.tensions is None else reference.tensions
             self._senses = state.tensions is not None
-            pulls[:, MEASURED] = pulls[:, LAST] if state.tensions is None else state.tensions
+            if self._senses:
+                pulls[:, MEASURED] = state.tensions
         except (ValueError, TypeError):
             raise InputError(self._misfit(state, reference)) from None
 
@@ -330,6 +400,8 @@ class ComputedTorque(Controller):
         m, count = self.robot.m, len(self.robot.carriers)
         for given in (state, reference):
             for name, value in given._asdict().items():
+                if name == "time":
+                    continue
                 core = (m,) if name == "tensions" else (count, 6) if name.startswith("carrier") else (6,)
                 shape = np.shape(value) if value is not None else core
                 if shape[-len(core) :] != core or shape[: -len(core)] not in ((), (len(self._wanted),)):

@@ -9,7 +9,7 @@ from ..base.machine_code.kernel import Kernel, compile_function
 from ..plant import machine
 from ..plant.machine import joined
 
-__all__ = ["aim", "carriers_of", "directions", "mechanics", "stages", "thrusts"]
+__all__ = ["aim", "carriers_of", "directions", "mechanics", "move_on", "stages", "thrusts"]
 
 _PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
 _SHARED = tuple(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines"))
@@ -17,12 +17,14 @@ _MECHANICS = (*_SHARED, _HERE / "reaction.py", _HERE / "mechanics.py")
 _TETHERS = (*_MECHANICS, _HERE / "tethers.py")
 _ROBOT = "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1]))"
 _OF_ROWS = (
-    f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64[:, :, ::1], "
-    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], boolean[::1], float64[:, :, ::1], "
+    f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, "
+    "float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], "
+    "boolean[::1], float64[:, :, ::1], "
     "float64[:, :, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
+_OF_AGE = f"void({_ROBOT}, float64, float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 _OF_THRUSTS = (
-    f"void({_ROBOT}, float64[::1], float64[:, :, ::1], float64[:, :, ::1], float64, float64[:, :, ::1], "
+    f"void({_ROBOT}, float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64, float64[:, :, ::1], "
     "float64[:, :, :, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, :, ::1], "
     "float64[:, :, ::1])"
 )
@@ -42,6 +44,12 @@ _OF_CARRIERS = f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, :, 
 def mechanics() -> Kernel:
     """Return `mechanics.write_rows` as machine code; compiling takes some seconds once on a machine."""
     return _compiled(_MECHANICS, "write_rows", _OF_ROWS)
+
+
+@cache
+def move_on() -> Kernel:
+    """Return `ageing.move_on` as machine code; compiling takes some seconds once on a machine."""
+    return _compiled((*_TETHERS, _HERE / "prediction.py", _HERE / "ageing.py"), "move_on", _OF_AGE)
 
 
 @cache

@@ -43,9 +43,9 @@ LOWEST, HIGHEST, RATE_MAX = 0, 1, 2
 SOMETHING = 1e-3
 # No sensor reports more [m, rad, m/s, rad/s, N]; beyond, squares would fill the memory with infinities.
 LARGEST = 1e9
-# Rows of `pulls`: tensions since the last step, by sensors or else as commanded, the last command, and what of the
-# first the observers know.
-MEASURED, LAST, KNOWN, PULLS = 0, 1, 2, 3
+# Rows of `pulls`: tensions until the state was measured, by sensors or else as commanded, the last command, what of the
+# first the observers know, and what was commanded until then.
+MEASURED, LAST, KNOWN, THEN, PULLS = 0, 1, 2, 3, 4
 # Rows of `heard`: tension reported and tension commanded, smoothed, 1 for a cable that counts as cut, and by how much
 # the report exceeds the command in the long run. It counts as cut once it reports less than `LITTLE` of what it is
 # commanded, which takes the patience if it reports nothing. It counts again once it reports `ENOUGH` of the little that
@@ -63,6 +63,8 @@ def write_rows(
     reach,
     patience,
     dt,
+    since,
+    late,
     measured,
     reference,
     t_ref,
@@ -96,14 +98,19 @@ def write_rows(
         For how long a cable may report no tension where one is commanded until it counts as cut [s]; inf: for ever.
     dt
         Time since the last step [s]; 0 in the first one, which starts the memory and has no bounds by rates.
+    since
+        Time between the measurement of the last state and that of this one [s].
+    late
+        (N, 1 + c, 12), pose and velocity of the platform and of each carrier when they were measured, which the
+        observer compares; (0, 1 + c, 12): now.
     measured
-        (N, 1 + c, 12), pose and velocity of the platform and of each carrier.
+        (N, 1 + c, 12), the same now.
     reference
         (N, 18), pose, velocity and acceleration of the platform.
     t_ref
         (N, m), tensions to stay near [N].
     pulls
-        (N, 3, m), rows MEASURED, LAST and KNOWN [N]; the last of them is written.
+        (N, 4, m), rows MEASURED, LAST, KNOWN and THEN [N]; KNOWN is written.
     heard
         (N, 4, m), rows REPORTED and COMMANDED [N], IS_CUT, and EXCESS [N].
     integrates
@@ -117,24 +124,24 @@ def write_rows(
     """
     bodies, cables, settings, mask = robot
     count, m = bodies.shape[0], cables.shape[0]
-    places = BODY * count
-    state, wanted, momentum = np.zeros(places + CABLE_BLOCKS * m), np.zeros(6), np.zeros(6)
+    state, wanted, momentum = np.zeros(BODY * count + CABLE_BLOCKS * m), np.zeros(6), np.zeros(6)
     missing = np.zeros(6)
     command = np.zeros(COMMANDS + m + CARRIER * count)
     on_bodies, on_cables = np.zeros((count, BODY_WORK)), np.zeros((m, CABLE_WORK))
     columns, gram = np.zeros((6 * reach.shape[0], 6)), np.zeros((6, 7))
-    spare = np.zeros_like(on_bodies), np.zeros_like(on_cables), np.zeros((6, m)), np.zeros(12), np.zeros(6)
+    spare = np.zeros_like(on_bodies), np.zeros_like(on_cables), np.zeros((6, m)), np.zeros((count, 12)), np.zeros(6)
     at_reference = np.zeros_like(state), command, *spare
     for row in range(measured.shape[0]):
         write_bounds(limits, gains[CARRIERS, WINCHES], patience, dt, pulls[row], heard[row], bounds[:, row])
         usable = is_usable(measured[row], reference[row], pulls[row], t_ref[row], carriers[row])
+        if usable and late.shape[0] > 0 and (since > 0.0 or dt == 0.0):
+            put_measured(robot, late[row], state, command, on_bodies, on_cables, A[row])
+            write_wrench(bodies, settings, state, wanted, late[row, 0], on_bodies, w[row], momentum)
+            usable = is_finite(A[row])
+            if usable:
+                observe(settings, mask, gains, since, A[row], pulls[row, KNOWN], momentum, memory[row])
         if usable:
-            for b in range(count):
-                put_body(state, BODY * b, measured[row, b])
-            place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
-            move_to_com(settings, state, on_bodies)
-            run_cables(cables, state, on_bodies, on_cables, places)
-            write_wrench_matrix(mask, on_cables, A[row])
+            put_measured(robot, measured[row], state, command, on_bodies, on_cables, A[row])
             usable = is_finite(A[row])
         if not usable:
             for k in range(6):
@@ -151,7 +158,8 @@ def write_rows(
             wanted[k] = reference[row, 12 + k] + gains[KP, k] * error + gains[KI, k] * memory[row, INTEGRAL, k]
             wanted[k] += gains[KD, k] * (reference[row, 6 + k] - measured[row, 0, 6 + k])
         write_wrench(bodies, settings, state, wanted, measured[row, 0], on_bodies, w[row], momentum)
-        observe(settings, mask, gains, dt, A[row], pulls[row, KNOWN], momentum, memory[row])
+        if late.shape[0] == 0:
+            observe(settings, mask, gains, since, A[row], pulls[row, KNOWN], momentum, memory[row])
         for k in range(6):
             w[row, k] = mask[k] * (w[row, k] - memory[row, DISTURBANCE, k])
         if reach.shape[0] > 0:
@@ -170,14 +178,25 @@ def write_rows(
             )  # fmt: skip
 
 
+def put_measured(robot, measured, state, command, on_bodies, on_cables, A):
+    """Put bodies and cables where they are measured, (1 + c, 12), and write the wrench matrix."""
+    bodies, cables, settings, mask = robot
+    for b in range(bodies.shape[0]):
+        put_body(state, BODY * b, measured[b])
+    place_bodies(bodies, command, state, state, on_bodies, cables.shape[0], 0.0)
+    move_to_com(settings, state, on_bodies)
+    run_cables(cables, state, on_bodies, on_cables, BODY * bodies.shape[0])
+    write_wrench_matrix(mask, on_cables, A)
+
+
 def planned_disturbance(robot, reference, carriers, t_ref, work, missing):
     """Write the wrench that the planned motion needs less the one of its tensions, (6,), or zeros without tensions.
 
     It is what the plan knows of wind, and what the tensions of a plan that has none in their limits miss.
     """
-    bodies, cables, settings, _ = robot
-    state, command, on_bodies, on_cables, A, motion, momentum = work
-    m, planned = cables.shape[0], False
+    bodies, _, settings, _ = robot
+    state, command, on_bodies, on_cables, A, motions, momentum = work
+    m, planned = A.shape[1], False
     for i in range(m):
         planned |= t_ref[i] != 0.0
     for k in range(6):
@@ -186,13 +205,9 @@ def planned_disturbance(robot, reference, carriers, t_ref, work, missing):
         return
     for b in range(bodies.shape[0]):
         for k in range(6):
-            motion[k] = reference[k] if b == 0 else carriers[b - 1, 0, k]
-            motion[6 + k] = reference[6 + k] if b == 0 else carriers[b - 1, 1, k]
-        put_body(state, BODY * b, motion)
-    place_bodies(bodies, command, state, state, on_bodies, m, 0.0)
-    move_to_com(settings, state, on_bodies)
-    run_cables(cables, state, on_bodies, on_cables, BODY * bodies.shape[0])
-    write_wrench_matrix(robot[3], on_cables, A)
+            motions[b, k] = reference[k] if b == 0 else carriers[b - 1, 0, k]
+            motions[b, 6 + k] = reference[6 + k] if b == 0 else carriers[b - 1, 1, k]
+    put_measured(robot, motions, state, command, on_bodies, on_cables, A)
     write_wrench(bodies, settings, state, reference[12:], reference, on_bodies, missing, momentum)
     for k in range(6):
         for i in range(m):
@@ -205,7 +220,7 @@ def write_bounds(limits, slow, patience, dt, pulls, heard, bounds):
         step, last, highest = limits[RATE_MAX, i] * dt, pulls[LAST, i], limits[HIGHEST, i]
         if abs(pulls[MEASURED, i]) <= LARGEST:
             little = max(limits[LOWEST, i], SOMETHING * highest)
-            hear(dt / patience, pulls[MEASURED, i], last, little, highest, heard, i)
+            hear(dt / patience, pulls[MEASURED, i], pulls[THEN, i], little, highest, heard, i)
             know(slow * dt, pulls, heard, i)
         if heard[IS_CUT, i] == 1.0:
             bounds[0, i] = bounds[1, i] = 0.0
@@ -240,7 +255,7 @@ def know(share, pulls, heard, i):
     if heard[IS_CUT, i] == 1.0:
         heard[EXCESS, i] = 0.0
     else:
-        heard[EXCESS, i] += min(share, 1.0) * (pulls[MEASURED, i] - pulls[LAST, i] - heard[EXCESS, i])
+        heard[EXCESS, i] += min(share, 1.0) * (pulls[MEASURED, i] - pulls[THEN, i] - heard[EXCESS, i])
     pulls[KNOWN, i] = pulls[MEASURED, i] - heard[EXCESS, i]
 
 

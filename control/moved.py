@@ -166,7 +166,9 @@ class Flown(Freed):
     """
 
     def __init__(self, reach: np.ndarray, strongest: float, delay: float, stage: float):
-        self._pending = Pending(round(delay / stage), stage)
+        late = round(delay / stage)
+        self._under_way = late * stage, late, stage
+        self._pending = Pending(delay + stage)
         super().__init__(reach, strongest)
 
     @override
@@ -184,7 +186,7 @@ class Flown(Freed):
 
     @override
     def under_way(self) -> np.ndarray:
-        return self._pending.means()
+        return self._pending.means(*self._under_way)
 
     @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
@@ -204,7 +206,9 @@ class Tethered:
         self.freed = np.zeros((0, 2), dtype=np.int64)
         self.tethers = _tethers(robot)
         self.count, self._robot = coordinates_of(self.tethers), arrays
-        self._pending = Pending(round(delay / stage), stage)
+        late = round(delay / stage)
+        self._under_way = late * stage, late, stage
+        self._pending = Pending(delay + stage)
         self._directions, self._carriers_of = directions(), carriers_of()
         self.reset()
 
@@ -231,7 +235,7 @@ class Tethered:
 
     def under_way(self) -> np.ndarray:
         """Return the accelerations of the stages that earlier commands decide, (d, f), less the reference's."""
-        return self._pending.means()
+        return self._pending.means(*self._under_way)
 
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         """Write how carriers should move, (c, 3, 6), with accelerations (f,) and the platform's (6,)."""

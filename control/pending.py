@@ -1,4 +1,4 @@
-"""`Pending`: accelerations that are commanded and not there yet."""
+"""`Pending`: commands that have not come true yet, or that no report has shown yet."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ __all__ = ["Pending"]
 
 
 class Pending:
-    """Remember commands for as long as they take to come true, a number of stages."""
+    """Remember commands for `kept` [s]."""
 
-    def __init__(self, late: int, stage: float):
-        self._late, self._stage = late, stage
+    def __init__(self, kept: float):
+        self._kept = kept
         self.reset(0)
 
     def reset(self, count: int) -> None:
-        """Forget all commands, of accelerations in `count` coordinates."""
+        """Forget all commands, of `count` numbers each."""
         self._time, self._count = 0.0, count
         self._commands: deque[tuple[float, np.ndarray]] = deque()
 
@@ -25,20 +25,23 @@ class Pending:
         """Let `dt` [s] pass."""
         self._time += dt
 
-    def add(self, acceleration: np.ndarray) -> None:
-        """Command accelerations, (f,), from now on."""
-        self._commands.append((self._time, acceleration.copy()))
-
-    def means(self) -> np.ndarray:
-        """Return the mean accelerations in each stage from now on, (late, f); zeros for what was not commanded."""
-        result, commands = np.zeros((self._late, self._count)), self._commands
-        first = self._time - self._late * self._stage
-        while len(commands) > 1 and commands[1][0] <= first:
+    def add(self, command: np.ndarray) -> None:
+        """Command numbers, (count,), from now on."""
+        commands = self._commands
+        commands.append((self._time, command.copy()))
+        while len(commands) > 1 and commands[1][0] <= self._time - self._kept:
             commands.popleft()
+
+    def means(self, ago: float, parts: int, part: float) -> np.ndarray:
+        """Return mean commands, (parts, count), in parts of `part` [s], from `ago` [s] before now on.
+
+        What was not commanded is zero.
+        """
+        result, commands = np.zeros((parts, self._count)), self._commands
         if commands:
             begins, values = np.array([each[0] for each in commands]), np.array([each[1] for each in commands])
             ends = np.append(begins[1:], self._time)
-            low = first + self._stage * np.arange(self._late)[:, None]
-            overlap = np.minimum(ends, low + self._stage) - np.maximum(begins, low)
-            result = np.maximum(overlap, 0.0) @ values / self._stage
+            low = self._time - ago + part * np.arange(parts)[:, None]
+            overlap = np.minimum(ends, low + part) - np.maximum(begins, low)
+            result = np.maximum(overlap, 0.0) @ values / part
         return result

@@ -30,8 +30,6 @@ from .reference import Reference
 from .stability import grows
 from .state import State
 from .surroundings import Surroundings
-from .thrusts import TURN, TURNS
-from .turning import Turning
 from .watch import LATE, UNSTABLE, HandOver, Watch
 from .weights import CORRECTING, PATIENT, STILL, tensions_of, terminal, weights
 
@@ -62,7 +60,7 @@ class Predictive(ComputedTorque):
 
     The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. Where a tenth
     of the weight is left unexplained, in the mean of some 50 ms, or there is no solution for that long, or noise of the
-    velocity asks for more tension than there is room for, or carriers turn too late (see `Turning`), this
+    velocity requires more tension than limits permit, or carriers turn too late (see `Turning`), this
     `ComputedTorque` controls the robot until `reset` ("not as modelled"). It does from the start, with a warning, where
     the loop is unstable at home with carriers that turn before they accelerate: with cables that begin below their CoM.
 
@@ -182,7 +180,6 @@ class Predictive(ComputedTorque):
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
         usual = self.robot.force_scale / self.robot.platform.mass
         self._watch = Watch(scale, usual, None if correct else self._ripple())
-        self._turning = Turning(self._loops[1]) if flies.any() else None
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
         self._has_winches, self._none = the_robot.fixed_lengths is None, np.zeros(self.robot.m)
         self._from_the_start: HandOver | None = None
@@ -207,7 +204,7 @@ class Predictive(ComputedTorque):
         return A[0], B[0]
 
     def _ripple(self) -> np.ndarray | None:
-        """Return tensions that unit rates ask for, over the room for tensions at home, (m, 6) [s/m]."""
+        """Return tensions that unit rates require, over their distance from limits at home, (m, 6) [s/m]."""
         low, high = self._limits[LOWEST], self._limits[HIGHEST]
         best = tensions_at(self.robot, self.robot.home, method="largest-margin")
         if best.tensions is None:
@@ -221,9 +218,6 @@ class Predictive(ComputedTorque):
         super().reset()
         self._beside.reset()
         self._watch.reset()
-        if self._turning is not None:
-            self._turning.reset()
-            self._ordered = np.zeros((len(self.robot.carriers), 3))
         self.handed_over = self._from_the_start
         count, n, u = self._sizes
         self._guess = np.zeros((count + 1, n)), np.zeros((count, u))
@@ -265,6 +259,7 @@ class Predictive(ComputedTorque):
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
         if self.handed_over is None:
             self._compare(time, dt, reference)
+        self._beside._turning = None if self.handed_over is None else self._turning  # of the orders that are sent
         beside = self._beside.step(time, state, reference)
         unexplained = np.array(self._watch.unexplained)
         if self.handed_over is not None:
@@ -282,11 +277,8 @@ class Predictive(ComputedTorque):
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(reference, tensions, answered, proof, alone=True)
         self._agree(self, self._beside)
-        if self._turning is not None and self.handed_over is None:
-            if lag := self._turning.lag(dt, self._ordered, self._others[0, :, TURNS]):
-                self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._loops[1]:.0f}")
-            inside = (self._actuation[0] == self._held[0]).all(axis=1, keepdims=True)
-            self._ordered = np.where(inside, self._others[0, :, TURN], np.nan)
+        if lag := self._lags[0]:
+            self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._loops[1]:.0f}")
         return command._replace(unexplained=unexplained)
 
     def _compare(self, time: float, dt: float, reference: Reference) -> None:
@@ -308,6 +300,8 @@ class Predictive(ComputedTorque):
     def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
         """Let another controller of the same robot know what one has sent as if it were its own."""
         other._pulls[:, LAST], other._held = sender._pulls[:, LAST], sender._held
+        other._accelerations[:], other._stable[:, 1] = sender._accelerations, sender._stable[:, 1]
+        other._ordered = sender._ordered
 
     @property
     @override

@@ -22,6 +22,9 @@ class State(NamedTuple):
         The same of each carrier, (..., c, 6).
     tensions
         Measured tensions [N], (..., m); None if the robot has no sensors for them.
+    time
+        When all of it was measured, on the clock of the steps [s]; default: now. The controllers of towline move an
+        older state on to the time of their step, with the commands that were sent since.
     """
 
     pose: np.ndarray
@@ -29,5 +32,6 @@ class State(NamedTuple):
     carrier_pose: np.ndarray
     carrier_velocity: np.ndarray
     tensions: np.ndarray | None = None
+    time: float | None = None
 
     __repr__ = record

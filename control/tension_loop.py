@@ -27,33 +27,38 @@ class TensionLoop:
     def __init__(self, bandwidth: float, lag: float, lowest: np.ndarray, highest: np.ndarray, fastest: np.ndarray):
         self._bandwidth, self._lag, self._fastest = bandwidth, lag, fastest
         self._lowest, self._highest = lowest, highest
-        self._wanted: np.ndarray | None = None
+        self.reset()
 
     def reset(self) -> None:
         """Forget all earlier steps."""
-        self._wanted = None
+        self._sent: np.ndarray | None = None
 
-    def sent(self, dt: float, wanted: np.ndarray, measured: np.ndarray | None, cut: np.ndarray) -> np.ndarray:
+    def sent(
+        self, dt: float, wanted: np.ndarray, before: np.ndarray, measured: np.ndarray | None, cut: np.ndarray
+    ) -> np.ndarray:
         """Return the tensions to send, (N, m) [N].
 
         Parameters
         ----------
         dt
             Time since the last step [s].
-        wanted, measured
-            Tensions, (N, m) [N]; those that are no numbers, and None, change nothing.
+        wanted
+            Tensions from now on, (N, m) [N].
+        before, measured
+            Tensions that were wanted when those were measured, (N, m) [N], and these; those that are no numbers, and
+            None, change nothing.
         cut
             Where cables count as cut, (N, m): these are sent what is wanted.
         """
-        if self._wanted is None:
-            self._wanted = self._late = self._sent = wanted.copy()
+        if self._sent is None:
+            self._late = self._sent = wanted.copy()
             self._more = np.zeros_like(wanted)
-        self._late = self._late + (1.0 - np.exp(-dt / self._lag)) * (self._wanted - self._late)
+        self._late = self._late + (1.0 - np.exp(-dt / self._lag)) * (before - self._late)
         if measured is not None:
             lacking = np.where(np.isfinite(measured), self._late - measured, 0.0)
             self._more = self._more + min(self._bandwidth * dt, 1.0) * lacking
         room = self._fastest * dt if dt > 0 else np.inf
         sent = np.clip(wanted + self._more, self._sent - room, self._sent + room)
         sent = np.where(cut, wanted, np.clip(sent, self._lowest, self._highest))
-        self._more, self._wanted, self._sent = sent - wanted, wanted.copy(), sent
+        self._more, self._sent = sent - wanted, sent
         return sent.copy()

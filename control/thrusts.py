@@ -48,7 +48,7 @@ def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensio
     robot
         As for `mechanics.write_rows`.
     gains
-        (3,), bandwidths of place, attitude and the estimate of d [rad/s].
+        (N, 3), bandwidths of place, attitude and the estimate of d [rad/s].
     inverses
         (c, a, 6), commands of the actuators for a force and a moment in the carrier's axes; zeros for carriers without.
     forces
@@ -62,7 +62,7 @@ def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensio
     tensions
         (N, m) [N], as commanded.
     pulls
-        (N, 3, m), whose row KNOWN has the tensions since the last step [N].
+        (N, 4, m), whose row KNOWN has the tensions since the last step [N].
     given
         (N, c, a), the actuators' commands since then.
     memory
@@ -86,11 +86,11 @@ def write_thrusts(robot, gains, inverses, forces, dt, measured, carriers, tensio
             if np.any(inverses[c] != 0.0):
                 if is_measured(measured[row], pulls[row]):
                     observe_carrier(
-                        bodies[1 + c, MASS], settings, gains[2], dt, on_bodies[1 + c], on_cables, cables, c,
+                        bodies[1 + c, MASS], settings, gains[row, 2], dt, on_bodies[1 + c], on_cables, cables, c,
                         measured[row, 1 + c], pulls[row, KNOWN], forces[c], given[row, c], memory[row, c],
                     )  # fmt: skip
                 wrench_of_carrier(
-                    bodies[1 + c], settings, gains, state, BODY * (1 + c), on_bodies[1 + c], cables, on_cables, c,
+                    bodies[1 + c], settings, gains[row], state, BODY * (1 + c), on_bodies[1 + c], cables, on_cables, c,
                     measured[row, 1 + c], carriers[row, c], tensions[row], memory[row, c], wrench,
                 )  # fmt: skip
                 for a in range(inverses.shape[1]):

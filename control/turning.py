@@ -1,4 +1,4 @@
-"""`Turning`: whether flying carriers turn as late as makes their attitude loop unstable."""
+"""`Turning`: whether flying carriers turn as late as makes their attitude loop unstable, and how late."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ __all__ = ["Turning"]
 
 LATE = 1.5  # over the bandwidth: a lag of 2 is where the loop gets unstable
 WINDOW = 0.05  # [s], in which orders and rates are compared
+FASTEST = 1e4  # [rad/s]: nothing turns faster
 SEEN = 0.01  # [rad]: what the lag makes of a carrier's attitude until it is believed
 
 
@@ -23,7 +24,7 @@ class Turning:
 
         tau = <x - r, dr/dt> / <dr/dt, dr/dt>
 
-    of all carriers and axes, where a lag of 1 / h before gives derivatives, and keeps vibrations away.
+    of all carriers and axes of a robot, where a lag of 1 / h before gives derivatives, and keeps vibrations away.
 
     Parameters
     ----------
@@ -40,24 +41,22 @@ class Turning:
         """Forget all earlier steps."""
         self._before: np.ndarray | None = None
 
-    def lag(self, dt: float, ordered: np.ndarray, rates: np.ndarray) -> float:
-        """Return the lag of carriers that are too late, `dt` [s] after the last step, else 0 [s].
+    def lag(self, dt: float, ordered: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        """Return the lag of carriers that are too late, `dt` [s] after the last step, else 0, (N,) [s].
 
         Parameters
         ----------
         ordered
-            Angular accelerations since that step in the carriers' axes, (c, 3) [rad/s^2]; nan where actuators were at
-            their limits, which starts the comparison of that carrier again.
+            Angular accelerations since that step in the carriers' axes, (N, c, 3) [rad/s^2]; nan where actuators were
+            at their limits, which starts the comparison of that carrier again, as rates do that are no numbers.
         rates
-            Measured now, (c, 3) [rad/s].
+            Measured now, (N, c, 3) [rad/s].
         """
-        if not np.isfinite(rates).all():
-            self._before = None
-            return 0.0
+        rates = np.where(np.abs(rates) <= FASTEST, rates, np.nan)
         if self._before is None or dt > WINDOW:
             self._before, self._motions = rates.copy(), np.zeros((3, *rates.shape))
-            self._along = self._square = 0.0
-            return 0.0
+            self._along, self._square = np.zeros((2, len(rates)))
+            return np.zeros(len(rates))
         exact, x, r = self._motions
         share, slow = 1.0 - np.exp(-self._bandwidth * dt), dt / WINDOW
         exact += dt * ordered - slow * exact
@@ -65,11 +64,11 @@ class Turning:
         change = rates - self._before - r
         x += share * (exact - x)
         r += share * change
-        again = np.isnan(x)
+        again = ~np.isfinite(x + r)
         if again.any():
             self._motions[:, again], self._before[again], change[again] = 0.0, rates[again], 0.0
         change *= self._bandwidth  # dr/dt
-        self._along += slow * (np.vdot(x - r, change) - self._along)
-        self._square += slow * (np.vdot(change, change) - self._square)
-        late = self._along > self._late * self._square and self._square > self._least
-        return float(self._along / self._square) if late else 0.0
+        self._along += slow * (((x - r) * change).sum(axis=(1, 2)) - self._along)
+        self._square += slow * ((change * change).sum(axis=(1, 2)) - self._square)
+        late = (self._along > self._late * self._square) & (self._square > self._least)
+        return np.where(late, self._along / np.maximum(self._square, self._least), 0.0)

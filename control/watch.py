@@ -13,7 +13,7 @@ __all__ = ["LATE", "UNSTABLE", "HandOver", "Watch"]
 BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and permitted
 UNSTABLE = "small errors at home grow with predictions, whose model has no carriers that turn before they accelerate"
 LATE = "carriers turn nearly as late after their orders as makes their attitude loop unstable"
-LOUD = "noise of its measured rates asks for more than tensions have room for: lower bandwidth and observer"
+LOUD = "noise of its measured rates requires more than the limits of tensions permit: lower bandwidth and observer"
 WINDOW = 0.05  # [s], in which a motion is compared
 QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
 OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off
@@ -54,9 +54,9 @@ class Watch:
         Acceleration that the robot's scale of forces gives its platform [m/s^2]: `BOUND` times it is permitted, and a
         step without any solution counts as it.
     ripple
-        Tensions that are commanded for unit rates of the pose, over the room that tensions have inside their limits,
+        Tensions that are commanded for unit rates of the pose, over how far tensions are from their limits,
         (m, 6) [s/m, s/rad]. Noise of the rates makes commands that limits cut off, on one side more than on the other,
-        and `OFTEN` standard deviations that have no room are a reason to hand over. Default: no noise is.
+        and `OFTEN` standard deviations beyond the limits are a reason to hand over. Default: whatever the noise.
     """
 
     def __init__(self, scale: np.ndarray, usual: float, ripple: np.ndarray | None = None):

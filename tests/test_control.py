@@ -6,8 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.benchmarks.control_steps import random_steps
-from towline.control import ANSWERS, ComputedTorque, OpenLoop, Reference, State, mechanics
+from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Reference, State, mechanics
 from towline.control.computed_torque import reach_of
+from towline.control.machine import move_on
 from towline.control.reaction import write_columns
 from towline.control.tension_loop import TensionLoop
 from towline.models import Dynamics, load
@@ -112,6 +113,66 @@ def test_a_row_of_a_batch_is_answered_as_it_is_alone():
         assert batch.answered[3] == single.answered
 
 
+def test_a_state_of_earlier_is_moved_on_as_the_plant_moves():
+    """Over 20 ms in which tensions jump, a carrier accelerates, and a push is known: 1 mm off as it was, 1 um moved."""
+    robot, age = load("wang-flying"), 0.02
+    plant, rng = Plant(robot, drive="tensions"), np.random.default_rng(4)
+    at_rest = distribute(robot, robot.home).tensions
+    push, bend = np.array([1.0, -2, 0.5, 0.1, 0.05, -0.1]), np.array([[3.0, -2, 1, 0, 0, 0]])
+    velocity = np.array([0.5, -0.3, 0.1, 0.2, -0.1, 0.3])
+    state = plant.start(robot.home, velocity, robot.carrier_home, 0 * bend, tensions=at_rest)
+    commanded = at_rest * rng.uniform(0.5, 2.0, (2, 6))
+    for k, pulls in enumerate(commanded):
+        late = 0.01 * k
+        moved = robot.carrier_home + late**2 / 2 * bend, late * bend, bend
+        state = plant.run(state, plant.command(pulls, None, *moved, wrench=push)[None], 0.01).states[-1]
+    now = plant.read(state)
+    measured = np.zeros((1, 2, 12))
+    measured[0, 0], measured[0, 1, :6] = np.append(robot.home, velocity), robot.carrier_home
+    was = measured.copy()
+    parts = np.repeat(commanded, 10, axis=0)[:, None]
+    move_on()(ComputedTorque(robot)._robot, age / 20, push[None], parts, bend[None], measured)
+    exact = np.concatenate([[np.append(now.pose, now.velocity)], np.hstack([now.carrier_pose, now.carrier_velocity])])
+    np.testing.assert_allclose(measured[0, :, :6], exact[:, :6], atol=1e-6)
+    np.testing.assert_allclose(measured[0, :, 6:], exact[:, 6:], atol=1e-3)
+    assert np.abs(was[0, :, :3] - exact[:, :3]).max() > 1e-3
+
+
+@pytest.mark.parametrize("law", [ComputedTorque, Predictive])
+def test_observers_are_stable_beyond_the_age_at_which_predicted_states_would_upset_them(law):
+    """A push that is there at once, and states 40 ms old: K x age is 2.4 with the gains of `Predictive`."""
+    robot, period = load("cogiro"), 1e-3
+
+    class Late(law):
+        def reset(self):
+            super().reset()
+            self.states = []
+
+        def step(self, time, state, reference):
+            self.states.append(state._replace(time=time))
+            return super().step(time, self.states[max(len(self.states) - 41, 0)], reference)
+
+    push = np.array([0.02 * robot.weight, 0, 0, 0, 0, 0])
+    flight = simulate(robot, robot.home, Late(robot), duration=1.5, period=period, disturbance=push)
+    assert flight.error[-200:].max() < 1e-4 < flight.error.max()
+    assert flight.answered["as planned"] == 1500
+
+
+def test_times_of_states():
+    robot = load("cogiro")
+    state, reference = at_home(robot)
+    off = state._replace(pose=robot.home + 1e-3)
+    now, stamped = ComputedTorque(robot), ComputedTorque(robot)
+    for k in range(3):
+        one, other = now.step(1e-3 * k, off, reference), stamped.step(1e-3 * k, off._replace(time=1e-3 * k), reference)
+        np.testing.assert_array_equal(one.tensions, other.tensions)
+    with pytest.raises(InputError, match=r"state.time must be a number up to the step's time, 0.003 s, got 1"):
+        now.step(3e-3, state._replace(time=1.0), reference)
+    dead = stamped.step(0.5, off._replace(time=2e-3), reference)
+    assert ANSWERS[dead.answered] == "hold"
+    np.testing.assert_array_equal(dead.tensions, np.clip(np.zeros(robot.m), robot.t_min, robot.t_max))
+
+
 def test_an_error_decays_as_the_bandwidth_says():
     """A critically damped error: e(t) = e_0 (1 + w t) exp(-w t)."""
     robot = load("cogiro")
@@ -187,12 +248,12 @@ def test_the_tension_loop_stands_still_at_limits_and_for_cables_that_are_cut():
     loop = TensionLoop(20.0, 0.005, low, high, np.full(2, np.inf))
     wanted, pulls = np.array([[10.0, 10.0]]), np.array([[10.0, 10.0]])
     for _ in range(1000):
-        pulls = 0.9 * loop.sent(1e-3, wanted, pulls, none)
+        pulls = 0.9 * loop.sent(1e-3, wanted, wanted, pulls, none)
     np.testing.assert_allclose(pulls, [[10.0, 0.9 * 10.5]], rtol=1e-6)
-    lower = loop.sent(1e-3, wanted - 5.0, pulls, none)  # nothing has wound up beyond the limit
+    lower = loop.sent(1e-3, wanted - 5.0, wanted, pulls, none)  # nothing has wound up beyond the limit
     assert lower[0, 1] == pytest.approx(5.5, abs=0.02)  # one step on
-    np.testing.assert_array_equal(loop.sent(1e-3, wanted, pulls, np.array([[True, False]]))[0, 0], 10.0)
-    np.testing.assert_array_equal(loop.sent(1e-3, wanted, np.full((1, 2), np.nan), none)[0, 0], 10.0)
+    np.testing.assert_array_equal(loop.sent(1e-3, wanted, wanted - 5.0, pulls, np.array([[True, False]]))[0, 0], 10.0)
+    np.testing.assert_array_equal(loop.sent(1e-3, wanted, wanted, np.full((1, 2), np.nan), none)[0, 0], 10.0)
 
 
 @pytest.mark.parametrize("name", ["multi-quadrotor-3", "multi-quadrotor-4", "wang-ctmrts"])

@@ -6,6 +6,7 @@ import pytest
 from towline.control import (
     ComputedTorque,
     Predictive,
+    ageing,
     aiming,
     computed_torque,
     mechanics,
@@ -21,6 +22,7 @@ from towline.simulation import flying, orders, sensors, simulate, winding
 
 PLAIN = [
     (computed_torque, "mechanics", mechanics.write_rows),
+    (computed_torque, "move_on", ageing.move_on),
     (computed_torque, "thrusts", thrusts.write_thrusts),
     (predictive, "write_stages", prediction.write_stages),
     (predictive, "aim", aiming.aim),
@@ -45,10 +47,15 @@ FLIGHTS = [
 def test_a_flight_in_python_is_that_of_machine_code(monkeypatch, name, law, steps):
     robot = load(name)
     wind = None if robot.platform.aero is None else (2, 1, 0)
+
+    class Late(law):
+        def step(self, time, state, reference):
+            return super().step(time, state._replace(time=max(time - 1e-3, 0.0)), reference)
+
     noise = {"position": 1e-3, "attitude": 1e-3, "velocity": 1e-2, "tension": 0.1}
 
     def fly():
-        given = {"controller": law(robot), "wind": wind, "noise": noise, "duration": 1e-3 * steps, "substeps": 2}
+        given = {"controller": Late(robot), "wind": wind, "noise": noise, "duration": 1e-3 * steps, "substeps": 2}
         motions = simulate(robot, robot.home, **given).trajectory
         return [motions[part].to_numpy() for part in ("pose", "velocity", "tensions", "cable_lengths", "carrier_pose")]
 
