@@ -63,11 +63,15 @@ def values(robot: Robot, names: Iterable[str]) -> np.ndarray:
     InputError
         If `names` is no list of names, or the robot has no such number.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
+    try:
+        listed = None if isinstance(names, str) else list(names)
+    except Exception:  # not iterable, as an array of CasADi is, which has `__iter__`
+        listed = None
+    if listed is None:
         raise InputError(f"names must be a list of names of a robot's numbers, got {shown(names)}")
     radii = robot.pulley_radii[:, None]
     numbers = {"anchor": robot.anchors, "attachment": robot.attachments, "radius": radii}
-    places = (_place(robot, "names", name) for name in names)
+    places = (_place(robot, "names", name) for name in listed)
     return np.array([numbers[place.part][place.cable, place.axis] for place in places])  # (p,)
 
 
