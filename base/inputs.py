@@ -86,7 +86,10 @@ def one_of(name: str, value: object, accepted: Collection[str]) -> str:
 
 def file_path(name: str, value: object, accepted: str = "a path") -> Path:
     """Return a text or path-like object as a path, or raise InputError; `accepted` is what the message names."""
-    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    try:
+        text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    except Exception:  # of a class of the user's
+        text = None
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"{name} must be {accepted}, got {shown(value)}")
     return Path(text)

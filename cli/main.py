@@ -41,6 +41,7 @@ COMMANDS = {
 }
 MODULES = {"import": "import_"}  # where the module is not named like the command
 TRACEBACK = "TOWLINE_TRACEBACK"  # environment variable: show the traceback of an error in towline itself
+LONGEST = 1000  # characters of a message; the lists of robots and of keys are long
 CLOSED = 141  # 128 and SIGPIPE, as of the tools that this signal ends
 COMPLETION = "_TOWLINE_COMPLETE"  # environment variable: the shell completes a line, and Typer ends the process
 UsageError = typer.BadParameter.__bases__[0]  # the base of all that Typer reports about a command line
@@ -145,8 +146,13 @@ def _report(error: BaseException) -> int:
     else:
         code = 3
         message = f"an error in towline itself: {type(error).__name__}: {error} ({TRACEBACK}=1 shows where)"
+    line = " ".join(message.split())
+    if len(line) > LONGEST or not line.isprintable():  # Typer repeats arguments as they were given
+        from ..inputs import printable
+
+        line = printable(line, LONGEST)
     try:
-        typer.echo(f"towline: {' '.join(message.split())}", err=True)
+        typer.echo(f"towline: {line}", err=True)
     except OSError:  # standard error is full or closed: the exit code is all that can be reported
         _to_nobody(2)
     return code

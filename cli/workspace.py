@@ -192,7 +192,11 @@ def _import(file: Path) -> None:
     except BaseException as error:  # anything that a file of the user's may raise: a script may end the process
         if requested():  # Ctrl-C
             raise
-        reason = printable(f"{type(error).__name__}: {error}".splitlines()[0].removesuffix(": "))
+        try:
+            reason = f"{type(error).__name__}: {error}"
+        except Exception:  # of a class of its own
+            reason = type(error).__name__
+        reason = printable(reason.splitlines()[0].removesuffix(": "))
     raise InputError(f"--define must be a Python file that can be imported, got {printable(str(file))} ({reason})")
 
 

@@ -105,10 +105,14 @@ class Robot(DisplayedRobot):
         InputError
             If `names` is no list of names, or the robot has no such number.
         """
-        if isinstance(names, str) or not isinstance(names, Iterable):
+        try:
+            listed = None if isinstance(names, str) else list(names)
+        except Exception:  # not iterable, as an array of CasADi is, which has `__iter__`
+            listed = None
+        if listed is None:
             raise InputError(f"names must be a list of names of a robot's numbers, got {shown(names)}")
         numbers = {"anchor": self.anchors, "attachment": self.attachments, "radius": self.pulley_radii[:, None]}
-        found = (parameters.located("names", name, self.cables) for name in names)
+        found = (parameters.located("names", name, self.cables) for name in listed)
         return np.array([numbers[one.part][one.cable, one.axis] for one in found])  # (p,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Robot:

@@ -57,7 +57,8 @@ def _from_binary(content: bytes, count: int, where: str) -> np.ndarray:
             f"{len(content)} bytes"
         )
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    return np.frombuffer(content, record, count, HEADER)["corners"].astype(float)
+    with np.errstate(invalid="ignore"):  # of a signalling nan, which is refused with the others
+        return np.frombuffer(content, record, count, HEADER)["corners"].astype(float)
 
 
 def _from_text(content: bytes, where: str) -> np.ndarray:

@@ -64,6 +64,7 @@ def test_the_example_runs_and_resumes(folder):
         ("farewell.py", "import sys; sys.exit('bye')", "(SystemExit: bye)"),
         ("interrupt.py", "raise KeyboardInterrupt", "(KeyboardInterrupt)"),
         ("generator.py", "raise GeneratorExit", "(GeneratorExit)"),
+        ("silent.py", "raise type('Silent', (Exception,), {'__str__': lambda _: 1 / 0})", "(Silent)"),
     ],
 )
 def test_a_file_that_cannot_be_imported_is_one_line(tmp_path, file, text, message):

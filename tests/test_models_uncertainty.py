@@ -1,5 +1,6 @@
 """How well a robot is known: names of its numbers, the covariance in robot files, and robots drawn from it."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -38,6 +39,13 @@ def test_robots_are_changed_by_name():
     np.testing.assert_array_equal(changed.attachments, attachments)
     np.testing.assert_array_equal(changed.pulley_radii, radii)
     assert robot.with_parameters({}) == robot
+
+
+@pytest.mark.parametrize("names", ["cables[0].anchor.x", 3, ca.DM(1)])
+def test_names_of_numbers_are_a_list(names):
+    """An array of CasADi has `__iter__`, and raises an exception of its own there."""
+    with pytest.raises(InputError, match=r"^names must be a list of names of a robot's numbers, got "):
+        known().parameter_values(names)
 
 
 def test_drawn_robots_have_the_covariance():

@@ -199,6 +199,9 @@ def test_a_mesh_of_a_file_is_that_of_its_corners(tmp_path, written):
     assert read_task(task.model_dump(mode="json")) == task
 
 
+SIGNALLING = struct.pack("<I", 0x7F800001)  # a float that is no number, and warns when it is converted
+
+
 def wrong(content, message, **fields):
     return pytest.param(content, fields, message, id=message)
 
@@ -214,6 +217,7 @@ def wrong(content, message, **fields):
         wrong(bytes(80) + b"\xff\xff\xff\xff", "must be an STL file, got other content"),
         wrong(bytes(84), "must have triangles, got none"),
         wrong(binary_stl(np.full((4, 3, 3), np.nan)), "finite coordinates up to 1e+09, got others in triangle 1"),
+        wrong(binary_stl(CUBE[[[0, 1, 2]]])[:96] + SIGNALLING * 9 + bytes(2), "got others in triangle 1"),
         wrong(text_stl(triangles_of(PRISM))[:300], "text that is cut off"),
         wrong(text_stl(triangles_of(PRISM)).replace(b"600", b"six"), "must have numbers as coordinates"),
         wrong(b"solid\nendsolid", "must have triangles, got none"),
@@ -225,6 +229,7 @@ def wrong(content, message, **fields):
         wrong(None, "keep_out[0].file"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_wrong_files_are_one_line(tmp_path, content, fields, message):
     if content is not None:
         (tmp_path / "part.stl").write_bytes(content)

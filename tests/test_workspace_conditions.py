@@ -175,7 +175,7 @@ def test_the_wrench_error_is_the_least():
 
 
 def test_the_posture_found_is_where_the_load_comes_to_rest():
-    """From lengths, energy and IPOPT (`statics.equilibria`); from the position, Newton: the same attitude and tensions."""
+    """From lengths, energy and IPOPT (`equilibria`); from the position, Newton: the same attitude and tensions."""
     robot = load("wang-ctmrts")
     for lengths in ([1.2, 1.2, 1.2], [1.3, 1.1, 1.2], [1.25, 1.3, 1.05]):
         rest = equilibria(robot, np.array(lengths))[0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from towline import InputError, plan, read_task, tensions
+from towline import InputError, load, plan, read_task, tensions
 from towline.cli.main import app
 
 REST = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.3}
@@ -68,6 +68,14 @@ def test_a_file_of_definitions_is_a_python_file(file, message):
     assert isinstance(done.exception, InputError)
     assert str(done.exception).startswith(message)
     assert len(str(done.exception)) < 600
+
+
+@pytest.mark.parametrize("given", [3, None])
+def test_a_path_of_the_users_own_class_must_be_a_text(given):
+    """`os.fspath` raises TypeError for what is a path by its class only."""
+    path = type("Own", (), {"__fspath__": lambda _: given})()
+    with pytest.raises(InputError, match=r"^robot must be a name of the library or the path of a YAML file, got "):
+        load(path)
 
 
 def test_half_floats_are_numbers_as_others_are():
