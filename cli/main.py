@@ -148,7 +148,7 @@ def _report(error: BaseException) -> int:
         message = f"an error in towline itself: {type(error).__name__}: {error} ({TRACEBACK}=1 shows where)"
     line = " ".join(message.split())
     if len(line) > LONGEST or not line.isprintable():  # Typer repeats arguments as they were given
-        from ..inputs import printable
+        from ..base.inputs import printable
 
         line = printable(line, LONGEST)
     try:

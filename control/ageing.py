@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..models.plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
+from ..plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
 from .prediction import VECTORS, put_robot, solve_columns, write_equations
 
 

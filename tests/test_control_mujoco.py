@@ -9,8 +9,8 @@ from towline.benchmarks.control_mujoco import TEAMS, WINCHES, Task, cogiro, fly,
 from towline.benchmarks.mujoco_plant import Hardware
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference
 from towline.control.turning import Turning
-from towline.distribution import tensions
 from towline.models import Robot, load
+from towline.statics.distribution import tensions
 
 OTHERWISE, SOFT = ANSWERS.index("not as modelled"), ANSWERS.index("soft wrench")
 
