@@ -303,7 +303,7 @@ def _fast(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
         "tube": {"position": "free", "attitude": float(rng.choice([0.0, 0.2]))},
         "base": _base(rng, robot),
         "limits": limits,
-        "scheme": str(rng.choice(["linear", "linear", "hermite", "spline"])),
+        "scheme": str(rng.choice(["linear", "linear", "hermite", "hermite", "linear"])),
         "steps": 40,
     }
     task |= _from_a_limit(rng, robot, start, end, limits)
