@@ -1,9 +1,12 @@
 """While a plan plays, each frame has scene, table and clock of one instant, on a busy machine too.
 
+`TOWLINE_FRAMES=50` looks at more frames, with processors kept busy.
+
 What the scene shows is read when WebGL has drawn it: the place of the platform, which is moved, and the end of a cable,
 which gets new points. What the page shows is read after its layout, the last step before a frame is painted.
 """
 
+import os
 import subprocess
 import sys
 
@@ -16,8 +19,8 @@ from towline.viewer import read, save_page, serve
 
 from .chromium import PATIENCE, chromium
 
-FRAMES = 50
-LOAD = 2  # processes that keep processors busy
+FRAMES = int(os.environ.get("TOWLINE_FRAMES", "8"))
+LOAD = 2 if "TOWLINE_FRAMES" in os.environ else 0  # processes that keep processors busy
 
 WATCH = """async (count) => {
   let left = [document.getElementById("root")], viewer = null;
@@ -75,11 +78,11 @@ def subject(tmp_path_factory):
 
 @pytest.fixture
 def page():
-    """An empty page of a browser on a busy machine."""
+    """An empty page of a browser, on a busy machine if many frames are looked at."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOAD)]
     try:
         with chromium() as browser:
-            opened = browser.new_page(viewport={"width": 640, "height": 400})
+            opened = browser.new_page(viewport={"width": 800, "height": 480})
             opened.set_default_timeout(2 * PATIENCE)
             opened.add_init_script("window.nativeFrame = requestAnimationFrame.bind(window)")
             yield opened
