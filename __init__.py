@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .export.step import export_step
     from .models import Dynamics, Robot, available, load
     from .ocp import Plan, Planner, Sweep, Task, Timing, plan, read_task, sweep, time_along
-    from .simulation import Flight, simulate
+    from .simulation import Simulation, simulate
     from .solvers import Certificate, TensionProblem, TensionSolution, methods, solve, solve_batch
     from .statics.distribution import tensions
     from .workspace import sample
@@ -36,7 +36,7 @@ _HOMES = {
     "workspace": ("sample",),
     "estimation.calibration": ("Calibration", "Measurements", "calibrate", "read_measurements"),
     "control": ("Controller",),
-    "simulation": ("Flight", "simulate"),
+    "simulation": ("Simulation", "simulate"),
     "export.step": ("export_step",),
     "base.errors": ("InputError", "SolverError", "TowlineError"),
 }
@@ -52,12 +52,12 @@ __all__ = [
     "Certificate",
     "Controller",
     "Dynamics",
-    "Flight",
     "InputError",
     "Measurements",
     "Plan",
     "Planner",
     "Robot",
+    "Simulation",
     "SolverError",
     "Sweep",
     "Task",
@@ -89,6 +89,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(f".{_HOME[name]}", __name__), name)
         globals()[name] = value
         return value
+    if (None, name) in former_names.MOVED:
+        return former_names.moved_name(None, name)
     if name in _PACKAGES:
         return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -25,11 +25,14 @@ NOW = {
     "models.statics": "statics.equilibria",
     "robust": "statics.robust",
 }
-MOVED = {  # names that packages are still asked for
-    ("models", "PoseEstimate"): "estimation",
-    ("models", "PoseTracker"): "estimation",
-    ("models", "branches"): "estimation",
-    ("models", "pose_from_lengths"): "estimation",
+# Names that packages are still asked for: the package now, and the name where it is another one, which goes next.
+MOVED = {
+    (None, "Flight"): ("simulation", "Simulation"),
+    ("simulation", "Flight"): ("simulation", "Simulation"),
+    ("models", "PoseEstimate"): ("estimation", None),
+    ("models", "PoseTracker"): ("estimation", None),
+    ("models", "branches"): ("estimation", None),
+    ("models", "pose_from_lengths"): ("estimation", None),
 }
 SHORT = {"calibration", "errors"}  # these two remain, as short names
 
@@ -42,11 +45,15 @@ def renamed(name: str) -> str | None:
     return None
 
 
-def moved_name(package: str, name: str) -> Any:
-    """Return what a package once exported under a name, or raise AttributeError."""
+def moved_name(package: str | None, name: str) -> Any:
+    """Return what a package, None: `towline`, once exported under a name, or raise AttributeError."""
+    whole = PACKAGE if package is None else f"{PACKAGE}.{package}"
     if (package, name) not in MOVED:
-        raise AttributeError(f"module '{PACKAGE}.{package}' has no attribute {name!r}")
-    return getattr(import_module(f"{PACKAGE}.{MOVED[package, name]}"), name)
+        raise AttributeError(f"module {whole!r} has no attribute {name!r}")
+    home, new = MOVED[package, name]
+    if new is not None:
+        warn(f"{whole}.{name} is called {new} now; the former name goes with the next release", DeprecationWarning, 3)
+    return getattr(import_module(f"{PACKAGE}.{home}"), new or name)
 
 
 def install() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..control import Predictive
 from ..models import Robot, load
-from ..simulation import Flight, simulate
+from ..simulation import Simulation, simulate
 
 ROBOTS = (
     "wang-flying",
@@ -42,7 +42,7 @@ def heavier(robot: Robot, share: float) -> Robot:
     return Robot.model_validate(data)
 
 
-def fly(robot: Robot, controller: Predictive, seed: int) -> Flight:
+def fly(robot: Robot, controller: Predictive, seed: int) -> Simulation:
     """Fly a run, which its seed determines."""
     rng = np.random.default_rng([seed, 5])
     correct = robot.fixed_lengths is not None or robot.m < len(robot.platform.dof)

@@ -174,7 +174,7 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> dict[str, Any]:
         elif kind == "lose":
             part = str(rng.choice(flying))
         faults.append(f"{kind} {part} at {at:.6f}")
-    return given | {"faults": faults}
+    return given | {"events": faults}
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ from typing_extensions import override
 from ..control import Command, Controller, Predictive, Reference, State
 from ..models import load
 from ..ocp import Plan, Planner
-from ..simulation import Flight, simulate
+from ..simulation import Simulation, simulate
 from .machine import machine
 
 __all__ = ["CIRCLE", "Replanned", "Replanning", "fly"]
@@ -139,7 +139,7 @@ def references(plan: Plan, period: float) -> list[Reference]:
     return [Reference(*row) for row in zip(*platform, *carriers, tensions, strict=True)]
 
 
-def fly(times: np.ndarray, duration: float | None = None, seed: int = 0) -> tuple[Replanning, Flight]:
+def fly(times: np.ndarray, duration: float | None = None, seed: int = 0) -> tuple[Replanning, Simulation]:
     """Return the controller of a flight that plans again at `times`, and the flight."""
     robot = load(ROBOT)
     planner = Planner(robot, CIRCLE)

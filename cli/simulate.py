@@ -62,12 +62,13 @@ def simulate(
             metavar="FILE", help="Errors and delay of the sensors (YAML), such as {position: 0.001, delay: 0.002}."
         ),
     ] = None,
-    fault: Annotated[
+    event: Annotated[
         list[str] | None,
         typer.Option(
+            "--event",
             "--fault",
-            metavar="FAULT",
-            help="What breaks: 'cut 3 at 2.5' (cable 3 tears at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
+            metavar="EVENT",
+            help="What happens: 'cut 3 at 2.5' (cable 3 tears at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
             "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s). Repeat the "
             "option for more.",
         ),
@@ -151,7 +152,7 @@ def simulate(
             "controller": {"predictive": Predictive, "open-loop": OpenLoop}.get(controller, ComputedTorque)(loaded),
             "gusts": gusts,
             "noise": None if noise is None else read_yaml(noise, Noise),
-            "faults": fault or (),
+            "events": event or (),
             "duration": duration,
             "tolerance": tolerance,
             "seed": seed,
@@ -165,14 +166,14 @@ def simulate(
                 conditions |= {"resume": resume is not None}
                 passed = _fly_often(loaded, plan, conditions, target, (figures, form), as_json)
         except InputError as error:
-            raise _of_option(error, fault or []) from None
+            raise _of_option(error, event or []) from None
     if not passed:
         raise typer.Exit(1)
 
 
-def _of_option(error: InputError, faults: list[str]) -> InputError:
-    """Return the error with the option --fault named in place of an item of the argument `faults`."""
-    return InputError(re.sub(r"^faults\[(\d+)\]", lambda item: f"--fault {shown(faults[int(item[1])])}", str(error)))
+def _of_option(error: InputError, events: list[str]) -> InputError:
+    """Return the error with the option --event named in place of an item of the argument `events`."""
+    return InputError(re.sub(r"^events\[(\d+)\]", lambda item: f"--event {shown(events[int(item[1])])}", str(error)))
 
 
 def _fly_once(

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.text import quantity
-from .flight_data import FlightData
+from .data import SimulationData
 
 __all__ = ["Event", "events", "sentence"]
 
@@ -27,7 +27,7 @@ class Event(NamedTuple):
         return {"at_s": self.at, "kind": self.kind, "what": self.what}
 
 
-def events(flight: FlightData) -> list[Event]:
+def events(flight: SimulationData) -> list[Event]:
     """Return the faults of a flight and the first instants at which a limit was exceeded, the earliest first."""
     found = [Event(fault.at, "fault", _words(fault, flight)) for fault in flight.conditions.faults]
     if flight.slack.any():
@@ -50,7 +50,7 @@ def sentence(of: list[Event]) -> str:
     return "; ".join(f"{event.what} at {event.at:.4g} s" for event in of)
 
 
-def _words(fault: Any, flight: FlightData) -> str:
+def _words(fault: Any, flight: SimulationData) -> str:
     if fault.kind == "cut":
         return f"cable {fault.part + 1} was cut"
     if fault.kind == "stick":

@@ -56,11 +56,11 @@ def read_faults(robot: Robot, faults: Sequence[str], duration: float) -> tuple[F
         If a line has another form, there is no such cable or carrier, or the flight ends before.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
-        raise InputError(f"faults must be a list of texts, each {ACCEPTED}, got {shown(faults)}")
-    read = [_read(robot, text, f"faults[{number}]") for number, text in enumerate(faults)]
+        raise InputError(f"events must be a list of texts, each {ACCEPTED}, got {shown(faults)}")
+    read = [_read(robot, text, f"events[{number}]") for number, text in enumerate(faults)]
     for number, fault in enumerate(read):
         if fault.at >= duration:
-            raise InputError(f"faults[{number}] must begin before the end at {duration:g} s, got {fault.at:g} s")
+            raise InputError(f"events[{number}] must begin before the end at {duration:g} s, got {fault.at:g} s")
     return tuple(sorted(read, key=lambda fault: fault.at))
 
 

@@ -19,8 +19,8 @@ from ..models.parsing import parse_yaml, to_yaml
 from ..models.robot import Robot
 from ..plant import Plant
 from .conditions import Conditions
+from .data import TENSION_TOLERANCE
 from .extremes import Extremes
-from .flight_data import TENSION_TOLERANCE
 from .flying import fly
 
 if TYPE_CHECKING:

@@ -7,14 +7,14 @@ import numpy as np
 from ..figures.animation import Scene
 from ..models import Dynamics
 from ..models.rotor_discs import rotor_discs
-from .flight_data import FlightData
+from .data import SimulationData
 
 __all__ = ["scene"]
 
 TRAIL = 10  # every so many periods have a point of the trail
 
 
-def scene(flight: FlightData, times: np.ndarray) -> Scene:
+def scene(flight: SimulationData, times: np.ndarray) -> Scene:
     """Return the flight's robot at the periods nearest to `times` [s]."""
     robot, record = flight.robot, flight.record
     rows = np.clip(np.round(times / flight.period).astype(int), 0, flight.lasted - 1)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
+from warnings import warn
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from ..plant import Plant
 from ..solvers import solve_batch
 from .conditions import Conditions
 from .faults import read_faults
-from .flight import Flight
 from .flights import flights
 from .flying import fly
 from .machine import prepare
@@ -29,6 +29,7 @@ from .noise import Noise
 from .orders import Orders
 from .record import Record
 from .runs import Execution, Progress, fly_many
+from .simulation import Simulation
 from .steps import steps_in
 from .trajectory import Motion, Trajectory, read_trajectory
 from .winds import read_wind
@@ -46,7 +47,7 @@ def simulate(
     controller: Controller | None = None,
     wind: Any = None,
     noise: Noise | dict[str, Any] | None = None,
-    faults: Sequence[str] = (),
+    events: Sequence[str] = (),
     duration: float | None = None,
     seed: int = 0,
     *,
@@ -62,8 +63,9 @@ def simulate(
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    faults: Sequence[str] | None = None,
 ) -> Any:
-    """Fly a reference: the plant, a controller, wind, sensors and faults, step by step.
+    """Simulate a robot along a reference: the plant, a controller, wind, sensors and events, step by step.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def simulate(
         no air, and so no drag.
     noise
         Of the sensors, see `Noise`; default: none.
-    faults
+    events
         Lines: "cut 3 at 2.5", a cable tears (they count from 1; times in [s]); "stick 2 at 1", its winch stops; "lose
         quad-1 at 2", the actuators of a carrier give nothing any more; "miss 0.05 at 1.2", the controller is late.
     duration
@@ -115,7 +117,7 @@ def simulate(
 
     Returns
     -------
-    Flight or xarray.Dataset
+    Simulation or xarray.Dataset
         With `runs`, a dataset with the figures of each flight.
 
     Raises
@@ -126,6 +128,9 @@ def simulate(
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
+    if faults is not None:
+        warn("faults is called events now; the former name goes with the next release", DeprecationWarning, 2)
+        events = faults
     the_robot = as_robot(robot)
     trajectory = read_trajectory(the_robot, reference, duration)
     if duration is None and trajectory.duration is None:
@@ -146,7 +151,7 @@ def simulate(
         wind=read_wind(the_robot, wind, number("gusts", gusts, 0.0, 100.0)),
         disturbance=finite_array("disturbance", np.zeros(6) if disturbance is None else disturbance, (6,)),
         noise=noise if isinstance(noise, Noise) else validate({} if noise is None else noise, Noise, "noise"),
-        faults=read_faults(the_robot, faults, periods * step),
+        faults=read_faults(the_robot, events, periods * step),
     )
     pilot = ComputedTorque(the_robot) if controller is None else controller
     first, error = whole_number("seed", seed, 0, 2**63 - 1), number("tolerance", tolerance, 0.0, 1e6)
@@ -199,14 +204,14 @@ def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndar
     return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions
 
 
-def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int, tolerance: float) -> Flight:
+def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int, tolerance: float) -> Simulation:
     robot, periods = plant.robot, len(conditions.references)
     record = Record(robot, periods)
     start = perf_counter()
     lasted, seconds = fly(plant, [controller], conditions, [seed], record)
     wall = perf_counter() - start
     wind = Orders(plant, conditions, [seed]).wind
-    return Flight(
+    return Simulation(
         robot=robot,
         conditions=conditions,
         seed=seed,

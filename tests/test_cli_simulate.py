@@ -161,9 +161,9 @@ def test_an_interrupt_before_the_first_result_explains_how_to_resume(monkeypatch
 
 
 def test_the_line_is_printed_and_the_exit_code_is_2(folder):
-    done = simulate(folder, "--fault", "cut 9 at 1", "--json")
+    done = simulate(folder, "--event", "cut 9 at 1", "--json")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "towline: --fault 'cut 9 at 1' must name a cable of 'wang-flying', 1 to 6, got '9'\n"
+    assert done.stderr == "towline: --event 'cut 9 at 1' must name a cable of 'wang-flying', 1 to 6, got '9'\n"
 
 
 def test_the_viewer_plays_a_flight(folder):

@@ -127,7 +127,7 @@ def test_lags_and_wrong_masses_that_predictions_bear_are_no_reason_to_give_them_
 @pytest.mark.parametrize(("name", "later"), [("multi-quadrotor-4", 0.03), ("multi-quadrotor-6", 0.05)])
 def test_a_lost_rotor_is_noticed_within_fifty_milliseconds(name, later):
     robot = load(name)
-    flight = simulate(robot, robot.home, Predictive(robot), duration=0.4, faults=["lose quad1 at 0.3"])
+    flight = simulate(robot, robot.home, Predictive(robot), duration=0.4, events=["lose quad1 at 0.3"])
     assert 0.3 < flight.handed_over <= 0.3 + later
     assert flight.answered["not as modelled"] == 400 - round(flight.handed_over / 1e-3)
     assert f"not as modelled         computed torque from t = {flight.handed_over:.3f} s on" in flight.report()

@@ -44,8 +44,8 @@ def results():
         "Task": found.scenario.task,
         "Plan": found,
         "infeasible Plan": blocked,
-        "Flight": short,
-        "Flight with nan": broken,
+        "Simulation": short,
+        "Simulation with nan": broken,
         "Timing": quick,
         "infeasible Timing": towline.time_along(robot, LIFT | {"path": LIFT["path"] | {"end": [9, 0, 0]}}),
         "Sweep": towline.sweep(robot, LIFT, {"duration": [0.2, 3]}),
@@ -112,7 +112,9 @@ def test_a_table_of_at_most_20_rows_with_one_picture(results):
         rows = {row[0].text: row[1].text for row in page.iter("tr")}
         assert 1 <= len(rows) <= 20, name
         pictures = list(page.iter(f"{SVG}svg"))
-        drawn = name.endswith(("Robot", "Plan", "Flight", "nan", "TensionSolution", "Calibration")) or name == "Timing"
+        drawn = (
+            name.endswith(("Robot", "Plan", "Simulation", "nan", "TensionSolution", "Calibration")) or name == "Timing"
+        )
         assert len(pictures) == drawn, name
         assert page.find("p/strong").text.startswith(repr(result).splitlines()[0][:100]), name
         first = re.match(r"  (.+?): ", repr(result).splitlines()[1])
@@ -126,8 +128,8 @@ def test_headlines_state_the_result(results):
     assert "FEASIBLE" in of["Plan"]
     certificate = results["infeasible Plan"].certificate
     assert f"INFEASIBLE, short by {certificate.shortfall:.0f} N" in of["infeasible Plan"]
-    assert "PASSED" in of["Flight"]
-    assert "FAILED" in of["Flight with nan"]
+    assert "PASSED" in of["Simulation"]
+    assert "FAILED" in of["Simulation with nan"]
     assert of["BatchSolution"] == "5000 problems: 5000 infeasible"
     problem, proof = results["TensionProblem"], results["Certificate"]
     reach = sum(max(d * low, d * high) for d, low, high in zip(
@@ -138,7 +140,7 @@ def test_headlines_state_the_result(results):
 
 def test_a_half_made_result_is_displayed():
     """As a debugger meets it: nothing in it can be computed."""
-    for kind in (towline.Plan, towline.Flight, towline.TensionSolution, towline.Calibration):
+    for kind in (towline.Plan, towline.Simulation, towline.TensionSolution, towline.Calibration):
         empty = object.__new__(kind)
         assert repr(empty) == kind.__name__
         assert empty._repr_html_() == f"<p><strong>{kind.__name__}</strong></p><table></table>"

@@ -130,6 +130,12 @@ def test_former_names_can_be_imported():
         assert module.__spec__.name == f"towline.{new}"
     with pytest.raises(ModuleNotFoundError):
         importlib.import_module("towline.embedding")
+    import towline
+
+    for package in (towline, towline.simulation):
+        with pytest.warns(DeprecationWarning, match="Flight is called Simulation now"):
+            assert package.Flight is towline.Simulation
+    assert towline.models.pose_from_lengths is towline.estimation.pose_from_lengths
 
 
 def test_only_carriers_know_their_kinds():

@@ -264,7 +264,7 @@ def test_carriers_go_on_while_the_controller_does_not_answer():
     motion[0, 1, 0], motion[1, :, 0] = 0.5, 0.5
     parts = zip(("pose", "velocity", "acceleration"), motion, strict=True)
     variables = {f"{owner}{name}": (dims, part) for name, part in parts for owner, dims, part in _of(robot, name, part)}
-    flight = simulate(robot, xr.Dataset(variables, {"time": times}), faults=["miss 0.05 at 0.5"]).trajectory
+    flight = simulate(robot, xr.Dataset(variables, {"time": times}), events=["miss 0.05 at 0.5"]).trajectory
     assert np.abs(flight["carrier_pose"] - flight["carrier_reference"]).max() < 1e-9
     assert (flight["answered"] == HOLD).sum() == 50
     assert flight["tensions"].to_numpy() == pytest.approx(robot.weight / 3 / np.sqrt(0.8), rel=1e-6)

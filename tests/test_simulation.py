@@ -101,7 +101,7 @@ def test_a_flight_of_many_is_the_flight_alone():
 
 def test_slack_cables_count_in_many_flights_as_alone_and_cut_ones_never():
     """Winch 1 of wang-flying stops under a side force, so that its cable gets slack; cable 3 tears."""
-    task = {"faults": ["stick 1 at 0.1", "cut 3 at 0.5"], "duration": 1.0, "tolerance": 10.0}
+    task = {"events": ["stick 1 at 0.1", "cut 3 at 0.5"], "duration": 1.0, "tolerance": 10.0}
     task |= {"disturbance": [2.0, 0, 0, 0, 0, 0]}
     alone = simulate("wang-flying", load("wang-flying").home, **task)
     taut = alone.record.tensions > 0
@@ -136,7 +136,7 @@ def test_a_cut_cable_is_survived_where_the_others_can_do_without_it(name, surviv
     bounds[0] = (0, 0)
     possible = linprog(np.zeros(robot.m), A_eq=A, b_eq=w, bounds=bounds).success
     flight = simulate(
-        robot, robot.home, faults=["cut 1 at 0.3"], duration=1.3, tolerance=0.02, noise={"tension": noise}
+        robot, robot.home, events=["cut 1 at 0.3"], duration=1.3, tolerance=0.02, noise={"tension": noise}
     )
     after = flight.record.answered[900:]
     assert possible == survives
@@ -156,7 +156,7 @@ def test_a_stuck_winch_holds_the_unstrained_length_of_its_cable():
     """By Hooke's law and the damper, from lengths and tensions: before the fault the unstrained length changes."""
     made = planned("wang-flying", [0.03, 0, -0.05])
     cable = load("wang-flying").cables[1]
-    flight = simulate("wang-flying", made, faults=["stick 2 at 1.4"], tolerance=0.5)
+    flight = simulate("wang-flying", made, events=["stick 2 at 1.4"], tolerance=0.5)
     t, length = flight.record.tensions[:, 1], flight.record.lengths[:, 1]
     t = t[:-1] - (cable.damping or 0.0) * np.diff(length) / flight.period  # means of the periods
     unstrained = cable.stiffness * (length[1:] + length[:-1]) / 2 / (t + cable.stiffness)
@@ -167,7 +167,7 @@ def test_a_stuck_winch_holds_the_unstrained_length_of_its_cable():
 
 def test_a_controller_that_misses_its_time_leaves_the_last_command(crane):
     calm = simulate("ipanema-1", crane)
-    missed = simulate("ipanema-1", crane, faults=["miss 0.03 at 1.5"])
+    missed = simulate("ipanema-1", crane, events=["miss 0.03 at 1.5"])
     assert calm.error.max() < missed.error.max() < 5e-3
     ordered = missed.record.commanded
     assert (ordered[1500:1530] == ordered[1499]).all()
@@ -177,7 +177,7 @@ def test_a_controller_that_misses_its_time_leaves_the_last_command(crane):
 def test_a_carrier_that_loses_its_thrust_has_its_weight_and_its_cable_alone():
     """By Newton, from the flight's velocities, tensions and the direction of the cable."""
     robot = load("multi-quadrotor-3")
-    flight = simulate(robot, robot.home, faults=["lose quad2 at 0.2"], duration=0.4)
+    flight = simulate(robot, robot.home, events=["lose quad2 at 0.2"], duration=0.4)
     assert not flight.passed
     poses = flight.record.motions[:, :, :6]
     anchors, attachments = Dynamics(robot).points(poses[:, 0], poses[:, 1:])
@@ -299,12 +299,12 @@ def test_a_plan_whose_loads_the_plant_would_not_carry_is_refused(crane):
         ({"duration": np.nan}, "duration"),
         ({"noise": {"delay": -1}}, "delay"),
         ({"noise": {"positon": 1}}, "positon"),
-        ({"faults": ["cut 9 at 1"]}, "1 to 8, got '9'"),
-        ({"faults": ["cut 1"]}, "faults"),
-        ({"faults": "cut 1 at 2"}, "faults"),
-        ({"faults": ["miss x at 2"]}, "faults"),
-        ({"faults": ["lose winch at 1"]}, "with actuators (it has none), got 'winch'"),
-        ({"faults": ["cut 1 at 3"]}, "faults[0] must begin before the end at 3 s, got 3 s"),
+        ({"events": ["cut 9 at 1"]}, "1 to 8, got '9'"),
+        ({"events": ["cut 1"]}, "events"),
+        ({"events": "cut 1 at 2"}, "events"),
+        ({"events": ["miss x at 2"]}, "events"),
+        ({"events": ["lose winch at 1"]}, "with actuators (it has none), got 'winch'"),
+        ({"events": ["cut 1 at 3"]}, "events[0] must begin before the end at 3 s, got 3 s"),
         ({"checkpoint": "file"}, "checkpoint must be None without runs"),
         ({"workers": 2}, "workers must be 1 without runs"),
         ({"scheduler": "tcp://no"}, "scheduler must be None without runs"),
@@ -365,7 +365,7 @@ def test_what_a_controller_may_return_is_checked(change, message, runs, since):
 
 @pytest.mark.parametrize("runs", [None, 2])
 def test_steps_without_an_answer_count_as_held(runs):
-    given = {"duration": 0.05, "faults": ["miss 0.01 at 0.02"], "runs": runs}
+    given = {"duration": 0.05, "events": ["miss 0.01 at 0.02"], "runs": runs}
     flight = simulate("wang-flying", load("wang-flying").home, **given)
     if runs is None:
         assert (flight.answered["as planned"], flight.answered["hold"]) == (40, 10)

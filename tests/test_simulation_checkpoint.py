@@ -73,7 +73,7 @@ def test_a_damaged_end_is_flown_again(tmp_path):
         ({"duration": 0.04}, "reference"),
         ({"disturbance": np.ones(6)}, "disturbance"),
         ({"noise": {"position": 1e-3}}, "noise"),
-        ({"faults": ["cut 1 at 0.01"]}, "faults"),
+        ({"events": ["cut 1 at 0.01"]}, "faults"),
         ({"controller": ComputedTorque("wang-flying", bandwidth=9.0)}, "controller"),
         ({"drive": "tensions"}, "robot"),
     ],

@@ -53,7 +53,7 @@ def test_one_run_uses_the_controller_itself():
 def test_a_second_run_starts_afresh(tmp_path, law):
     controller = law(ROBOT)
     first = fly(controller).save(tmp_path / "first.nc").read_bytes()
-    fly(controller, seed=3, duration=0.03, faults=["cut 2 at 0.005"])
+    fly(controller, seed=3, duration=0.03, events=["cut 2 at 0.005"])
     assert fly(controller).save(tmp_path / "second.nc").read_bytes() == first
 
 

@@ -18,7 +18,7 @@ LINE = {"kind": "line", "start": [0, 0, -1], "end": [0.3, 0, -1.1]}
 
 @pytest.fixture(scope="module")
 def failed():
-    return simulate("wang-flying", LINE, duration=1.5, faults=["miss 0.02 at 0.3", "cut 3 at 0.8"])
+    return simulate("wang-flying", LINE, duration=1.5, events=["miss 0.02 at 0.3", "cut 3 at 0.8"])
 
 
 def test_a_failed_flight_names_the_fault_and_what_came_after(failed):
@@ -31,7 +31,7 @@ def test_a_failed_flight_names_the_fault_and_what_came_after(failed):
 
 
 def test_the_first_slack_cable_is_named():
-    flight = simulate("multi-quadrotor-4", load("multi-quadrotor-4").home, duration=1.0, faults=["lose quad1 at 0.2"])
+    flight = simulate("multi-quadrotor-4", load("multi-quadrotor-4").home, duration=1.0, events=["lose quad1 at 0.2"])
     first = {event["kind"]: event for event in reversed(flight.to_dict()["events"])}
     row, cable = np.argwhere(flight.slack)[0]
     assert first["slack"] == {
@@ -49,7 +49,7 @@ def test_extreme_tensions_are_those_of_cables_that_are_not_cut(failed):
     merit = failed.to_dict()
     assert merit["tension_min"] == min(held.min(), before.min()) > 0
     assert merit["tension_max"] == max(held.max(), before.max())
-    home, conditions = load("wang-flying").home, {"duration": 0.05, "faults": ["cut 3 at 0.02"]}
+    home, conditions = load("wang-flying").home, {"duration": 0.05, "events": ["cut 3 at 0.02"]}
     flight = simulate("wang-flying", home, **conditions).to_dict()
     runs = simulate("wang-flying", home, runs=2, **conditions)
     assert runs["tension_min"].values == pytest.approx(flight["tension_min"], rel=1e-9)

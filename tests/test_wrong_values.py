@@ -91,7 +91,7 @@ def test_a_wrong_fault_is_named_as_the_option_with_its_text(folder, fault):
     plan("wang-flying", REST).save("rest.nc")
     done = CliRunner().invoke(app, ["simulate", "wang-flying", "rest.nc", "--fault", "cut 2 at 0.1", "--fault", fault])
     assert isinstance(done.exception, InputError)
-    assert str(done.exception).startswith(f"--fault {fault!r} must ")
+    assert str(done.exception).startswith(f"--event {fault!r} must ")
 
 
 @pytest.mark.parametrize(

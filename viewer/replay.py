@@ -30,7 +30,7 @@ LONGEST = 100  # letters of a text of the file
 
 
 class Replay:
-    """A plan that `Plan.save` wrote, or a flight that `Flight.save` wrote.
+    """A plan that `Plan.save` wrote, or a flight that `Simulation.save` wrote.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from ...ocp import Plan, Task, plan
 from ...ocp.nlp.solver import Progress
 from ...ocp.tasks.paths import AnyPath, CirclePath, RestPath
 from ...ocp.tasks.task import FreeBase, HoldBase
-from ...simulation import Flight, simulate
+from ...simulation import Simulation, simulate
 
 HOVER = (50.0, 50.0, 100.0, 0.0, 0.0, 0.0)  # paper F, section VI.B [m, rad]
 WIND, GUSTS = (3.0, 2.0, 0.5), 0.5  # [m/s], the mean and the intensity of turbulence about it
@@ -67,7 +67,7 @@ def run(folder: Path, progress: Progress | None = None, form: str = "png") -> Fl
     return FlyingCircle(hovering, free, pictures, files)
 
 
-def fly(folder: Path, planned: Plan, form: str = "png") -> tuple[Flight, list[Path]]:
+def fly(folder: Path, planned: Plan, form: str = "png") -> tuple[Simulation, list[Path]]:
     """Fly a plan in gusts; return the flight, and the NetCDF file and the picture written into `folder`."""
     flight = simulate(planned.scenario.robot, planned, wind=WIND, gusts=GUSTS)
     file = flight.save(folder / "circle-flight.nc")

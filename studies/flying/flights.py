@@ -21,7 +21,7 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.air import trapezoid
 from ...ocp.tasks.paths import CirclePath, Motion
-from ...simulation import Flight, simulate
+from ...simulation import Simulation, simulate
 from ...simulation.trajectory import read_trajectory
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, compared, repaired, stated, undetermined
@@ -46,8 +46,8 @@ SHOWN = slice(None, None, 20)  # of the rows, in figures
 class Flown(NamedTuple):
     """A motion: its flights with computed torque, and driven by lengths, in still vacuum and in the wind."""
 
-    stays: Flight
-    gives: Flight
+    stays: Simulation
+    gives: Simulation
     calm: Wound
     windy: Wound
     body: Motion
@@ -96,7 +96,7 @@ def fly(robot: Robot, name: Name) -> Flown:
     )
 
 
-def small_circle(robot: Robot, away: float) -> Flight:
+def small_circle(robot: Robot, away: float) -> Simulation:
     """Fly the circle of `FEASIBLE` radius under a quadrotor that hovers and gives way by up to `away` [m]."""
     path = CirclePath(kind="circle", centre=(0.0, 0.0, -BELOW), radius=FEASIBLE, rate=RATE)
     return simulate(robot, path, ComputedTorque(robot, reach=(away, 0.0)), wind=gust, duration=SECONDS)
@@ -110,13 +110,13 @@ def required(robot: Robot, flown: Flown, wind: np.ndarray | None = None) -> np.n
     return np.linalg.solve(A, w[..., None])[..., 0]
 
 
-def moved(flight: Flight) -> float:
+def moved(flight: Simulation) -> float:
     """Return how far the quadrotor was from its plan at most [m]."""
     motion, plan = flight.trajectory["carrier_pose"].values, flight.trajectory["carrier_reference"].values
     return float(np.linalg.norm((motion - plan)[..., :3], axis=-1).max())
 
 
-def accelerated(flight: Flight) -> float:
+def accelerated(flight: Simulation) -> float:
     """Return the largest horizontal acceleration of the quadrotor [m/s^2], over steps of 10 ms."""
     steps = slice(None, None, 10)
     velocity, times = flight.trajectory["carrier_velocity"].values[steps, 0, :2], flight.times[steps]
@@ -246,7 +246,7 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
     )
 
 
-def _stability(stays: Flight, gives: Flight) -> Claim:
+def _stability(stays: Simulation, gives: Simulation) -> Claim:
     unanswered = 1 - stays.answered["as planned"] / len(stays.references)
     off = tuple(float(flight.error.max()) for flight in (stays, gives))
     return undetermined(
@@ -266,7 +266,7 @@ def _stability(stays: Flight, gives: Flight) -> Claim:
     )
 
 
-def _drawing(name: str, stays: Flight, gives: Flight) -> Drawing:
+def _drawing(name: str, stays: Simulation, gives: Simulation) -> Drawing:
     robot = stays.robot
     errors = {STAYS: 1e3 * stays.error[SHOWN], GIVES: 1e3 * gives.error[SHOWN]}
     panels = [Panel("error [mm]", errors, logarithmic=True)]

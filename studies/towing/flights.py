@@ -10,7 +10,7 @@ import numpy as np
 
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
-from ...simulation import Flight, simulate
+from ...simulation import Simulation, simulate
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, stated
 from .equations import SIZES
@@ -25,18 +25,18 @@ SHOWN = slice(None, None, 5)  # of the rows, in figures
 
 def chapter() -> Chapter:
     """Fly every drive and every m."""
-    flights: dict[Drive, dict[int, Flight]] = {drive: {m: fly(drive, m) for m in SIZES} for drive in DRIVES}
+    flights: dict[Drive, dict[int, Simulation]] = {drive: {m: fly(drive, m) for m in SIZES} for drive in DRIVES}
     claims = [_towed(drive, by_m) for drive, by_m in flights.items()]
     claims.append(_positive(flights))
     return Chapter(claims, {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()})
 
 
-def fly(drive: Drive, m: int) -> Flight:
+def fly(drive: Drive, m: int) -> Simulation:
     """Fly the plan with least effort of `m` robots."""
     return simulate(robot(SIZES[m], drive), planned(SIZES[m], drive), duration=SECONDS, tolerance=ARRIVED)
 
 
-def in_boxes(flight: Flight) -> bool:
+def in_boxes(flight: Simulation) -> bool:
     """Return whether the robot-ends were in the boxes of their reach all the time."""
     boxes = [carrier.motion_limits.reach for carrier in flight.robot.carriers]
     low, high = (np.array([getattr(box, edge) for box in boxes]) for edge in ("min", "max"))
@@ -44,7 +44,7 @@ def in_boxes(flight: Flight) -> bool:
     return bool(((places >= low - EDGE) & (places <= high + EDGE)).all())
 
 
-def _towed(drive: Drive, flights: dict[int, Flight]) -> Claim:
+def _towed(drive: Drive, flights: dict[int, Simulation]) -> Claim:
     most, left = (max(float(flight.error[rows].max()) for flight in flights.values()) for rows in (slice(None), [-1]))
     return stated(
         f"towed-{drive}",
@@ -62,7 +62,7 @@ def _towed(drive: Drive, flights: dict[int, Flight]) -> Claim:
     )
 
 
-def _positive(flights: dict[Drive, dict[int, Flight]]) -> Claim:
+def _positive(flights: dict[Drive, dict[int, Simulation]]) -> Claim:
     ranges = {
         drive: (by_m[PAPERS].record.tensions.min(), by_m[PAPERS].record.tensions.max())
         for drive, by_m in flights.items()
@@ -84,7 +84,7 @@ def _positive(flights: dict[Drive, dict[int, Flight]]) -> Claim:
     )
 
 
-def _drawing(drive: Drive, flight: Flight) -> Drawing:
+def _drawing(drive: Drive, flight: Simulation) -> Drawing:
     tensions = flight.record.tensions[SHOWN]
     lines = {f"cable {index + 1}": tensions[:, index] for index in range(flight.robot.m)}
     panels = [Panel("error [mm]", {"": 1e3 * flight.error[SHOWN]}), Panel("tension [N]", lines)]

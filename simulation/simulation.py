@@ -1,4 +1,4 @@
-"""`Flight`: what a robot did along a reference, as data, dataset, file, figures and report."""
+"""`Simulation`: what a robot did along a reference, as data, dataset, file, figures and report."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ..control import ANSWERS
 from ..figures.drawn import Filmed
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
+from .data import SimulationData
 from .events import events, sentence
-from .flight_data import FlightData
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
     from ..figures.animation import Scene
 
-__all__ = ["Flight"]
+__all__ = ["Simulation"]
 
 
-class Flight(FlightData, Filmed):
-    """A flown motion; its numbers are those of `FlightData`."""
+class Simulation(SimulationData, Filmed):
+    """A flown motion; its numbers are those of `SimulationData`."""
 
     def figures_of_merit(self) -> dict[str, Any]:
         """Return what the flight is judged by, without times of the machine: the same for the same seed."""

@@ -1,4 +1,4 @@
-"""`FlightData`: what a robot did along a reference, as numbers, which events, figures and reports read."""
+"""`SimulationData`: what a robot did along a reference, as numbers, which events, figures and reports read."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .record import Record
 if TYPE_CHECKING:
     pass
 
-__all__ = ["TENSION_TOLERANCE", "FlightData"]
+__all__ = ["TENSION_TOLERANCE", "SimulationData"]
 
 TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
 
 
 @dataclass(frozen=True, eq=False)
-class FlightData(Displayed):
+class SimulationData(Displayed):
     """Numbers of what a robot did along a reference, without figures, files and reports.
 
     Attributes
