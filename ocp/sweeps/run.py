@@ -25,11 +25,11 @@ from ..tasks.task import Task, read_task
 from .axis import read_axes
 from .cases import Cases
 from .result import Sweep
-from .row import LONGEST, Row, plan_case, read_row, written_row
+from .row import Row, plan_case
 
-__all__ = ["KIND", "plan_file", "sweep"]
+__all__ = ["plan_file", "sweep"]
 
-KIND = Kind(b"towline sweep checkpoint 1\n", "plan", LONGEST)
+KIND = Kind("sweep", "plan")  # a result is a row as JSON, in which floats keep every bit
 
 Progress = Callable[[int, int, int], None]
 
@@ -114,12 +114,12 @@ def sweep(
     rows: dict[int, Row] = {}
     with start_workers(workers, scheduler) as started, opened as stored:
         if stored is not None:
-            rows.update(read_row(content) for content in iter(stored.read, None))
+            rows.update((number, Row(*json.loads(content))) for number, content in stored.items())
         feasible = sum(row.status == MotionStatus.FEASIBLE for row in rows.values())
         _report(progress, rows, cases, feasible)
         for number, row in started.as_completed(plan_case, _jobs(cases, set(rows), folder)):
             if stored is not None:
-                stored.append(written_row(number, row))
+                stored.put(number, json.dumps(row).encode())
             rows[number] = row
             feasible += row.status == MotionStatus.FEASIBLE
             _report(progress, rows, cases, feasible)
