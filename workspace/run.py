@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.checkpoint import Checkpoint, Kind, open_checkpoint
+from ..base.checkpoint import Checkpoint, Kind, checkpoint_path, open_checkpoint
 from ..base.errors import InputError
 from ..base.execution import Workers, check_workers, start_workers
-from ..base.inputs import file_path, flag, one_of, required, shown, whole_number
+from ..base.inputs import one_of, required, shown, whole_number
 from ..base.version import __version__
 from ..models import Robot
 from .condition import Condition, condition_from, for_robots
@@ -135,12 +135,7 @@ def sample(
     check_workers(workers, scheduler)
     whole_number("points_max", points_max, 0, MOST_POINTS)
     one_of("keep", keep, KEEP)
-    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
-    flag("resume", resume)
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    if resume and file is None:
-        raise InputError("checkpoint must be a path if resume is True, got None")
+    file = checkpoint_path(checkpoint, resume, progress)
     if size is not None and method != "adaptive":
         raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
     domain = Domain.of(robot, region)

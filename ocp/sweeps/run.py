@@ -13,9 +13,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...base.checkpoint import Kind, open_checkpoint
+from ...base.checkpoint import Kind, checkpoint_path, open_checkpoint
 from ...base.errors import InputError
-from ...base.inputs import file_path, flag, shown
+from ...base.inputs import file_path
 from ...base.version import __version__
 from ...base.writing import check_writable
 from ...models import Robot
@@ -96,13 +96,8 @@ def sweep(
     from ...base.execution import check_workers, start_workers  # imports as long as a short plan takes
 
     check_workers(workers, scheduler)
-    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    file = checkpoint_path(checkpoint, resume, progress)
     folder = None if keep is None else file_path("keep", keep, "a path or None").resolve()
-    flag("resume", resume)
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    if resume and file is None:
-        raise InputError("checkpoint must be a path if resume is True, got None")
     cases = Cases(as_robot(robot), read_task(task), read_axes(vary))
     cases.check()
     if folder is not None:
