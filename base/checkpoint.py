@@ -123,7 +123,8 @@ def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool
     target = check_writable(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.open("ab" if resume else "xb").close()
+        if not resume:
+            target.touch(exist_ok=False)
     except FileExistsError:
         raise InputError(f"checkpoint must be a new file unless it is resumed, got {path}, which exists") from None
     except OSError as error:

@@ -30,6 +30,7 @@ from towline.ocp.sweeps.row import Row
 
 TOWLINE = Path(sys.executable).with_name("towline")
 GRAVITY = 9.81
+FRAME = 32 + 24 + 16_384  # bytes of the log of a checkpoint with one row
 RISE = 1.0  # [m]
 MASS, T_MAX = 2.0, 50.0  # [kg, N]
 LIFT = {"name": "lift", "path": {"kind": "line", "start": [0, 0, 0.5], "end": [0, 0, 0.5 + RISE]}, "duration": 1.2}
@@ -419,7 +420,7 @@ def test_killed_interrupted_and_resumed_is_the_same_table(folder):
     file = folder / "run.chk"
     first = start(folder, "--checkpoint", "run.chk")
     log = folder / "run.chk-wal"
-    wait_until(lambda: stored_size(log) > 0, first)
+    wait_until(lambda: stored_size(log) >= FRAME, first)
     first.kill()
     first.communicate()
     (folder / "killed").mkdir()
