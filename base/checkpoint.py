@@ -1,112 +1,102 @@
-r"""Checkpoints: the results so far in a file that only grows, so that a run that was stopped can be resumed.
+"""Checkpoints: the results so far in an SQLite file, so that a run that was stopped can be resumed.
 
-The file has a first line that identifies it, a header, and records:
+Each result is committed as it comes, to SQLite's write-ahead log FILE-wal, and so survives the end of the process; once
+a second the disk has it, and so it survives a power cut. The log is gone after a run that ended normally or with an
+error; after a kill it belongs to the file, and the next run takes it in.
 
-    towline KIND checkpoint VERSION\n
-    length of the header (uint32), header (JSON: everything that the records depend on), its CRC-32
-    for each record in turn: length of its content (uint32), content, CRC-32 of both
-
-Integers are little-endian. If the last `longest_record` bytes or fewer cannot be read, they count as a record
-that was cut short by the end of the process, and are dropped. Damage farther from the end is an error, and the file is
-left unchanged.
+The table `record` has numbered results with the CRC-32 of both, and as number -1 the header: everything that the
+results depend on, as JSON. The database's `application_id` is the kind of results. One process at a time has the file.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import struct
+import sqlite3
 import time
-import uuid
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from io import FileIO
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .errors import InputError
+from .inputs import file_path, flag, shown
 from .writing import check_writable
 
-__all__ = ["ACCEPTED", "Checkpoint", "Kind", "begin", "open_checkpoint"]
+__all__ = ["Checkpoint", "Kind", "checkpoint_path", "open_checkpoint"]
 
 ACCEPTED = "a checkpoint of this run"
-_SIZE = struct.Struct("<I")  # of a length and of a CRC-32
-_SAFE_EVERY = 1.0  # [s] between writes that survive a power cut
+HEADER = -1  # its number
+PAGE = 16_384  # [bytes]; holds seven chunks of a workspace, where a page of the usual 4096 holds one
+SAFE_EVERY = 1.0  # [s] between writes that survive a power cut
+TABLE = "CREATE TABLE record (number INTEGER PRIMARY KEY, content BLOB NOT NULL, crc INTEGER NOT NULL)"
+WRITE = "INSERT OR IGNORE INTO record VALUES (?1, ?2, crc32(?2, ?1))"
 
 
-@dataclass(frozen=True)
-class Kind:
-    """The kind of records in a checkpoint.
+class Kind(NamedTuple):
+    """The kind of results in a checkpoint.
 
     Attributes
     ----------
-    magic
-        Its first line.
+    what
+        What computes them, such as "workspace".
     unit
-        What a record is called in messages, such as "chunk".
-    longest
-        Length of the longest content of a record [bytes].
+        What a result is called in messages, such as "chunk".
     """
 
-    magic: bytes
+    what: str
     unit: str
-    longest: int
-
-    @property
-    def longest_record(self) -> int:
-        """Return the length of the longest record [bytes]."""
-        return 2 * _SIZE.size + self.longest
 
 
 class Checkpoint:
-    """Read the records of an open checkpoint one by one, then append.
+    """The numbered results in an open checkpoint.
 
     Attributes
     ----------
     stored
-        Number of records that it has.
-    path
-        Its file.
+        How many there are.
     """
 
-    def __init__(self, path: Path, kind: Kind, stream: FileIO, start: int, stored: int):
-        self.path, self.stored = path, stored
-        self._kind, self._stream, self._left = kind, stream, stored
+    def __init__(self, path: Path, kind: Kind, database: sqlite3.Connection):
+        self._path, self._kind, self._database = path, kind, database
+        self.stored: int = database.execute("SELECT count(*) FROM record WHERE number >= 0").fetchone()[0]
         self._safe_at = time.monotonic()
-        stream.seek(start)
 
-    def read(self) -> bytes | None:
-        """Return the content of the next record; None if there is no other. Read them all before you append."""
-        if not self._left:
-            return None
-        self._left -= 1
-        return _record(self._stream, self._kind)
+    def get(self, number: int) -> bytes | None:
+        """Return the content of a result, or None if there is none of this number."""
+        found = self._database.execute("SELECT content FROM record WHERE number = ?", (number,)).fetchone()
+        return found and found[0]
 
-    def append(self, content: bytes) -> None:
-        """Append a record.
+    def items(self) -> Iterator[tuple[int, bytes]]:
+        """Yield the number and the content of each result, by number."""
+        yield from self._database.execute("SELECT number, content FROM record WHERE number >= 0 ORDER BY number")
+
+    def put(self, number: int, content: bytes) -> None:
+        """Store a result unless there is one of this number.
 
         Raises
         ------
         InputError
             If it cannot be written, as on a full disk. The file can be resumed.
         """
-        record = _SIZE.pack(len(content)) + content
-        left = memoryview(record + _SIZE.pack(zlib.crc32(record)))
         try:
-            self._stream.seek(0, os.SEEK_END)
-            while left:
-                left = left[self._stream.write(left) :]
-            if time.monotonic() - self._safe_at > _SAFE_EVERY:
-                os.fsync(self._stream.fileno())
+            self.stored += self._database.execute(WRITE, (number, content)).rowcount
+            if time.monotonic() - self._safe_at > SAFE_EVERY:
+                self._database.execute("PRAGMA wal_checkpoint")
                 self._safe_at = time.monotonic()
-        except OSError as error:
-            where = f"after {self._kind.unit} {self.stored}"
-            raise InputError(
-                f"checkpoint {self.path} cannot be written {where} ({error.strerror}); it can be resumed"
-            ) from None
-        self.stored += 1
+        except sqlite3.Error as error:
+            where = f"{self._path} cannot be written after {self._kind.unit} {self.stored}"
+            raise InputError(f"checkpoint {where} ({error}); it can be resumed") from None
+
+
+def checkpoint_path(checkpoint: object, resume: object, progress: object) -> Path | None:
+    """Return the path of a checkpoint or None; raise InputError if one of these arguments of a long run is wrong."""
+    path = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    if flag("resume", resume) and path is None:
+        raise InputError("checkpoint must be a path if resume is True, got None")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress must be a function or None, got {shown(progress)}")
+    return path
 
 
 @contextmanager
@@ -120,9 +110,9 @@ def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool
     kind
         What it holds.
     header
-        Everything that the records depend on, by names for messages; ready for JSON.
+        Everything that the results depend on, by names for messages; ready for JSON.
     resume
-        False: create a new file. True: continue the file, or create it if there is none.
+        False: create a new file. True: continue the file, or create it if there is none or an empty one.
 
     Raises
     ------
@@ -131,67 +121,52 @@ def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool
         damaged, or in use. The file is not changed then.
     """
     target = check_writable(path)
-    if target.exists() and not resume:
-        raise InputError(f"checkpoint must be a new file unless it is resumed, got {path}, which exists")
-    text = json.dumps(header, sort_keys=True).encode()
-    content = kind.magic + _SIZE.pack(len(text)) + text + _SIZE.pack(zlib.crc32(text))
     try:
-        if not target.exists() and not begin(target, content):
-            raise InputError(f"checkpoint must not be in use, got {path}, which another run has just begun")
-        stream = FileIO(target, "r+b")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if not resume:
+            target.touch(exist_ok=False)
+    except FileExistsError:
+        raise InputError(f"checkpoint must be a new file unless it is resumed, got {path}, which exists") from None
     except OSError as error:
         raise InputError(f"checkpoint must be a file that can be written, got {path} ({error.strerror})") from None
-    with stream:
-        _lock(path, stream)
-        _check_header(path, kind, stream, header)
-        start = stream.tell()
-        stored, end = _scan(path, kind, stream)
-        stream.truncate(end)
-        yield Checkpoint(path, kind, stream, start, stored)
-        os.fsync(stream.fileno())
-
-
-def begin(target: Path, content: bytes) -> bool:
-    """Create a new file atomically; return False if it exists by now, and leave it as it is."""
-    temporary = target.with_name(f".{uuid.uuid4().hex}")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        temporary.write_bytes(content)
+    with closing(sqlite3.connect(target, timeout=0, isolation_level=None)) as database:
         try:
-            os.link(temporary, target)  # unlike renaming, this never replaces a file
-        except FileExistsError:
-            return False
-        except OSError:  # a file system without links
-            os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return True
+            _begin(path, kind, database, header)
+            checkpoint = Checkpoint(path, kind, database)
+        except sqlite3.Error as error:
+            raise _refusal(path, kind, error) from None
+        yield checkpoint
 
 
-def _lock(path: Path, stream: FileIO) -> None:
-    """Lock the file as long as the stream is open, where the system has locks."""
-    try:
-        import fcntl
-    except ModuleNotFoundError:
-        return
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise InputError(f"checkpoint must not be in use, got {path}, to which another run is writing") from None
-    except OSError:  # a network file system without locks
-        return
+def _begin(path: Path, kind: Kind, database: sqlite3.Connection, header: dict[str, Any]) -> None:
+    """Lock the database; create its table, or check what it has."""
+    kind_id = zlib.crc32(f"towline {kind.what}".encode()) >> 1
+    database.create_function("crc32", 2, zlib.crc32, deterministic=True)
+    database.execute("PRAGMA locking_mode = EXCLUSIVE")
+    database.execute(f"PRAGMA page_size = {PAGE}")
+    database.execute("BEGIN EXCLUSIVE")
+    (found,) = database.execute("PRAGMA application_id").fetchone()
+    if found == 0 and not database.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        database.execute(f"PRAGMA application_id = {kind_id}")
+        database.execute(TABLE)
+        database.execute(WRITE, (HEADER, json.dumps(header, sort_keys=True).encode()))
+    elif found != kind_id:
+        raise _foreign(path, kind)
+    else:
+        _check(path, database, header)
+    database.execute("COMMIT")
+    database.execute("PRAGMA journal_mode = WAL")
+    database.execute("PRAGMA synchronous = NORMAL")
 
 
-def _check_header(path: Path, kind: Kind, stream: FileIO, header: dict[str, Any]) -> None:
-    """Read the header; raise InputError unless it is that of this run."""
-    if stream.read(len(kind.magic)) != kind.magic:
-        what = kind.magic.decode().partition(" checkpoint")[0].replace(" ", "'s ", 1)
-        raise InputError(f"checkpoint must be {ACCEPTED} or a new file, got {path}, which is no checkpoint of {what}")
-    size = stream.read(_SIZE.size)
-    text = stream.read(_SIZE.unpack(size)[0]) if len(size) == _SIZE.size else b""
-    if stream.read(_SIZE.size) != _SIZE.pack(zlib.crc32(text)) or not text:
-        raise InputError(f"checkpoint must be {ACCEPTED}, got {path} with a damaged header")
-    stored = json.loads(text)
+def _check(path: Path, database: sqlite3.Connection, header: dict[str, Any]) -> None:
+    """Raise InputError if the database is damaged, or its header is that of another run."""
+    whole = database.execute("PRAGMA quick_check(1)").fetchone() == ("ok",)
+    broken = "SELECT count(*) FROM record WHERE crc32(CAST(content AS BLOB), number) IS NOT crc"
+    content = database.execute("SELECT content FROM record WHERE number = ?", (HEADER,)).fetchone()
+    if not whole or database.execute(broken).fetchone()[0] or content is None:
+        raise InputError(f"checkpoint must be {ACCEPTED}, got {path}, which is damaged")
+    stored = json.loads(content[0])
     for name in {**header, **stored}:
         if header.get(name) != stored.get(name):
             ours, theirs = (_brief(values.get(name)) for values in (header, stored))
@@ -200,32 +175,21 @@ def _check_header(path: Path, kind: Kind, stream: FileIO, header: dict[str, Any]
             )
 
 
-def _scan(path: Path, kind: Kind, stream: FileIO) -> tuple[int, int]:
-    """Return how many whole records there are, and where they end."""
-    count, end = 0, stream.tell()
-    length = os.fstat(stream.fileno()).st_size
-    while _record(stream, kind) is not None:
-        count, end = count + 1, stream.tell()
-    longest = kind.longest_record
-    stream.seek(end)
-    stream.read(longest)
-    # A power cut can leave a file as long as it was to be, with zeros where nothing was written.
-    if length - end > longest and any(any(block) for block in iter(lambda: stream.read(longest), b"")):
-        where = f"{kind.unit} {count}, byte {end}"
-        raise InputError(f"checkpoint must be {ACCEPTED}, got {path}, which is damaged after {where}")
-    return count, end
+def _foreign(path: Path, kind: Kind) -> InputError:
+    what = f"towline's {kind.what}"
+    return InputError(f"checkpoint must be {ACCEPTED} or a new file, got {path}, which is no checkpoint of {what}")
 
 
-def _record(stream: FileIO, kind: Kind) -> bytes | None:
-    """Return the content of the next record, or None if there is no whole one."""
-    head = stream.read(_SIZE.size)
-    if len(head) < _SIZE.size:
-        return None
-    (size,) = _SIZE.unpack(head)
-    if not 0 < size <= kind.longest:
-        return None
-    content = stream.read(size)
-    return content if stream.read(_SIZE.size) == _SIZE.pack(zlib.crc32(head + content)) else None
+def _refusal(path: Path, kind: Kind, error: sqlite3.Error) -> InputError:
+    """Return the message for an error of SQLite while a checkpoint is opened."""
+    name = getattr(error, "sqlite_errorname", "")
+    if name == "SQLITE_NOTADB":
+        return _foreign(path, kind)
+    if name.startswith("SQLITE_BUSY"):
+        return InputError(f"checkpoint must not be in use, got {path}, to which another run is writing")
+    if name.startswith("SQLITE_CORRUPT"):
+        return InputError(f"checkpoint must be {ACCEPTED}, got {path}, which is damaged")
+    return InputError(f"checkpoint must be a file that can be written, got {path} ({error})")
 
 
 def _brief(value: Any) -> str:

@@ -15,10 +15,12 @@ __all__ = [
     "file_path",
     "finite_array",
     "flag",
+    "leading",
     "number",
     "one_of",
     "printable",
     "real_array",
+    "repeated",
     "required",
     "shown",
     "whole_number",
@@ -127,3 +129,27 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.fl
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got {shown(array.tolist())}")
     return array
+
+
+def repeated(name: str, value: Any, size: int) -> NDArray[np.float64]:
+    """Return a float64 copy of one number or `size` of them as (size,), or raise InputError for another shape."""
+    given = real_array(name, value)
+    if given.shape not in ((), (size,)):
+        raise InputError(f"{name} must be of shape ({size},), or a single number, got shape {given.shape}")
+    return np.full(size, given, dtype=np.float64)
+
+
+def leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the common leading dimensions of arguments, from those of each.
+
+    Raises
+    ------
+    InputError
+        If they differ where none is 1.
+    """
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        given = {name: str(shape) for name, shape in shapes.items() if shape}
+        accepted = f"{', '.join(given)} must have leading dimensions that are equal or 1"
+        raise InputError(f"{accepted}, got {', '.join(given.values())}") from None

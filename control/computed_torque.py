@@ -11,7 +11,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
-from ..base.inputs import number, shown
+from ..base.inputs import number, repeated, shown
 from ..models.batch import as_array
 from ..models.files import as_robot
 from ..models.robot import Robot
@@ -444,11 +444,10 @@ def reach_of(robot: Robot, reach: Any) -> np.ndarray:
 
 def positive(name: str, value: Any, size: int) -> np.ndarray:
     """Return numbers from 0 on, one or `size` of them, as (size,)."""
-    alone = np.isscalar(value) or getattr(value, "ndim", 1) == 0  # not np.ndim, which raises for unequal rows
-    result = as_array(name, value, () if alone else (size,))
-    if result.ndim > 1 or not ((result >= 0) & (result <= 1e9)).all():
+    result = repeated(name, value, size)
+    if not ((result >= 0) & (result <= 1e9)).all():
         raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")
-    return np.broadcast_to(result, size)
+    return result
 
 
 def _for_all(value: np.ndarray, rows: int) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base import processors
 from ..base.errors import InputError, SolverError
-from ..base.inputs import shown
+from ..base.inputs import leading, shown
 from ..base.machine_code.kernel import Kernel, compile_kernel
 from .tape import dense, translate
 
@@ -282,22 +282,6 @@ def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, A
                 raise InputError(f"{name} must have the shape {_core(size)} beside expressions, got {array.shape}")
             result[name] = ca.DM(array)
     return result
-
-
-def leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the common leading dimensions of arguments, from those of each.
-
-    Raises
-    ------
-    InputError
-        If they differ where none is 1.
-    """
-    try:
-        return np.broadcast_shapes(*shapes.values())
-    except ValueError:
-        given = ", ".join(str(shape) for shape in shapes.values())
-        message = f"{', '.join(shapes)} must have leading dimensions that are equal or 1, got {given}"
-        raise InputError(message) from None
 
 
 def _shape(core: tuple[int, ...]) -> str:

@@ -12,10 +12,11 @@ from ..base.inputs import printable
 from ..base.reading import read_bytes
 from .part import LARGEST
 
-__all__ = ["read_stl"]
+__all__ = ["HEADER", "RECORD", "read_stl"]
 
 LARGEST_FILE = 50_000_000  # [bytes], a million triangles
-HEADER, RECORD = 84, 50  # bytes of a binary file: before the triangles, and of each
+HEADER = 84  # bytes of a binary file before its triangles
+RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  # in small letters
 MARK = b"\xef\xbb\xbf"  # with which some editors begin a text in UTF-8
 
@@ -32,7 +33,7 @@ def read_stl(path: Path) -> np.ndarray:
     where, content = printable(path.name), read_bytes(path, "an STL file", LARGEST_FILE)
     count = int.from_bytes(content[HEADER - 4 : HEADER], "little") if len(content) >= HEADER else 0
     begins = content[:HEADER].removeprefix(MARK).lstrip()
-    if begins[:5].lower() == b"solid" and len(content) != HEADER + RECORD * count:
+    if begins[:5].lower() == b"solid" and len(content) != HEADER + RECORD.itemsize * count:
         triangles = _from_text(content.lower(), where)
     else:
         triangles = _from_binary(content, count, where)
@@ -47,18 +48,16 @@ def read_stl(path: Path) -> np.ndarray:
 
 
 def _from_binary(content: bytes, count: int, where: str) -> np.ndarray:
+    size = HEADER + RECORD.itemsize * count
     if len(content) < HEADER:
         raise InputError(f"{where} must be an STL file, got {len(content)} bytes, fewer than its header has")
-    if HEADER + RECORD * count > LARGEST_FILE:  # four bytes of anything else are a number too
+    if size > LARGEST_FILE:  # four bytes of anything else are a number too
         raise InputError(f"{where} must be an STL file, got other content")
-    if len(content) < HEADER + RECORD * count:
-        raise InputError(
-            f"{where} must have the {count} triangles that its header states, {HEADER + RECORD * count} bytes, got "
-            f"{len(content)} bytes"
-        )
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    if len(content) < size:
+        stated = f"the {count} triangles that its header states, {size} bytes"
+        raise InputError(f"{where} must have {stated}, got {len(content)} bytes")
     with np.errstate(invalid="ignore"):  # of a signalling nan, which is refused with the others
-        return np.frombuffer(content, record, count, HEADER)["corners"].astype(float)
+        return np.frombuffer(content, RECORD, count, HEADER)["corners"].astype(float)
 
 
 def _from_text(content: bytes, where: str) -> np.ndarray:

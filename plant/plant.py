@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base import processors
 from ..base.errors import InputError, SolverError
-from ..base.inputs import number, one_of, shown, whole_number
-from ..models.batch import as_array, leading
+from ..base.inputs import leading, number, one_of, repeated, shown, whole_number
+from ..models.batch import as_array
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
 from ..models.robot import Robot
@@ -131,11 +131,10 @@ class Plant:
         self._command_size = layout.COMMANDS + self.robot.m + layout.CARRIER * len(self.robot.carriers)
 
     def _of_cables(self, name: str, value: Any, default: list[float]) -> np.ndarray:
-        given = default if value is None else value
-        result = as_array(name, given, () if np.ndim(given) == 0 else (self.robot.m,))
-        if result.ndim > 1 or (result < 0).any():
-            raise InputError(f"{name} must be numbers >= 0, one or one for each cable, got {shown(value)}")
-        return np.broadcast_to(result, self.robot.m)
+        result = repeated(name, default if value is None else value, self.robot.m)
+        if not ((result >= 0) & (result < np.inf)).all():
+            raise InputError(f"{name} must be finite numbers >= 0, one or one for each cable, got {shown(value)}")
+        return result
 
     def start(
         self,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-import struct
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext, suppress
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.checkpoint import ACCEPTED, Checkpoint, Kind, open_checkpoint
+from ..base.checkpoint import Kind, open_checkpoint
 from ..base.errors import InputError
 from ..base.execution import start_workers
 from ..base.version import __version__
@@ -33,8 +32,7 @@ FASTER = 8  # times as many flights in a block as in the longest that has been m
 PARTS = 4  # blocks for each worker, as far as there are flights, so that none waits long for the last
 FEWEST = 25  # flights in a block, unless they take long; with fewer side by side each takes longer
 
-_HEAD = struct.Struct("<QI")  # number of the first flight, flights
-KIND = Kind(b"towline flights checkpoint 1\n", "block", _HEAD.size + SIDE_BY_SIDE * FIGURES.itemsize)
+KIND = Kind("flights", "block")  # a result is the figures of a block, by the number of its first flight
 Progress = Callable[[int, int, int], None]
 Part = tuple[int, np.ndarray, float]  # of all flights: the first, figures, and the time that they took [s]
 
@@ -76,8 +74,10 @@ def fly_many(
         opened = open_checkpoint(checkpoint, KIND, _header(*everything, seeds), resume)
     packed = None if workers == 1 and scheduler is None else _packed(everything, scheduler)
     with start_workers(workers, scheduler) as started, opened as stored:
-        if stored is not None:
-            _restore(stored, figures, done)
+        for first, content in () if stored is None else stored.items():
+            block = np.frombuffer(content, dtype=FIGURES)
+            figures[first : first + len(block)] = block
+            done[first : first + len(block)] = True
         shares = None if packed is None else started.limit if scheduler is not None else lambda: workers
         sizes = _Sizes(_estimated(everything, seeds), shares)
         fly = (lambda *job: fly_part(everything, *job)) if packed is None else fly_packed
@@ -86,7 +86,7 @@ def fly_many(
         for first, result, seconds in started.as_completed(fly, jobs):
             sizes.learn(len(result), seconds)
             if stored is not None:
-                stored.append(_HEAD.pack(first, len(result)) + result.tobytes())
+                stored.put(first, result.tobytes())
             figures[first : first + len(result)] = result
             done[first : first + len(result)] = True
             if progress is not None:
@@ -157,17 +157,6 @@ def _blocks(done: np.ndarray, sizes: _Sizes) -> Iterator[range]:
             stop = min(start + sizes.choose(left), end)
             yield range(start, stop)
             left, start = left - (stop - start), stop
-
-
-def _restore(stored: Checkpoint, figures: np.ndarray, done: np.ndarray) -> None:
-    """Copy the flights that the checkpoint has."""
-    while (content := stored.read()) is not None:
-        first, count = _HEAD.unpack(content[: _HEAD.size])
-        some = slice(first, first + count)
-        if len(content) != _HEAD.size + count * FIGURES.itemsize or first + count > len(done) or done[some].any():
-            raise InputError(f"checkpoint must be {ACCEPTED}, got {stored.path} with flights of another run")
-        figures[some] = np.frombuffer(content[_HEAD.size :], dtype=FIGURES)
-        done[some] = True
 
 
 def _header(plant: Plant, controller: Controller, conditions: Conditions, seeds: range) -> dict[str, Any]:

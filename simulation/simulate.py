@@ -10,9 +10,10 @@ from warnings import warn
 
 import numpy as np
 
+from ..base.checkpoint import checkpoint_path
 from ..base.errors import InputError
 from ..base.execution import check_workers
-from ..base.inputs import file_path, finite_array, flag, number, shown, whole_number
+from ..base.inputs import finite_array, number, shown, whole_number
 from ..control import ComputedTorque, Controller, Reference
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
@@ -164,21 +165,16 @@ def simulate(
 
 
 def _execution(
-    runs: int | None, workers: int, scheduler: Any, checkpoint: Any, resume: Any, progress: Any
+    runs: int | None, workers: int, scheduler: Any, checkpoint: Any, resume: Any, progress: Progress | None
 ) -> Execution:
     check_workers(workers, scheduler)
-    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    file = checkpoint_path(checkpoint, resume, progress)
     if runs is None and workers != 1:
         raise InputError(f"workers must be 1 without runs, got {workers}")
     if runs is None and (file is not None or scheduler is not None):
         name, value = ("checkpoint", file) if file is not None else ("scheduler", scheduler)
         raise InputError(f"{name} must be None without runs, got {shown(str(value))}")
-    if flag("resume", resume) and file is None:
-        raise InputError("checkpoint must be a path if resume is True, got None")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    show: Any = progress
-    return Execution(workers, scheduler, file, resume, show)
+    return Execution(workers, scheduler, file, resume, progress)
 
 
 def _drive(robot: Robot) -> str:

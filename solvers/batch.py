@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import processors
 from ..base.display import Displayed, Fact
 from ..base.errors import InputError
-from ..base.inputs import number, real_array, shown, whole_number
+from ..base.inputs import leading, number, real_array, shown, whole_number
 from ..base.text import quantity
 from . import compiled
 from .core import CABLES, ROWS, solve_rows
@@ -200,7 +200,7 @@ def solve_batch(
         "length": _real("length", 1.0 if length is None else length),
     }
     core = {name: {"A": 2, "length": 0}.get(name, 1) for name in given}
-    lead = _leading({name: value.shape[: value.ndim - core[name]] for name, value in given.items()})
+    lead = leading({name: value.shape[: value.ndim - core[name]] for name, value in given.items()})
     rows = int(np.prod(lead, dtype=np.int64))
 
     flat, per = [], np.zeros(7, np.int64)
@@ -319,16 +319,3 @@ def _ends(name: str, value: ArrayLike, size: int, repeat: bool = False) -> Array
         also = " or a single number" if repeat else ""
         raise InputError(f"{name} must be of shape (..., {size}) for this A{also}, got shape {array.shape}")
     return array
-
-
-def _leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the common leading dimensions, or raise InputError naming the first argument that does not fit."""
-    lead: tuple[int, ...] = ()
-    for name, shape in shapes.items():
-        try:
-            lead = np.broadcast_shapes(lead, shape)
-        except ValueError:
-            raise InputError(
-                f"{name} must have leading dimensions that broadcast with {lead}, those before it, got {shape}"
-            ) from None
-    return lead

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.display import Displayed
 from ..base.errors import InputError
-from ..base.inputs import real_array
+from ..base.inputs import real_array, repeated
 from ..base.tolerances import CANCELLED, DOUBTFUL, FEASIBILITY, ROUNDING, WEIGHTS_APART
 
 __all__ = ["Array", "TensionProblem", "accepted_error"]
@@ -209,20 +209,17 @@ def accepted_error(problem: TensionProblem, tensions: Array) -> float:
 
 def _real_array(name: str, value: ArrayLike) -> Array:
     """Return a float64 copy of `value`, or raise InputError if it is not an array of real numbers."""
-    array = np.array(real_array(name, value), dtype=np.float64, order="C")
+    return _flushed(np.array(real_array(name, value), dtype=np.float64, order="C"))
+
+
+def _flushed(array: Array) -> Array:
     array[np.abs(array) < _SMALLEST] = 0.0
     return array
 
 
 def _per_cable(name: str, value: ArrayLike, m: int) -> Array:
     """Return `value` as a new (m,) array without NaN, repeating a single number."""
-    array = _real_array(name, value)
-    if array.ndim == 0:
-        array = np.full(m, array)
-    elif array.shape != (m,):
-        raise InputError(
-            f"{name} must be of shape ({m},), one entry per cable, or a single number, got shape {array.shape}"
-        )
+    array = _flushed(repeated(name, value, m))
     _reject_at(name, array, np.isnan(array), "numbers")
     return array
 

@@ -1,10 +1,10 @@
 """Tension-rate limits: tensions near the last ones, for every method."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
-from ..base.inputs import real_array, required, shown
+from ..base.inputs import repeated, required, shown
 from .problem import TensionProblem
 
 __all__ = ["limit_rate"]
@@ -38,17 +38,10 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
         If an argument has a wrong type, shape or value.
     """
     required("problem", problem, TensionProblem)
-    at, step = _per_cable("previous", previous, problem.m), _per_cable("rate_max", rate_max, problem.m)
+    at, step = repeated("previous", previous, problem.m), repeated("rate_max", rate_max, problem.m)
     if not (step >= 0.0).all() or not np.isfinite(at).all():
         if np.isfinite(at).all():
             raise InputError(f"rate_max must be numbers >= 0 [N per call], got {step.min():g}")
         raise InputError(f"previous must be finite tensions [N], got {shown(at.tolist())}")
     lower, upper = (np.clip(limit, at - step, at + step) for limit in (problem.t_min, problem.t_max))
     return TensionProblem(problem.A, problem.w, lower, upper, problem.t_ref, problem.weights, problem.length)
-
-
-def _per_cable(name: str, value: ArrayLike, m: int) -> NDArray[np.float64]:
-    array = real_array(name, value)
-    if array.shape not in ((), (m,)):
-        raise InputError(f"{name} must be of shape ({m},) or a single number, got shape {array.shape}")
-    return np.broadcast_to(array.astype(np.float64), (m,))

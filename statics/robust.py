@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from ..base.display import record
 from ..base.errors import InputError
-from ..base.inputs import real_array, required, shown, whole_number
+from ..base.inputs import finite_array, real_array, required, shown, whole_number
 from ..models.part import LARGEST
 from ..models.robot import Robot
 
@@ -154,7 +154,7 @@ def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: Arr
         If an argument has a wrong type or shape, or the robot has no uncertainty.
     """
     poses, carriers = _places(robot, pose, carrier_pose)
-    values = _rows("tensions", tensions, len(poses), (robot.m,))
+    values = finite_array("tensions", tensions, (len(poses), robot.m))
     return Spread(robot, poses, carriers).sigmas(values)
 
 
@@ -287,7 +287,7 @@ def share_of_robots(
     poses, carriers = _places(robot, pose, carrier_pose)
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
-    w = _rows("wrench", wrench, len(poses), (6,))[:, rows] * scale
+    w = finite_array("wrench", wrench, (len(poses), 6))[:, rows] * scale
     holds = np.zeros(whole_number("count", count, 1, 1_000_000), dtype=bool)
     for index, one in enumerate(robot.drawn(count, seed)):
         A = wrench_matrices(one, poses, carriers)[:, rows] * scale[:, None]
@@ -303,14 +303,7 @@ def _places(robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike | None) -> tu
         raise InputError(f"pose must be an array of shape (n, 6) of finite numbers, got {shown(poses)}")
     if carrier_pose is None:
         return poses, np.broadcast_to(home, (len(poses), *home.shape))
-    return poses, _rows("carrier_pose", carrier_pose, len(poses), home.shape)
-
-
-def _rows(name: str, value: ArrayLike, n: int, shape: tuple[int, ...]) -> np.ndarray:
-    array = real_array(name, value).astype(float)
-    if array.shape != (n, *shape) or not np.isfinite(array).all():
-        raise InputError(f"{name} must be an array of shape {(n, *shape)} of finite numbers, got {shown(array)}")
-    return array
+    return poses, finite_array("carrier_pose", carrier_pose, (len(poses), *home.shape))
 
 
 def _indices(name: str, value: ArrayLike, n: int) -> np.ndarray:

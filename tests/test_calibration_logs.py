@@ -138,8 +138,8 @@ def spoiled(what):
 
 
 FAULTS = {
-    "no unit": r"the header must have a name and a unit for each column, as 'l0 \[m\]', got 'l2'",
-    "wrong unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, got 'N'",
+    "no unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, got ''",
+    "wrong unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, got 'N'",
     "unknown column": "columns must be among l0, l1, .*, got 'length'",
     "twice": "must have each column once, got l1 twice",
     "a gap": "must have columns l0 to l7 without a gap, got no l2",
@@ -152,8 +152,8 @@ FAULTS = {
     "header alone": "must have a line for each sample below its header, got none",
     "binary": "must be a CSV file in UTF-8, or NetCDF, got other bytes",
     "damaged NetCDF": "must be a NetCDF 4 file, got one that cannot be read",
-    "text": "l1 must be a number at sample 3, got 'much'",
-    "truncated": "sample 59 must have 15 fields, as the header has, got",
+    "text": r"line 5, column l1 \[m\] must be a number, got 'much'",
+    "truncated": "line 61 must have 15 columns as the header, got",
 }
 
 
@@ -173,7 +173,7 @@ def test_bad_logs_are_refused_in_one_line(what, tmp_path):
 )
 def test_a_csv_field_without_end_is_refused_in_one_line(read, header, tmp_path):
     (tmp_path / "log.csv").write_text(f'{header}"{"x" * 200_000}\n1\n2\n')
-    with pytest.raises(InputError, match=r"log\.csv must be CSV that can be read, got field larger than") as error:
+    with pytest.raises(InputError, match=r"log\.csv: must be CSV that can be read, got field larger than") as error:
         read(tmp_path / "log.csv")
     assert str(error.value).isprintable()
 

@@ -428,7 +428,7 @@ def test_a_single_estimate_takes_microseconds():
         ({"lengths": [8, 8, 8, 8, 8, 8, 8, 2e9]}, r"lengths must be numbers up to 1e\+09 \[m\], got 2e\+09"),
         ({"start": np.zeros(5)}, "start must have the shape"),
         ({"sigma": 0}, "sigma must be numbers > 0"),
-        ({"sigma": [1e-3, 1e-3]}, r"sigma must be a number > 0 or of shape \(8,\)"),
+        ({"sigma": [1e-3, 1e-3]}, r"sigma must be of shape \(8,\), or a single number, got shape \(2,\)"),
         ({"start": np.zeros((2, 6)), "lengths": np.full((3, 8), 8.0)}, "leading dimensions"),
     ],
 )

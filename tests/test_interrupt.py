@@ -273,13 +273,14 @@ def test_a_signal_ends_a_command_and_its_workers(number, to_all, tmp_path):
     while len(sizes) < 2:  # until the first plan is stored
         time.sleep(0.05)
         assert process.poll() is None, process.stderr.read()
-        sizes |= {(tmp_path / "c").stat().st_size} if (tmp_path / "c").exists() else set()
+        sizes |= {(tmp_path / "c-wal").stat().st_size} if (tmp_path / "c-wal").exists() else set()
     out, err, _ = stop(process, number, os.killpg if to_all else os.kill)  # the time is also that of its workers
     assert (process.returncode, out) == (STOP[number], "")
     # What is stored is counted a moment later.
     counted = r"towline: stopped( after \d+ of 251 plans)?; to continue, repeat the command with --resume c\n"
     assert re.fullmatch(counted, err), err
-    assert sorted(os.listdir(tmp_path)) == ["c", "circle.yaml"]
+    # A thread ends the process where it does not end in time: then the log of the checkpoint is left beside it.
+    assert {"c", "circle.yaml"} <= set(os.listdir(tmp_path)) <= {"c", "c-wal", "circle.yaml"}
     if Path("/proc/self").exists():
         deadline = time.perf_counter() + LONGEST
         while processes_of(process.pid):

@@ -171,10 +171,7 @@ def test_bad_rows_are_flagged_and_the_rest_solved():
         ({"A": np.ones((2, 6, 8)) + 1j}, r"A must be .*, got entries of type complex128"),
         ({"A": [[1.0, 2.0], [3.0]]}, "A must be an array of real numbers, got .*unequal length"),
         ({"w": np.ones((2, 5))}, r"w must be of shape \(\.\.\., 6\) .*, got shape \(2, 5\)"),
-        (
-            {"w": np.ones((3, 6))},
-            r"w must have leading dimensions that broadcast with \(2,\), those before it, got \(3,\)",
-        ),
+        ({"w": np.ones((3, 6))}, r"A, w must have leading dimensions that are equal or 1, got \(2,\), \(3,\)"),
         ({"t_min": np.ones(6)}, r"t_min must be of shape \(\.\.\., 8\) .*, got shape \(6,\)"),
         ({"t_max": None}, r"t_max must be an array of real numbers, got None"),
         ({"threads": 0}, "threads must be a whole number from 1 to 1024, got 0"),

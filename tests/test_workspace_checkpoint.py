@@ -1,7 +1,10 @@
-"""Checkpoints: a run that was killed goes on and ends with the identical file; no foreign file is touched."""
+"""Checkpoints: a run that was killed goes on and ends with the identical result; no foreign file is touched."""
 
+import contextlib
 import os
+import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -9,17 +12,21 @@ from pathlib import Path
 
 import pytest
 
-from towline.base.checkpoint import begin, open_checkpoint
+from towline.base import checkpoint
+from towline.base.checkpoint import Kind, open_checkpoint
 from towline.base.errors import InputError
 from towline.models import load
 from towline.solvers import compiled
 from towline.workspace import Condition, StaticEquilibrium, sample, save
-from towline.workspace.checkpoint import KIND
+from towline.workspace.run import KIND
 from towline.workspace.sampling import CHUNK
 
 TOWLINE = Path(sys.executable).with_name("towline")
 SAMPLES = 3 * CHUNK + 1000
-RECORD = 16 + CHUNK // 8 + 4  # bytes
+PAGE = 16_384 + 24  # bytes in the log of SQLite for each chunk, at least
+
+
+FOREIGN = "which is no checkpoint of towline's workspace"
 
 
 class Counting(StaticEquilibrium):
@@ -55,23 +62,33 @@ def test_killed_and_resumed_is_the_identical_file(tmp_path):
     options = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     first = subprocess.Popen([*command, "killed", "--workers", "2"], **options)
     deadline = time.monotonic() + 100
-    while not (tmp_path / "killed").exists() or (tmp_path / "killed").stat().st_size < 10 * RECORD:
+    while not (tmp_path / "killed-wal").exists() or (tmp_path / "killed-wal").stat().st_size < 10 * PAGE:
         assert first.poll() is None, first.stderr.read()
         assert time.monotonic() < deadline
         time.sleep(0.002)
     children = [int(child) for child in Path(f"/proc/{first.pid}/task/{first.pid}/children").read_text().split()]
     first.send_signal(signal.SIGKILL)
     first.wait()
-    size = (tmp_path / "killed").stat().st_size
-    assert size < 62 * RECORD, "it was done before it was killed"
+    (tmp_path / "copy").mkdir()
+    for left in ("killed", "killed-wal"):  # reading takes the log in
+        shutil.copy(tmp_path / left, tmp_path / "copy")
+    chunks = stored(tmp_path / "copy" / "killed")
+    assert 5 < len(chunks) < 62, "it was done before it was killed"
     while any(alive(child) for child in children):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     second = subprocess.run([*command, "killed", "--out", "killed.nc"], check=False, timeout=120, **options)
     assert second.returncode == 0, second.stderr
     subprocess.run([*command, "other", "--out", "other.nc"], check=True, timeout=120, **options)
-    assert (tmp_path / "killed").read_bytes() == (tmp_path / "other").read_bytes()
+    resumed = stored(tmp_path / "killed")
+    assert {number: resumed[number] for number in chunks} == chunks
+    assert sorted(os.listdir(tmp_path)) == ["copy", "killed", "killed.nc", "other", "other.nc"]
     assert (tmp_path / "killed.nc").read_bytes() == (tmp_path / "other.nc").read_bytes()
+
+
+def stored(file):
+    with contextlib.closing(sqlite3.connect(file)) as database:
+        return dict(database.execute("SELECT number, content FROM record"))
 
 
 def alive(process):
@@ -81,26 +98,36 @@ def alive(process):
         return False
 
 
-@pytest.mark.parametrize("lost", [1, RECORD - 1, RECORD, 2 * RECORD + 7, 10**6])
-def test_a_torn_end_is_dropped(tmp_path, whole, lost):
-    """Wherever the file ends, down to its bare header."""
-    content, result = whole
-    header = len(content) - 3 * RECORD - (16 + 1000 // 8 + 4)
-    file = tmp_path / "run.checkpoint"
-    file.write_bytes(content[: max(header, len(content) - lost)])
-    found = run(file, True)
-    assert file.read_bytes() == content
-    assert save(found, tmp_path / "result.nc").read_bytes() == result
+@pytest.mark.parametrize("lost", [0, 1, 7000, 30_000, 10**9])
+@pytest.mark.parametrize("zeros", [False, True], ids=["cut", "zeros"])
+def test_what_a_power_cut_leaves_is_resumed(tmp_path, whole, monkeypatch, lost, zeros):
+    """Wherever the log ends, down to nothing, or with zeros where nothing was written yet."""
+    monkeypatch.setattr(checkpoint, "SAFE_EVERY", float("inf"))  # all chunks stay in the log
+    left = {}
+
+    def look(done, total, accepted):
+        if done == total:  # before the file is closed
+            left.update({name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)})
+
+    run(tmp_path / "run.checkpoint", False, progress=look)
+    assert os.listdir(tmp_path) == ["run.checkpoint"]
+    assert sorted(left) == ["run.checkpoint", "run.checkpoint-wal"]
+    log = left["run.checkpoint-wal"]
+    size = max(0, len(log) - lost)
+    (tmp_path / "run.checkpoint").write_bytes(left["run.checkpoint"])
+    (tmp_path / "run.checkpoint-wal").write_bytes(log[:size] + bytes(len(log) - size if zeros else 0))
+    counts.clear()
+    found = run(tmp_path / "run.checkpoint", True, Counting())
+    assert counts[0] == 1
+    assert (sum(counts) == 1) == (lost == 0)
+    assert save(found, tmp_path / "result.nc").read_bytes() == whole[1]
+    assert sorted(os.listdir(tmp_path)) == ["result.nc", "run.checkpoint"]
 
 
-def test_garbage_at_the_end_is_dropped(tmp_path, whole):
-    """As a power cut can leave: the length is there, the content is not."""
-    content, result = whole
-    file = tmp_path / "run.checkpoint"
-    for lost, zeros in ((100, 100), (RECORD + 5, 3 * RECORD)):
-        file.write_bytes(content[:-lost] + bytes(zeros))
-        assert save(run(file, True), tmp_path / "result.nc").read_bytes() == result
-        assert file.read_bytes() == content
+def lose(file, more=""):
+    """Remove the last chunk from a checkpoint, or those that `more` selects."""
+    with contextlib.closing(sqlite3.connect(file)) as database, database:
+        database.execute(f"DELETE FROM record WHERE number {more or '= (SELECT max(number) FROM record)'}")
 
 
 def test_what_is_there_is_not_asked_again(tmp_path):
@@ -112,21 +139,22 @@ def test_what_is_there_is_not_asked_again(tmp_path):
     counts.clear()
     assert run(file, True, Counting()).drop_attrs().identical(first.drop_attrs())
     assert sum(counts) == 1
-    with file.open("r+b") as stream:
-        stream.truncate(file.stat().st_size - 1)
+    lose(file)
     counts.clear()
     run(file, True, Counting())
     assert sum(counts) == 1 + 1000
+    lose(file, "= 1")  # also in the middle
+    counts.clear()
+    assert run(file, True, Counting()).drop_attrs().identical(first.drop_attrs())
+    assert sum(counts) == 1 + CHUNK
 
 
 def test_refinement_goes_on_too(tmp_path):
     options = {"method": "adaptive", "samples": 60_000}
     file = tmp_path / "run.checkpoint"
     first = save(run(file, False, **options), tmp_path / "first.nc").read_bytes()
-    content = file.read_bytes()
-    file.write_bytes(content[: len(content) * 2 // 3])
+    lose(file, ">= 2")
     assert save(run(file, True, **options), tmp_path / "second.nc").read_bytes() == first
-    assert file.read_bytes() == content
 
 
 @pytest.mark.parametrize(
@@ -159,12 +187,13 @@ def test_a_checkpoint_of_another_robot_is_refused(tmp_path, whole):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda content: b"", "which is no checkpoint of towline's workspace"),
-        (lambda content: b"robot: mine\n" * 100, "which is no checkpoint of towline's workspace"),
-        (lambda content: content[: len(KIND.magic) + 2], "with a damaged header"),
-        (lambda content: content[:60] + b"?" + content[61:], "with a damaged header"),
-        (lambda content: content[: -2 * RECORD] + b"?" + content[-2 * RECORD + 1 :], "is damaged after chunk"),
-        (lambda content: content + content, "is damaged after chunk 4"),
+        (lambda content: b"robot: mine\n" * 100, FOREIGN),
+        (lambda content: b"towline workspace checkpoint 2\n" + bytes(5000), FOREIGN),  # of older versions
+        (lambda content: content[:68] + b"mine" + content[72:], FOREIGN),  # the database of another program
+        (lambda content: content[: len(content) // 2], "which is damaged"),
+        (lambda content: content.replace(b'"robot"', b'"rabot"'), "which is damaged"),
+        (lambda content: content[:-2000] + b"?" + content[-1999:], "which is damaged"),
+        (lambda content: content[:16_384] + b"?" * 8 + content[16_392:], "which is damaged"),  # a page of its table
     ],
 )
 def test_a_damaged_or_foreign_file_is_left_as_it_is(tmp_path, whole, damage, message):
@@ -175,6 +204,21 @@ def test_a_damaged_or_foreign_file_is_left_as_it_is(tmp_path, whole, damage, mes
         run(file, True)
     assert "\n" not in str(caught.value)
     assert file.read_bytes() == before
+
+
+def test_an_empty_file_is_a_new_one(tmp_path, whole):
+    """As a run leaves it that is killed before it has begun."""
+    file = tmp_path / "run.checkpoint"
+    file.touch()
+    assert save(run(file, True), tmp_path / "result.nc").read_bytes() == whole[1]
+
+
+def test_a_checkpoint_of_another_command_is_refused(tmp_path, whole):
+    file = tmp_path / "run.checkpoint"
+    file.write_bytes(whole[0])
+    with pytest.raises(InputError, match="which is no checkpoint of towline's sweep"):
+        open_checkpoint(file, Kind("sweep", "plan"), {}, True).__enter__()
+    assert file.read_bytes() == whole[0]
 
 
 def test_nothing_is_overwritten(tmp_path):
@@ -191,11 +235,14 @@ def test_nothing_is_overwritten(tmp_path):
 
 
 def test_of_two_runs_that_begin_at_once_one_has_the_file(tmp_path):
-    """Both have seen that it is not there yet."""
+    """Neither resumes, and both have seen that it is not there yet."""
     file = tmp_path / "run.checkpoint"
-    assert begin(file, b"first")
-    assert not begin(file, b"second")
-    assert file.read_bytes() == b"first"
+    with open_checkpoint(file, KIND, {"a": 1}, False) as first:
+        with pytest.raises(InputError, match="must be a new file unless it is resumed"):
+            open_checkpoint(file, KIND, {"a": 1}, False).__enter__()
+        first.put(0, b"mine")
+    with open_checkpoint(file, KIND, {"a": 1}, True) as again:
+        assert list(again.items()) == [(0, b"mine")]
     assert os.listdir(tmp_path) == ["run.checkpoint"]
 
 
@@ -205,15 +252,16 @@ def test_a_full_disk_is_told_and_what_is_there_is_gone_on_with(tmp_path, whole):
     file = tmp_path / "run.checkpoint"
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole[0]) - RECORD, before[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (3 * PAGE, before[1]))
         with pytest.raises(
-            InputError, match=r"run.checkpoint cannot be written after chunk 2 \(File too large\); it can be resumed"
+            InputError, match=r"run.checkpoint cannot be written after chunk [12] \(disk I/O error\); it can be resumed"
         ):
             run(file, False)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     found = run(file, True)
-    assert file.read_bytes() == whole[0]
+    assert save(found, tmp_path / "whole.nc").read_bytes() == whole[1]
+    (tmp_path / "whole.nc").unlink()
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
         with pytest.raises(InputError, match=r"result.nc: cannot be written \(File too large\)"):
@@ -224,7 +272,6 @@ def test_a_full_disk_is_told_and_what_is_there_is_gone_on_with(tmp_path, whole):
 
 
 def test_one_run_at_a_time(tmp_path):
-    pytest.importorskip("fcntl")
     file = tmp_path / "run.checkpoint"
     with (
         open_checkpoint(file, KIND, {"a": 1}, False),

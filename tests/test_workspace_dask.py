@@ -1,8 +1,10 @@
 """Sampling on a Dask cluster: the same result, also when a worker is killed, and what is told without a cluster."""
 
+import contextlib
 import json
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -15,6 +17,7 @@ from towline.base import execution
 from towline.base.errors import InputError
 from towline.models import load
 from towline.workspace import StaticEquilibrium, sample, save
+from towline.workspace.sampling import CHUNK
 
 TOWLINE = Path(sys.executable).with_name("towline")
 distributed = pytest.importorskip("distributed")
@@ -54,7 +57,13 @@ def test_a_killed_worker_leaves_the_file_identical(cluster, tmp_path):
     assert killed[0] < ended, "the worker was killed after the work"
     alone = sample(robot, StaticEquilibrium(), samples=samples, checkpoint=tmp_path / "alone.checkpoint")
     assert save(shared, tmp_path / "shared.nc").read_bytes() == save(alone, tmp_path / "alone.nc").read_bytes()
-    assert (tmp_path / "cluster.checkpoint").read_bytes() == (tmp_path / "alone.checkpoint").read_bytes()
+    assert results(tmp_path / "cluster.checkpoint") == results(tmp_path / "alone.checkpoint")
+    assert len(results(tmp_path / "alone.checkpoint")) == -(-samples // CHUNK)
+
+
+def results(file):
+    with contextlib.closing(sqlite3.connect(file)) as database:
+        return database.execute("SELECT * FROM record WHERE number >= 0").fetchall()
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "no such host:1", "tcp://"])
@@ -108,7 +117,8 @@ def test_a_cluster_that_ends_is_one_line_within_ten_seconds(killed, message, tmp
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
         started["command"] = subprocess.Popen([TOWLINE, "workspace", "wang-flying", *options], **pipes)
         sizes = set()
-        until(lambda: sizes.add(checkpoint.exists() and checkpoint.stat().st_size) or len(sizes) > 2)
+        log = tmp_path / "c-wal"
+        until(lambda: sizes.add(log.exists() and log.stat().st_size) or len(sizes) > 2)
         began = time.monotonic()
         started[killed].kill()
         out, err = started["command"].communicate(timeout=60)

@@ -13,14 +13,13 @@ from ..base.errors import InputError
 from ..base.inputs import finite_array, required, whole_number
 from ..base.writing import whole_file
 from ..models import Robot
+from ..models.stl import HEADER, RECORD
 from .condition import Condition
 from .places import Places
 
 __all__ = ["Mesh", "boundary", "boundary_of_values"]
 
 MOST_CELLS = 512  # along an edge: 10^8 poses at once
-
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +48,11 @@ class Mesh(Displayed):
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         sizes = np.linalg.norm(normals, axis=1, keepdims=True)
-        records = np.zeros(len(corners), dtype=_RECORD)
+        records = np.zeros(len(corners), dtype=RECORD)
         records["normal"], records["corners"] = normals / np.where(sizes > 0, sizes, 1.0), corners
-        with whole_file(Path(path)) as temporary, temporary.open("wb") as stream:
-            stream.write(b"towline workspace, metres".ljust(80))
-            stream.write(np.uint32(len(records)).astype("<u4").tobytes())
-            stream.write(records.tobytes())
+        count = len(records).to_bytes(4, "little")
+        with whole_file(Path(path)) as temporary:
+            temporary.write_bytes(b"towline workspace, metres".ljust(HEADER - 4) + count + records.tobytes())
         return Path(path)
 
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.checkpoint import Checkpoint, Kind, checkpoint_path, open_checkpoint
 from ..base.errors import InputError
 from ..base.execution import Workers, check_workers, start_workers
-from ..base.inputs import file_path, flag, one_of, required, shown, whole_number
+from ..base.inputs import one_of, required, shown, whole_number
 from ..base.version import __version__
 from ..models import Robot
-from .checkpoint import ChunkCheckpoint, open_chunks
 from .condition import Condition, condition_from, for_robots
 from .counting import Counter, Shared, count
 from .counts import Counts
@@ -25,7 +25,7 @@ from .dataset import dataset
 from .domain import Domain
 from .refinement import Refinement
 from .region import Region
-from .sampling import CHUNK, Sampler, check_sampling, chunks_of, size_of
+from .sampling import CHUNK, Sampler, check_sampling, chunks_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 KEEP = ("accepted", "all", "none")
 MOST_POINTS = 10_000_000
 LARGEST_JOB = 8  # chunks
+KIND = Kind("workspace", "chunk")  # a result is which samples are accepted, one bit each
 
 Progress = Callable[[int, int, int], None]
 
@@ -134,12 +135,7 @@ def sample(
     check_workers(workers, scheduler)
     whole_number("points_max", points_max, 0, MOST_POINTS)
     one_of("keep", keep, KEEP)
-    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
-    flag("resume", resume)
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    if resume and file is None:
-        raise InputError("checkpoint must be a path if resume is True, got None")
+    file = checkpoint_path(checkpoint, resume, progress)
     if size is not None and method != "adaptive":
         raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
     domain = Domain.of(robot, region)
@@ -158,7 +154,7 @@ def sample(
     counter = Counter(condition, domain, sampler, keep, total)
     counts = Counts(domain, points_max if keep != "none" else 0)
     header = _header(robot, {**requested, "samples": total, "size": size})
-    opened = open_chunks(file, header, resume) if file is not None else nullcontext()
+    opened = open_checkpoint(file, KIND, header, resume) if file is not None else nullcontext()
     if workers > 1 and scheduler is None:
         counter.prepare()
     with start_workers(workers, scheduler) as started, opened as stored:
@@ -195,7 +191,7 @@ class _Run:
         counter: Counter,
         counts: Counts,
         workers: Workers,
-        checkpoint: ChunkCheckpoint | None,
+        checkpoint: Checkpoint | None,
         progress: Progress | None,
     ):
         self._shared, self._total = Shared(counter), counter.samples
@@ -217,7 +213,7 @@ class _Run:
                 size = min(CHUNK, left)
                 left -= size
                 if self._checkpoint:
-                    self._checkpoint.append(self._chunk, size, flags)
+                    self._checkpoint.put(self._chunk, flags)
                 self._chunk += 1
                 yield np.unpackbits(np.frombuffer(flags, np.uint8), count=size).astype(bool)
             if self._progress is not None:
@@ -229,7 +225,7 @@ class _Run:
         together = min(LARGEST_JOB, max(1, chunks // 64))
         for start in range(0, chunks, together):
             some = range(start, min(start + together, chunks))
-            known = [self._checkpoint and self._checkpoint.flags(first + i, size_of(i, samples)) for i in some]
+            known = [self._checkpoint and self._checkpoint.get(first + i) for i in some]
             units = None if points is None else [points[i * CHUNK : (i + 1) * CHUNK] for i in some]
             yield self._shared, first + start, known, units, self._counts.left > 0
 

@@ -7,18 +7,18 @@ with these names and the attribute `units`, or, as towline writes them, cable_le
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 import re
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from ...base.csv_columns import ANGLES, LENGTHS, TIMES, read_columns, unit_factor
 from ...base.declared import check_hdf5
 from ...base.errors import InputError
-from ...base.inputs import file_path, printable, shown
+from ...base.inputs import file_path, printable
 from ...base.netcdf import check_units
 from ...base.reading import read_bytes
 from .measurements import Measurements, Sigma
@@ -27,9 +27,6 @@ __all__ = ["read_measurements"]
 
 LARGEST_LOG = 1_000_000_000  # [bytes]
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
-LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "km": 1e3}
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180, "°": np.pi / 180}
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 NUMBERS = {"1": 1.0, "-": 1.0}
 POSITION, ANGLE_NAMES, QUATERNION = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("qx", "qy", "qz", "qw")
@@ -40,15 +37,8 @@ UNITS = {
     "t": TIMES,
 }
 NUMBERED = re.compile(r"(l|tension)(0|[1-9]\d{0,2})")
-HEADING = re.compile(r"\s*([^\[\]]*?)\s*\[\s*([^\[\]]*?)\s*\]\s*")
 WRITTEN = ("cable_lengths", "pose", "tensions", "time")  # by towline
 ACCEPTED = "l0, l1, ..., x, y, z, roll, pitch, yaw, qx, qy, qz, qw, t, tension0, tension1, ..."
-MISSING = ("", "nan", "NaN", "NAN")
-
-
-class _Column(NamedTuple):
-    values: np.ndarray  # (N,), in SI units
-    where: str
 
 
 def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, float] | None = None) -> Measurements:
@@ -82,76 +72,35 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
         return Measurements(**arguments)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    except csv.Error as error:  # a field of more than 131 072 characters
-        raise InputError(f"{where} must be CSV that can be read, got {error}") from None
 
 
-def _csv_columns(content: bytes) -> dict[str, _Column]:
+def _csv_columns(content: bytes) -> dict[str, np.ndarray]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"must be a CSV file in UTF-8, or NetCDF, got other bytes (byte {error.start})") from None
     if "\0" in text:
         raise InputError("must be a CSV file in UTF-8, or NetCDF, got binary data")
-    lines = text.splitlines()
-    header, body = lines[0], [line for line in lines[1:] if line.strip()]
-    delimiter = ";" if ";" in header else "\t" if "\t" in header and "," not in header else ","
-    headings = [_heading(cell) for cell in next(csv.reader([header], delimiter=delimiter))]
-    names = [name for name, _ in headings]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"must have each column once, got {name} twice")
-    if not body:
+    columns, lines = read_columns(text, _factor, gaps=True)
+    if not lines:
         raise InputError("must have a line for each sample below its header, got none")
-    table = _numbers(body, delimiter, names)
-    return {name: _Column(table[:, i] * factor, f"column {name}") for i, (name, factor) in enumerate(headings)}
-
-
-def _heading(cell: str) -> tuple[str, float]:
-    """Return the name of a column and the factor to SI units."""
-    match = HEADING.fullmatch(cell)
-    if match is None:
-        raise InputError(f"the header must have a name and a unit for each column, as 'l0 [m]', got {shown(cell)}")
-    return match[1], _factor(match[1], match[2])
+    return columns
 
 
 def _factor(name: str, unit: str) -> float:
+    """Return the factor to SI units of a column or a variable."""
     numbered = NUMBERED.fullmatch(name)
     units = (LENGTHS if numbered[1] == "l" else FORCES) if numbered else UNITS.get(name)
-    if units is None:
-        raise InputError(f"columns must be among {ACCEPTED}, got {shown(name)}")
-    if unit not in units:
-        raise InputError(f"the unit of {name} must be one of {', '.join(units)}, got {shown(unit)}")
-    return units[unit]
+    return unit_factor(name, unit, units, ACCEPTED)
 
 
-def _numbers(lines: list[str], delimiter: str, names: list[str]) -> np.ndarray:
-    """Return the numbers of the lines, (N, columns); empty fields are nan."""
-    try:
-        table = np.loadtxt(io.StringIO("\n".join(lines)), delimiter=delimiter, ndmin=2, comments=None)
-        if table.shape == (len(lines), len(names)):
-            return table
-    except ValueError:
-        pass
-    table = np.empty((len(lines), len(names)))
-    for row, cells in enumerate(csv.reader(lines, delimiter=delimiter)):
-        if len(cells) != len(names):
-            raise InputError(f"sample {row} must have {len(names)} fields, as the header has, got {len(cells)}")
-        for column, cell in enumerate(cells):
-            try:
-                table[row, column] = np.nan if cell.strip() in MISSING else float(cell)
-            except ValueError:
-                raise InputError(f"{names[column]} must be a number at sample {row}, got {shown(cell)}") from None
-    return table
-
-
-def _from_columns(columns: Mapping[str, _Column]) -> dict[str, Any]:
+def _from_columns(columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Return the arguments of `Measurements`."""
     lengths = _numbered(columns, "l")
     if lengths is None:
         raise InputError(f"must have columns l0, l1, ... of lengths, got {', '.join(columns) or 'none'}")
     result: dict[str, Any] = {"lengths": lengths, "tensions": _numbered(columns, "tension")}
-    result["times"] = columns["t"].values if "t" in columns else None
+    result["times"] = columns.get("t")
     groups = {names: [name for name in names if name in columns] for names in (POSITION, ANGLE_NAMES, QUATERNION)}
     for names, there in groups.items():
         if there and len(there) < len(names):
@@ -160,13 +109,13 @@ def _from_columns(columns: Mapping[str, _Column]) -> dict[str, Any]:
         raise InputError("must have an orientation as roll, pitch, yaw or as qx, qy, qz, qw, got both")
     orientation = groups[ANGLE_NAMES] or groups[QUATERNION]
     if groups[POSITION]:
-        result["poses"] = np.column_stack([columns[name].values for name in POSITION])
+        result["poses"] = np.column_stack([columns[name] for name in POSITION])
     if orientation:
-        result["orientations"] = np.column_stack([columns[name].values for name in orientation])
+        result["orientations"] = np.column_stack([columns[name] for name in orientation])
     return result
 
 
-def _numbered(columns: Mapping[str, _Column], prefix: str) -> np.ndarray | None:
+def _numbered(columns: Mapping[str, np.ndarray], prefix: str) -> np.ndarray | None:
     """Return the columns prefix0, prefix1, ... side by side, (N, m), or None if there are none."""
     count = sum(1 for name in columns if (match := NUMBERED.fullmatch(name)) and match[1] == prefix)
     if not count:
@@ -174,7 +123,7 @@ def _numbered(columns: Mapping[str, _Column], prefix: str) -> np.ndarray | None:
     for i in range(count):
         if f"{prefix}{i}" not in columns:
             raise InputError(f"must have columns {prefix}0 to {prefix}{count - 1} without a gap, got no {prefix}{i}")
-    table = np.column_stack([columns[f"{prefix}{i}"].values for i in range(count)])
+    table = np.column_stack([columns[f"{prefix}{i}"] for i in range(count)])
     wrong = np.argwhere(~np.isfinite(table))
     if wrong.size:
         row, column = (int(i) for i in wrong[0])
@@ -209,8 +158,8 @@ def _from_netcdf(content: bytes) -> dict[str, Any]:
             continue
         if "units" not in attributes:
             raise InputError(f"variable {name} must have the attribute units, got none")
-        columns[name] = _Column(_floats(values) * _factor(name, str(attributes["units"])), f"variable {name}")
-    sizes = {column.values.size for column in columns.values()}
+        columns[name] = _floats(values) * _factor(name, str(attributes["units"]))
+    sizes = {column.size for column in columns.values()}
     if len(sizes) > 1:
         raise InputError(f"variables must have one size, got {', '.join(str(size) for size in sorted(sizes))}")
     return _from_columns(columns)
@@ -249,10 +198,7 @@ def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], sta
         if name not in arrays or (name == "tensions" and not stated):
             continue
         values, attributes = arrays[name]
-        unit = str(attributes.get("units", ""))
-        if unit not in units:
-            raise InputError(f"the units of {name} must be one of {', '.join(units)}, got {shown(unit)}")
-        result[argument] = _floats(values) * units[unit]
+        result[argument] = _floats(values) * unit_factor(name, str(attributes.get("units", "")), units, name)
     if "pose" in arrays:
         values, attributes = arrays["pose"]
         check_units("pose", attributes)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
-from ...base.inputs import shown
-from ...models.batch import as_array, leading
+from ...base.inputs import leading, repeated, shown
+from ...models.batch import as_array
 from ...models.files import as_robot
 from ...models.part import LARGEST
 from ...models.robot import Robot
@@ -108,12 +108,10 @@ def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:
     """Return standard deviations (m,) of one number or (m,), or raise InputError unless all are above zero."""
     if isinstance(sigma, float) and 0.0 < sigma < np.inf:
         return _equal(sigma, m)
-    deviations = as_array("sigma", sigma, ())
-    if deviations.shape not in ((), (m,)):
-        raise InputError(f"sigma must be a number > 0 or of shape ({m},) [m], got {shown(deviations)}")
-    if not deviations.min() > 0.0:
+    deviations = repeated("sigma", sigma, m)
+    if not ((deviations > 0.0) & (deviations < np.inf)).all():
         raise InputError(f"sigma must be numbers > 0 [m], got {deviations.min():g}")
-    return np.broadcast_to(deviations, (m,)).copy()
+    return deviations
 
 
 @lru_cache(maxsize=16)

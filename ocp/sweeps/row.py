@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from pathlib import Path
@@ -18,10 +17,9 @@ from ..planner import plan
 from ..reports.report import decisive
 from ..tasks.task import Task
 
-__all__ = ["FAILED", "LONGEST", "Row", "plan_case", "read_row", "written_row"]
+__all__ = ["FAILED", "Row", "plan_case"]
 
 FAILED = "failed"  # the status of a plan that ended with an error, beside those of `MotionStatus`
-LONGEST = 65_536  # bytes of a row in a checkpoint
 
 
 class Row(NamedTuple):
@@ -103,14 +101,3 @@ def _cost(planned: Plan) -> float:
     if not planned.feasible:
         return math.nan
     return cost(planned) if planned.objective is None else planned.objective
-
-
-def written_row(number: int, row: Row) -> bytes:
-    """Return a row as the content of a checkpoint's record."""
-    return json.dumps([number, *row]).encode()
-
-
-def read_row(content: bytes) -> tuple[int, Row]:
-    """Read what `written_row` wrote; floats keep every bit."""
-    number, *values = json.loads(content)
-    return number, Row(*values)

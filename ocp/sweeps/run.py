@@ -13,9 +13,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...base.checkpoint import Kind, open_checkpoint
+from ...base.checkpoint import Kind, checkpoint_path, open_checkpoint
 from ...base.errors import InputError
-from ...base.inputs import file_path, flag, shown
+from ...base.inputs import file_path
 from ...base.version import __version__
 from ...base.writing import check_writable
 from ...models import Robot
@@ -25,11 +25,11 @@ from ..tasks.task import Task, read_task
 from .axis import read_axes
 from .cases import Cases
 from .result import Sweep
-from .row import LONGEST, Row, plan_case, read_row, written_row
+from .row import Row, plan_case
 
-__all__ = ["KIND", "plan_file", "sweep"]
+__all__ = ["plan_file", "sweep"]
 
-KIND = Kind(b"towline sweep checkpoint 1\n", "plan", LONGEST)
+KIND = Kind("sweep", "plan")  # a result is a row as JSON, in which floats keep every bit
 
 Progress = Callable[[int, int, int], None]
 
@@ -96,13 +96,8 @@ def sweep(
     from ...base.execution import check_workers, start_workers  # imports as long as a short plan takes
 
     check_workers(workers, scheduler)
-    file = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
+    file = checkpoint_path(checkpoint, resume, progress)
     folder = None if keep is None else file_path("keep", keep, "a path or None").resolve()
-    flag("resume", resume)
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    if resume and file is None:
-        raise InputError("checkpoint must be a path if resume is True, got None")
     cases = Cases(as_robot(robot), read_task(task), read_axes(vary))
     cases.check()
     if folder is not None:
@@ -114,12 +109,12 @@ def sweep(
     rows: dict[int, Row] = {}
     with start_workers(workers, scheduler) as started, opened as stored:
         if stored is not None:
-            rows.update(read_row(content) for content in iter(stored.read, None))
+            rows.update((number, Row(*json.loads(content))) for number, content in stored.items())
         feasible = sum(row.status == MotionStatus.FEASIBLE for row in rows.values())
         _report(progress, rows, cases, feasible)
         for number, row in started.as_completed(plan_case, _jobs(cases, set(rows), folder)):
             if stored is not None:
-                stored.append(written_row(number, row))
+                stored.put(number, json.dumps(row).encode())
             rows[number] = row
             feasible += row.status == MotionStatus.FEASIBLE
             _report(progress, rows, cases, feasible)

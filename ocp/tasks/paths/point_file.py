@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import math
-import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ....base.csv_columns import ANGLES, LENGTHS, TIMES, read_columns, unit_factor
 from ....base.errors import InputError
 from ....base.inputs import printable, shown
 from ....base.reading import read_bytes
@@ -15,16 +15,12 @@ from .gcode import read_gcode
 
 __all__ = ["read_csv", "read_points"]
 
-LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-ANGLES = {"rad": 1.0, "deg": math.pi / 180}
-TIMES = {"s": 1.0, "ms": 0.001, "min": 60.0}
 UNITS = {
     **dict.fromkeys(("x", "y", "z"), LENGTHS),
     **dict.fromkeys(("roll", "pitch", "yaw"), ANGLES),
     **dict.fromkeys(("t", "dwell"), TIMES),
 }
 GCODE = (".gcode", ".ngc", ".tap")
-COLUMN = re.compile(r"\s*([a-z]+)\s*(?:\[\s*([a-z]+)\s*\])?\s*")
 
 
 def read_points(name: str, folder: Path) -> dict[str, Any]:
@@ -44,82 +40,42 @@ def read_points(name: str, folder: Path) -> dict[str, Any]:
         text = read_bytes(path, "a list of points").decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{where} must be text in UTF-8, got another one (byte {error.start})") from None
+    if ending in GCODE:
+        return read_gcode(text, where)
     try:
-        return read_csv(text, where) if ending == ".csv" else read_gcode(text, where)
-    except csv.Error as error:  # a field of more than 131 072 characters
-        raise InputError(f"{where} must be CSV that can be read, got {error}") from None
+        return read_csv(text)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
-def read_csv(text: str, where: str) -> dict[str, Any]:
+def read_csv(text: str) -> dict[str, Any]:
     """Return the fields of a path from CSV, with a header such as x [mm], y [mm], z [mm], yaw [deg], t [s].
 
     Raises
     ------
     InputError
-        Naming `where`, line and column.
+        Naming line and column.
     """
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    if len(lines) < 3:
-        raise InputError(f"{where} must have a header and two points or more, got {len(lines)} lines")
-    mark = max(",;\t", key=lines[0][1].count)
-    titles = _cells(lines[0][1], mark)
-    scales = _header(titles, f"{where}, line {lines[0][0]}")
-    columns: dict[str, list[float]] = {name: [] for name in scales}
-    for number, line in lines[1:]:
-        cells = _cells(line, mark)
-        if len(cells) != len(titles):
-            raise InputError(f"{where}, line {number} must have {len(titles)} columns as the header, got {len(cells)}")
-        for (name, scale), title, cell in zip(scales.items(), titles, cells, strict=True):
-            columns[name].append(scale * _number(cell, f"{where}, line {number}, column {title}"))
-    count = len(lines) - 1
-    level = [0.0] * count
-    poses = (columns.get(name, level) for name in ("x", "y", "z", "roll", "pitch", "yaw"))
+    names = ", ".join(UNITS)
+    columns, lines = read_columns(text.lower(), lambda name, unit: unit_factor(name, unit, UNITS.get(name), names))
+    for name in ("x", "y", "z"):
+        if name not in columns:
+            raise InputError(f"column {name} is missing, such as '{name} [m]'")
+    if len(lines) < 2:
+        raise InputError(f"must have a header and two points or more, got {len(lines)} below it")
+    level = np.zeros(len(lines))
+    poses = [columns.get(name, level).tolist() for name in ("x", "y", "z", "roll", "pitch", "yaw")]
     fields: dict[str, Any] = {"points": list(zip(*poses, strict=True))}
     for name, field in (("t", "times"), ("dwell", "dwell")):
         if name in columns:
-            fields[field] = columns[name]
-    _check_times(columns.get("t", []), [number for number, _ in lines[1:]], where)
+            fields[field] = columns[name].tolist()
+    _check_times(fields.get("times", []), lines)
     return fields
 
 
-def _cells(line: str, mark: str) -> list[str]:
-    return [printable(cell.strip()) for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True))]
-
-
-def _header(titles: list[str], where: str) -> dict[str, float]:
-    """Return the unit in SI of each column, by its name."""
-    scales: dict[str, float] = {}
-    for title in titles:
-        match = COLUMN.fullmatch(title.lower())
-        name, unit = match.groups() if match else (None, None)
-        if name not in UNITS:
-            raise InputError(f"{where}: a column must be one of {', '.join(UNITS)} with its unit, got {shown(title)}")
-        if unit not in UNITS[name]:
-            accepted = ", ".join(f"'{name} [{unit}]'" for unit in UNITS[name])
-            raise InputError(f"{where}: column {name} must be one of {accepted}, got {shown(title)}")
-        if name in scales:
-            raise InputError(f"{where}: column {name} must occur once, got it twice")
-        scales[name] = UNITS[name][unit]
-    for name in ("x", "y", "z"):
-        if name not in scales:
-            raise InputError(f"{where}: column {name} is missing, such as '{name} [m]'")
-    return scales
-
-
-def _number(cell: str, where: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where} must be a number, got {shown(cell)}")
-    return value
-
-
-def _check_times(times: list[float], numbers: list[int], where: str) -> None:
+def _check_times(times: list[float], lines: list[int]) -> None:
     if times and times[0] != 0:
-        raise InputError(f"{where}, line {numbers[0]}, column t must start at 0 s, got {times[0]:g} s")
-    for before, after, number in zip(times, times[1:], numbers[1:], strict=False):
+        raise InputError(f"line {lines[0]}, column t must start at 0 s, got {times[0]:g} s")
+    for before, after, number in zip(times, times[1:], lines[1:], strict=False):
         if after <= before:
-            raise InputError(f"{where}, line {number}, column t must increase, got {after:g} s after {before:g} s")
+            raise InputError(f"line {number}, column t must increase, got {after:g} s after {before:g} s")
