@@ -26,6 +26,7 @@ from .mujoco_plant import Hardware, World
 
 PERIOD = 1e-3  # [s]
 WORSE = 1.2  # than computed torque
+CONTROLLERS = {"computed torque": ComputedTorque, "predictive": Predictive}
 
 
 @dataclass(frozen=True)
@@ -216,14 +217,6 @@ def fly(task: Task, controller: Controller, seed: int = 0, air_of_carriers: floa
     return Flown(error, answered, True, unexplained)
 
 
-def controllers(task: Task) -> dict[str, Callable[[], Controller]]:
-    """Return what makes each controller of a task."""
-    return {
-        "computed torque": lambda: ComputedTorque(task.robot, reach=task.reach),
-        "predictive": lambda: Predictive(task.robot, reach=task.reach),
-    }
-
-
 def soak(start: int, count: int, tasks: Sequence[str]) -> bool:
     """Fly `count` cases of these tasks from number `start` on, print a table, and return whether all are good."""
     columns = "rms mm | largest mm | end mm | unexplained g | handed over s | "
@@ -233,11 +226,11 @@ def soak(start: int, count: int, tasks: Sequence[str]) -> bool:
     for number, (name, case) in list(enumerate(cases))[start : start + count]:
         task = made[name] = made.get(name) or TASKS[name][0]()
         standard = np.inf
-        for kind, new in controllers(task).items():
-            controller = new()
+        for kind, make in CONTROLLERS.items():
+            controller = make(task.robot, reach=task.reach)
             flown = fly(task, controller, **TASKS[name][1][case])
             over = getattr(controller, "handed_over", None)
-            standard = flown.rms if kind == "computed torque" else standard
+            standard = flown.rms if make is ComputedTorque else standard
             good = flown.rms <= WORSE * standard or over is not None
             well &= good
             counts = np.bincount(flown.answered, minlength=len(ANSWERS))

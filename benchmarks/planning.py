@@ -24,10 +24,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=100, help="intervals (default: 100)")
     parser.add_argument("--runs", type=int, default=5, help="of each contender (default: 5)")
     options = parser.parse_args()
-    if options.steps < 4:
-        parser.error(f"--steps must be 4 or more, got {options.steps}")
-    if options.runs < 1:
-        parser.error(f"--runs must be 1 or more, got {options.runs}")
+    if options.steps < 4 or options.runs < 1:
+        parser.error(f"--steps must be 4 or more and --runs 1 or more, got {options.steps} and {options.runs}")
     print(machine(("casadi", "rockit-meco", "numpy")))
     runs = measure(options.steps, options.runs)
     print("\n".join(table(runs)))

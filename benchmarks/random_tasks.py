@@ -46,9 +46,10 @@ def soak(start: int, count: int, families: Sequence[str]) -> bool:
     outcomes = []
     for number in range(count):
         family = families[number % len(families)]
-        outcomes.append(attempt(family, start + number // len(families)))
-        if outcomes[-1].result not in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE):
-            print(_line(outcomes[-1]), flush=True)
+        outcomes.append(last := attempt(family, start + number // len(families)))
+        if last.result not in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE):
+            of = f"{family}, seed {last.seed}, {last.robot}"
+            print(f"{of}: {last.result}, {last.reason} ({last.seconds:.1f} s)", flush=True)
     for family in families:
         mine = [outcome for outcome in outcomes if outcome.family == family]
         if mine:
@@ -56,11 +57,6 @@ def soak(start: int, count: int, families: Sequence[str]) -> bool:
     print(f"{'all':9} {_summary(outcomes)}")
     counts = _counts(outcomes)
     return counts["wrong"] == 0 and counts[MotionStatus.NOT_FOUND] <= MOST_NOT_FOUND * len(outcomes)
-
-
-def _line(outcome: Outcome) -> str:
-    of = f"{outcome.family}, seed {outcome.seed}, {outcome.robot}"
-    return f"{of}: {outcome.result}, {outcome.reason} ({outcome.seconds:.1f} s)"
 
 
 def _counts(outcomes: list[Outcome]) -> Counter[str]:

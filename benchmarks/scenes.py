@@ -29,18 +29,14 @@ Scene = tuple[Robot, dict[str, Any]]
 
 LENGTH = 0.5  # [m], of the quadrotors' cables
 QUADROTOR, APART, LOAD = 0.1, 0.2, 0.01  # [m]
-ROUND = [(1.57, 1.0), (0.0, 1.0), (4.2, 1.0)]
-SIX = [(azimuth, 1.1) for azimuth in (1.04, 0.0, 2.08, 3.16, 4.2, 5.24)]
-FIVE = [(azimuth, 1.2) for azimuth in (1.25, 0.0, 2.5, 3.75, 5.0)]
-FOUR = [(azimuth, 1.1) for azimuth in (0.0, 1.57, 3.14, 4.71)]
 FOUR_AT_GOAL = [(azimuth, 1.2) for azimuth in (0.0, 5.0, 3.14, 4.0)]
 TEAMS = {  # azimuth and elevation of each cable [rad]
     1: [(0.0, np.pi / 2)],
     2: [(1.57, 1.0), (1.57 + np.pi, 1.0)],
-    3: ROUND,
-    4: FOUR,
-    5: FIVE,
-    6: SIX,
+    3: [(1.57, 1.0), (0.0, 1.0), (4.2, 1.0)],
+    4: [(azimuth, 1.1) for azimuth in (0.0, 1.57, 3.14, 4.71)],
+    5: [(azimuth, 1.2) for azimuth in (1.25, 0.0, 2.5, 3.75, 5.0)],
+    6: [(azimuth, 1.1) for azimuth in (1.04, 0.0, 2.08, 3.16, 4.2, 5.24)],
 }
 GATE = [(0.5, 0.4, 0.4), (0.5, -0.4, 0.4)]  # x and y of the middle, and the width [m]
 # x and y of the trees [m]

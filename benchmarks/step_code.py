@@ -30,13 +30,7 @@ def compiled_step(
     compiler: str = "cc",
     flags: tuple[str, ...] = ("-O2",),
 ) -> ctypes.CDLL:
-    """Export the step of a robot to a folder, compile these sources with it, and load the library.
-
-    Raises
-    ------
-    InputError
-        If there is no such compiler.
-    """
+    """Export the step of a robot, compile sources with it, and load the library; errors as of `StepCode`."""
     if shutil.which(compiler) is None:
         raise InputError(f"compiler must be a C compiler in PATH, got {compiler!r}")
     folder.mkdir(parents=True, exist_ok=True)

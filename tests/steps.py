@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from towline import load
-from towline.benchmarks.step_states import twelve_cables
 from towline.export.step.export import step_files
 
 CORTEX_M7 = ("arm-none-eabi-gcc", "-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-d16", "-mfloat-abi=hard")
@@ -29,11 +27,6 @@ def required(*commands):
     for command in commands:
         if shutil.which(command) is None:
             pytest.skip(f"there is no command {command}")
-
-
-def robot_named(name):
-    """Return a robot of the library, or that of twelve cables."""
-    return twelve_cables() if name == "twelve" else load(name)
 
 
 def line(*parts):

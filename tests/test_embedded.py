@@ -10,6 +10,7 @@ import pytest
 import towline
 from towline import Robot, available, load, solve_batch
 from towline.benchmarks import step as benchmark
+from towline.benchmarks.step import robot_named
 from towline.benchmarks.step_code import FLAGS, States, StepCode
 from towline.benchmarks.step_states import random_states
 from towline.export.step.costs import costs
@@ -19,7 +20,7 @@ from towline.models import Dynamics
 from towline.models.tape_c import operations
 from towline.solvers.status import STATUSES
 
-from .steps import deepest, line, measure_size, required, robot_named, target
+from .steps import deepest, line, measure_size, required, target
 
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID = range(5)
 ROBOTS = ["wang-flying", "cogiro", "ipanema-2", "wang-ctmrts-6", "planar-4", "caroca-pulleys", "twelve"]
