@@ -27,7 +27,7 @@ FIELDS = ("A", "B", "c", "start", "Q", "R", "q", "r", "u_min", "u_max")
 
 
 class Program(NamedTuple):
-    """A program as a flight has had it: arrays of `StageProblem`, the guess, and whether it was used."""
+    """A program as a flight has had it: arrays of `Horizon`, the guess, and whether it was used."""
 
     A: Array  # (N, n, n)
     B: Array  # (N, n, m)

@@ -1,23 +1,24 @@
-"""Solve the QP of a predictive controller stage by stage: `solve_horizon`, and `Horizon` for control loops.
+"""Solve the QP of a predictive controller stage by stage.
 
 The method, its conditions and its sources are described in `docs/horizon.md`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.display import Displayed, record
 from ..base.errors import InputError
-from ..base.inputs import number, shown, whole_number
-from .stage_problem import Array, StageProblem
+from ..base.inputs import shown, whole_number
 from .stages import layout, machine
 from .stages.sizes import padded, places
 
-__all__ = ["Horizon", "HorizonSolution", "Multipliers", "Residuals", "solve_horizon"]
+__all__ = ["Horizon", "Multipliers", "Residuals"]
+
+Array = NDArray[np.float64]
 
 
 class Multipliers(NamedTuple):
@@ -64,122 +65,52 @@ class Residuals(NamedTuple):
     __repr__ = record
 
 
-@dataclass(slots=True, eq=False)
-class HorizonSolution(Displayed):
-    """Controls and states of all stages, and how near they are to the optimum.
-
-    Attributes
-    ----------
-    states, controls :
-        Shapes (N + 1, n) and (N, m). Controls never break their bounds, and states are what they lead to.
-    multipliers :
-        See `Multipliers`.
-    residuals :
-        See `Residuals`.
-    converged :
-        Whether all residuals are within the tolerance. If not, this is the best iterate.
-    iterations :
-        How many Newton matrices were factorised, without the one of a cold start.
-    """
-
-    states: Array  # (N + 1, n)
-    controls: Array  # (N, m)
-    multipliers: Multipliers
-    residuals: Residuals
-    converged: bool
-    iterations: int
-
-    @property
-    def status(self) -> str:
-        """Return "converged" or "not converged"."""
-        return "converged" if self.converged else "not converged"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain lists, numbers and strings, ready for JSON."""
-        return {
-            "status": self.status,
-            "states": self.states.tolist(),
-            "controls": self.controls.tolist(),
-            "multipliers": {name: array.tolist() for name, array in self.multipliers._asdict().items()},
-            "residuals": self.residuals._asdict(),
-            "iterations": self.iterations,
-        }
-
-
-def solve_horizon(
-    problem: StageProblem,
-    start: HorizonSolution | None = None,
-    iterations: int = 50,
-    tolerance: float = 1e-8,
-) -> HorizonSolution:
-    """Solve a problem of stages by an interior-point method with a Riccati recursion.
-
-    Parameters
-    ----------
-    problem :
-        The problem.
-    start :
-        The solution of a similar problem of the same sizes, from which fewer iterations are needed. default: none.
-    iterations :
-        The largest number of iterations, from 1 to 1000.
-    tolerance :
-        The largest residual of a solution that counts as converged, from 1e-12 to 1.
-
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, or `start` other sizes.
-    """
-    if not isinstance(problem, StageProblem):
-        raise InputError(f"problem must be a StageProblem, got {type(problem).__name__}")
-    iterations, tolerance = whole_number("iterations", iterations, 1, 1000), number("tolerance", tolerance, 1e-12, 1.0)
-    horizon = Horizon(problem.N, problem.n, problem.m, problem.p)
-    horizon.iterations_max, horizon.tolerance = int(iterations), float(tolerance)
-    for name in _FIELDS:
-        getattr(horizon, name)[...] = getattr(problem, name)
-    if start is not None:
-        if not isinstance(start, HorizonSolution):
-            raise InputError(f"start must be a HorizonSolution or None, got {type(start).__name__}")
-        there = (horizon.states, horizon.controls, *horizon.multipliers)
-        given = (start.states, start.controls, *start.multipliers)
-        if any(a.shape != b.shape for a, b in zip(there, given, strict=True)):
-            raise InputError(f"start must be of the problem's sizes, got controls of shape {start.controls.shape}")
-        for a, b in zip(there, given, strict=True):
-            a[...] = b
-    horizon.solve(warm=start is not None)
-    return HorizonSolution(
-        horizon.states.copy(),
-        horizon.controls.copy(),
-        Multipliers(*[array.copy() for array in horizon.multipliers]),
-        horizon.residuals,
-        horizon.converged,
-        horizon.iterations,
-    )
-
-
-_FIELDS = ("A", "B", "start", "Q", "R", "c", "S", "q", "r", "u_min", "u_max", "C", "D", "d", "penalty", "square")
-
-
 class Horizon(Displayed):
-    """Problems of one size, to be written into its arrays, solved, and written again.
+    r"""Problems of one size, to be written into its arrays, solved, and written again.
+
+    $$
+    \min \; \sum_{k=0}^{N-1} \tfrac12 \begin{bmatrix} x_k \\ u_k \end{bmatrix}^\top
+    \begin{bmatrix} Q_k & S_k^\top \\ S_k & R_k \end{bmatrix} \begin{bmatrix} x_k \\ u_k \end{bmatrix}
+    + q_k^\top x_k + r_k^\top u_k + \rho_k^\top s_k + \tfrac12 s_k^\top \mathrm{diag}(\sigma_k) s_k
+    \; + \tfrac12 x_N^\top Q_N x_N + q_N^\top x_N
+    $$
+
+    subject to $x_{k+1} = A_k x_k + B_k u_k + c_k$ from a given $x_0$, $u_{\min,k} \le u_k \le u_{\max,k}$ and
+    $C_k x_k + D_k u_k \le d_k + s_k$, $s_k \ge 0$. It is feasible for any data.
 
     A predictive controller solves such a problem at each step. All arrays are parts of one, in the layout of the
-    machine code: nothing is copied, allocated or checked. What is no problem (numbers that are not finite, a cost that
-    is not convex) is answered with controls that are finite and inside their bounds, and not converged.
+    machine code: nothing is copied, allocated or checked. Where a number is not finite or the cost is not convex, the
+    controls are still finite and inside their bounds, and the solution is not converged.
 
     Parameters
     ----------
     N, n, m, rows :
-        How many stages, states, controls, and soft rows of a stage.
+        How many stages, states, controls, and soft rows of a stage (p).
 
     Attributes
     ----------
-    A, B, c, start, Q, R, S, q, r, u_min, u_max, C, D, d, penalty, square :
-        As of `StageProblem`, zero at first, and bounds infinite. Q and R must be symmetric.
-    states, controls, multipliers :
-        As of `HorizonSolution`; they are also what `solve(warm=True)` begins with.
+    A, B, c :
+        Dynamics, shapes (N, n, n), (N, n, m) and (N, n). All arrays are zero at first, but for the bounds.
+    start :
+        The state x of stage 0, shape (n,).
+    Q, R, S :
+        Cost, shapes (N + 1, n, n), (N, m, m) and (N, m, n); together convex, Q and R symmetric. R may be zero.
+    q, r :
+        Linear cost, shapes (N + 1, n) and (N, m).
+    u_min, u_max :
+        Bounds of controls, shape (N, m), infinite at first. They may be equal.
+    C, D, d :
+        Soft rows, shapes (N, p, n), (N, p, m) and (N, p).
+    penalty, square :
+        Linear and quadratic cost of breaking each soft row, not negative, shape (N, p). A linear one that is larger
+        than the multiplier which the row has as a constraint keeps it exactly.
+    states, controls :
+        The solution, shapes (N + 1, n) and (N, m). Controls never break their bounds, and states are what they lead to.
+    multipliers :
+        See `Multipliers`. `solve(warm=True)` begins with these, and with states and controls.
     tolerance, iterations_max :
-        When to stop.
+        When to stop: the largest residual of a solution that has converged, and the largest number of iterations. At
+        first 1e-8 and 50.
 
     Raises
     ------
@@ -261,7 +192,7 @@ class Horizon(Displayed):
 
     @property
     def iterations(self) -> int:
-        """Return how many iterations the last solution took."""
+        """Return how many Newton matrices the last solution took, without the one of a cold start."""
         return int(self._settings[layout.COUNT])
 
     @property

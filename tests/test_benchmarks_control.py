@@ -10,7 +10,6 @@ from towline.base.errors import InputError
 from towline.benchmarks.control import run
 from towline.benchmarks.control_contenders import (
     CONTENDERS,
-    FIELDS,
     REFERENCE,
     TOWLINE,
     Contender,
@@ -24,7 +23,6 @@ from towline.cli.bench import app
 from towline.control import Predictive
 from towline.models import load
 from towline.simulation import simulate
-from towline.solvers import StageProblem
 
 FREE, TEAM = TASKS[0], TASKS[-1]
 LIMITS = Task("limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, reach=0.5, stage=0.015)
@@ -37,17 +35,18 @@ def at_limits():
 
 
 def test_condensed_costs_are_those_of_the_stages(at_limits):
-    """Differences of the cost, which `StageProblem` adds up from states and controls."""
+    """Differences of the cost, which is added up here from states and controls."""
     program, rng = at_limits[150], np.random.default_rng(0)
     cost, slope = condense(program)
-    problem = StageProblem(**{name: getattr(program, name) for name in FIELDS})
     totals = []
     for scale in (0.0, 1.0, 10.0):
         u, states = scale * rng.normal(size=program.r.shape), [program.start]
         for A, B, c, each in zip(program.A, program.B, program.c, u, strict=True):
             states.append(A @ states[-1] + B @ each + c)
-        own = 0.5 * u.ravel() @ cost @ u.ravel() + slope @ u.ravel()
-        totals.append((problem.cost(np.array(states), u), own))
+        x = np.array(states)
+        total = 0.5 * np.einsum("ki,kij,kj->", x, program.Q, x) + (program.q * x).sum()
+        total += 0.5 * np.einsum("ki,kij,kj->", u, program.R, u) + (program.r * u).sum()
+        totals.append((total, 0.5 * u.ravel() @ cost @ u.ravel() + slope @ u.ravel()))
     (nothing, _), *others = totals
     for total, own in others:
         assert own == pytest.approx(total - nothing, rel=1e-8)
@@ -123,7 +122,7 @@ def test_wrong_numbers_are_refused(steps, seeds, name):
 
 @pytest.mark.parametrize("name", ["cogiro", "wang-flying", "wang-flying-quadrotor", "wang-ctmrts-4"])
 def test_random_flights_are_answered_as_promised(name):
-    """A few; `python -m towline.benchmarks.predictive_steps` flies many."""
+    """A few; `python -m towline.benchmarks.soak predictive` flies many."""
     robot = load(name)
     for seed in range(3):
         answered, broken = fly_random(robot, seed)

@@ -26,7 +26,7 @@ from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.estimation.calibration import Calibration, Measurements, calibrate
 from towline.models import RelativeDynamics
 from towline.models.uncertainty import Uncertainty
-from towline.solvers import Horizon, StageProblem, solve_horizon
+from towline.solvers import Horizon
 from towline.statics.robust import Spread
 from towline.workspace import Places, Region, StaticEquilibrium, sample
 
@@ -59,7 +59,6 @@ NOT_CALLED = {
     "StandardForm",
     "BatchSolution",
     "Certificate",
-    "HorizonSolution",
     "Multipliers",
     "Residuals",
     "solvers.Margin",
@@ -153,11 +152,6 @@ def robot() -> towline.Robot:
 @cache
 def problem() -> TensionProblem:
     return TensionProblem(np.eye(6, 7), np.ones(6), 0.0, 10.0)
-
-
-@cache
-def stages() -> StageProblem:
-    return StageProblem(np.eye(6)[None], np.ones((1, 6, 2)), np.ones(6), np.tile(np.eye(6), (2, 1, 1)), np.eye(2)[None])
 
 
 @cache
@@ -346,21 +340,6 @@ VALID: dict[str, Callable[[], Any]] = {
     "vary": lambda: {"margin": [0, 1]},
     "sweep.keep": lambda: None,
     "Sweep.plan.index": lambda: 0,
-    "StageProblem.A": lambda: np.eye(6)[None],
-    "StageProblem.start": lambda: np.ones(6),
-    "StageProblem.n": lambda: 6,
-    "B": lambda: np.ones((1, 6, 2)),
-    "Q": lambda: np.tile(np.eye(6), (2, 1, 1)),
-    "R": lambda: np.eye(2)[None],
-    **{name: lambda: None for name in ("c", "S", "q", "r", "C", "D", "d")},
-    "u_min": lambda: -1.0,
-    "u_max": lambda: 1.0,
-    "penalty": lambda: 1.0,
-    "square": lambda: 0.0,
-    "states": lambda: np.ones((2, 6)),
-    "controls": lambda: np.ones((1, 2)),
-    "solve_horizon.problem": stages,
-    "iterations": lambda: 50,
     "N": lambda: 1,
     "Horizon.rows": lambda: 0,
     "shifted": lambda: False,
@@ -439,8 +418,6 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "TensionProblem": problem,
     "TensionSolution": lambda: solve(problem()),
     "Certificate": lambda: infeasible().certificate,
-    "StageProblem": stages,
-    "HorizonSolution": lambda: solve_horizon(stages()),
     "Horizon": lambda: Horizon(1, 6, 2),
     "BatchSolution": lambda: solve_batch(np.eye(6, 7)[None], np.ones((2, 6)), 0.0, 10.0),
     "Places": places,

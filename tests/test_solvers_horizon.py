@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from types import SimpleNamespace
 
 import clarabel
 import daqp
@@ -13,9 +14,40 @@ from hypothesis import strategies as st
 from scipy.linalg import block_diag
 
 from towline.base.errors import InputError
-from towline.solvers import Horizon, HorizonSolution, StageProblem, solve_horizon
+from towline.solvers import Horizon
 
 TOLERANCE = 1e-8
+
+
+def written(given):
+    """Return a horizon with these arrays, of which None is zero, and numbers repeat."""
+    N, n, m = given["B"].shape
+    horizon = Horizon(N, n, m, given["d"].shape[1])
+    for name, value in given.items():
+        getattr(horizon, name)[...] = 0.0 if value is None else value
+    return horizon
+
+
+def solved(problem, start=None, tolerance=TOLERANCE, iterations=50):
+    """Return a horizon that has solved the problem, cold or from another one's solution."""
+    horizon = written(problem.arrays)
+    horizon.tolerance, horizon.iterations_max = tolerance, iterations
+    if start is not None:
+        horizon.states[:], horizon.controls[:] = start.states, start.controls
+        for own, other in zip(horizon.multipliers, start.multipliers, strict=True):
+            own[:] = other
+    horizon.solve(warm=start is not None)
+    return horizon
+
+
+def cost_of(problem, states, controls):
+    """Return the cost, penalties of broken rows included."""
+    x, u, p = states[:-1], controls, problem
+    total = 0.5 * np.einsum("ki,kij,kj->", states, p.Q, states) + (p.q * states).sum()
+    total += 0.5 * np.einsum("ki,kij,kj->", u, p.R, u) + (p.r * u).sum() + np.einsum("ki,kij,kj->", u, p.S, x)
+    excess = np.einsum("kpj,kj->kp", p.C, x) + np.einsum("kpj,kj->kp", p.D, u) - p.d
+    excess = np.maximum(excess, 0.0)
+    return total + (p.penalty * excess + 0.5 * p.square * excess**2).sum()
 
 
 def random_problem(seed, N=6, n=4, m=3, p=0, radius=1.0, width=1.0, scaled=False, **other):
@@ -50,7 +82,9 @@ def random_problem(seed, N=6, n=4, m=3, p=0, radius=1.0, width=1.0, scaled=False
         given |= {name: given[name] * x for name in ("c", "start")} | {"D": given["D"] / u}
         given |= {name: given[name] * u for name in ("u_min", "u_max")}
         given |= {name: cost * given[name] for name in ("penalty", "square")}
-    return StageProblem(**(given | other))
+    horizon = written(given | other)
+    arrays = {name: getattr(horizon, name).copy() for name in given}
+    return SimpleNamespace(N=N, n=n, m=m, p=p, arrays=arrays, **arrays)
 
 
 def dense(problem):
@@ -149,16 +183,15 @@ def by_clarabel(problem):
 @pytest.mark.parametrize("seed", range(12))
 def test_conditions_hold_and_clarabel_agrees(seed):
     problem = random_problem(seed, p=seed % 3, N=3 + seed)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     assert solution.converged
-    assert solution.status == "converged"
     assert max(solution.residuals) <= TOLERANCE
     check_optimality(problem, solution)
     states, controls = by_clarabel(problem)
-    ours, theirs = problem.cost(solution.states, solution.controls), problem.cost(states, controls)
+    ours, theirs = cost_of(problem, solution.states, solution.controls), cost_of(problem, states, controls)
     assert abs(ours - theirs) <= 1e-6 * (1 + abs(theirs))
     # Where a multiplier and a distance to a bound are both nearly 0, controls depend on the tolerance's square root.
-    exact = solve_horizon(problem, tolerance=1e-11)
+    exact = solved(problem, tolerance=1e-11)
     np.testing.assert_allclose(exact.controls, controls, atol=2e-5)
 
 
@@ -183,7 +216,7 @@ def test_daqp_agrees_on_the_condensed_problem():
         np.zeros(16, dtype=np.int32),
     )
     assert flag == 1
-    np.testing.assert_allclose(solve_horizon(problem).controls.ravel(), v, atol=1e-6)
+    np.testing.assert_allclose(solved(problem).controls.ravel(), v, atol=1e-6)
 
 
 @settings(max_examples=60, deadline=None)
@@ -198,7 +231,7 @@ def test_daqp_agrees_on_the_condensed_problem():
 )
 def test_conditions_hold_for_all_sizes(seed, N, n, m, p, radius, scaled):
     problem = random_problem(seed, N, n, m, p, radius, scaled=scaled)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     assert ((problem.u_min <= solution.controls) & (solution.controls <= problem.u_max)).all()
     assert solution.converged == (max(solution.residuals) <= TOLERANCE)
     if not scaled:
@@ -209,7 +242,7 @@ def test_conditions_hold_for_all_sizes(seed, N, n, m, p, radius, scaled):
 def test_units_change_nothing():
     """The same problem in other units of states, controls and cost has the same residuals and iterations."""
     one, other = random_problem(3, p=1), random_problem(3, p=1, scaled=True)
-    a, b = solve_horizon(one), solve_horizon(other)
+    a, b = solved(one), solved(other)
     assert a.converged
     assert b.converged
     assert a.iterations == b.iterations
@@ -220,7 +253,7 @@ def test_units_change_nothing():
 @pytest.mark.parametrize(("N", "n", "m"), [(1, 1, 1), (1, 5, 3), (40, 2, 1), (2, 28, 12)])
 def test_smallest_and_largest(N, n, m):
     problem = random_problem(1, N, n, m)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     assert solution.converged
     check_optimality(problem, solution)
 
@@ -231,7 +264,7 @@ def test_equal_bounds_fix_controls_exactly():
     low[::2, 0] = high[::2, 0] = 0.1 + 0.2
     low[1, 1], high[1, 1] = 0.3, np.nextafter(0.3, 1)
     problem = random_problem(2, u_min=low, u_max=high)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     assert (solution.controls[::2, 0] == 0.1 + 0.2).all()
     assert 0.3 <= solution.controls[1, 1] <= np.nextafter(0.3, 1)
     check_optimality(problem, solution)
@@ -239,7 +272,7 @@ def test_equal_bounds_fix_controls_exactly():
 
 def test_without_bounds_it_is_the_linear_quadratic_regulator():
     problem = random_problem(4, u_min=-np.inf, u_max=np.inf)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     H, h, G, g, _, _ = dense(problem)
     matrix = np.block([[H, G.T], [G, np.zeros((len(g), len(g)))]])
     expected = np.linalg.solve(matrix, np.concatenate([-h, g]))
@@ -250,24 +283,24 @@ def test_without_bounds_it_is_the_linear_quadratic_regulator():
 
 def test_one_sided_bounds():
     problem = random_problem(6, u_min=0.0, u_max=np.inf)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     assert solution.converged
     check_optimality(problem, solution)
 
 
 def test_cost_of_states_alone():
     problem = random_problem(7, m=2, R=np.zeros((6, 2, 2)), S=None, r=None, Q=np.tile(np.eye(4), (7, 1, 1)))
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     assert solution.converged
     check_optimality(problem, solution)
 
 
 def test_a_large_penalty_is_a_constraint_and_a_small_one_is_paid():
     tight = {"C": np.zeros((6, 1, 4)), "D": np.ones((6, 1, 3)), "d": np.full((6, 1), -0.2), "square": 0.0}
-    strict = solve_horizon(random_problem(8, p=1, **tight, penalty=1e4))
+    strict = solved(random_problem(8, p=1, **tight, penalty=1e4))
     assert strict.converged
     assert strict.controls.sum(axis=1).max() <= -0.2 + 1e-7
-    loose = solve_horizon(random_problem(8, p=1, **tight, penalty=1e-3))
+    loose = solved(random_problem(8, p=1, **tight, penalty=1e-3))
     assert loose.controls.sum(axis=1).max() > -0.2
     broken = loose.controls.sum(axis=1) > -0.2 + 1e-6
     np.testing.assert_allclose(loose.multipliers.rows[broken], 1e-3, rtol=1e-4)
@@ -275,7 +308,7 @@ def test_a_large_penalty_is_a_constraint_and_a_small_one_is_paid():
 
 def test_states_are_the_trajectory_of_the_controls():
     problem = random_problem(9, N=30, radius=1.3)
-    solution = solve_horizon(problem)
+    solution = solved(problem)
     x = problem.start
     for k in range(problem.N):
         following = problem.A[k] @ x + problem.B[k] @ solution.controls[k] + problem.c[k]
@@ -287,20 +320,13 @@ def test_a_warm_start_gives_the_same_in_fewer_iterations():
     fewer = 0
     for seed in range(10):
         problem = random_problem(seed, N=10, p=seed % 2)
-        cold = solve_horizon(problem)
+        cold = solved(problem)
         moved = random_problem(seed, N=10, p=seed % 2, start=problem.start * 1.01)
-        again, warm = solve_horizon(moved, tolerance=1e-11), solve_horizon(moved, cold, tolerance=1e-11)
+        again, warm = solved(moved, tolerance=1e-11), solved(moved, cold, tolerance=1e-11)
         assert warm.converged
         np.testing.assert_allclose(warm.controls, again.controls, atol=2e-5)
         fewer += again.iterations - warm.iterations
     assert fewer > 10
-
-
-def written(problem):
-    horizon = Horizon(problem.N, problem.n, problem.m, problem.p)
-    for name in StageProblem.__dataclass_fields__:
-        getattr(horizon, name)[...] = getattr(problem, name)
-    return horizon
 
 
 def test_a_shifted_start_in_a_loop():
@@ -310,7 +336,7 @@ def test_a_shifted_start_in_a_loop():
     same = {name: np.repeat(getattr(one, name), 15, axis=0) for name in names}
     same |= {"Q": np.repeat(one.Q[:1], 16, axis=0), "q": np.repeat(one.q[:1], 16, axis=0), "c": None}
     problem = random_problem(10, N=15, n=6, m=3, **same)
-    horizon, other = written(problem), written(problem)
+    horizon, other = written(problem.arrays), written(problem.arrays)
     horizon.tolerance = other.tolerance = 1e-11
     assert horizon.solve()
     shifted = cold = 0
@@ -327,8 +353,8 @@ def test_a_shifted_start_in_a_loop():
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
 def test_nonsense_is_answered_inside_bounds_and_forgotten(name, value):
     problem = random_problem(11, p=2)
-    horizon = written(problem)
-    expected = solve_horizon(problem)
+    horizon = written(problem.arrays)
+    expected = solved(problem)
     getattr(horizon, name).flat[-1] = value
     for way in ({}, {"warm": True}, {"shifted": True}):
         horizon.solve(**way)
@@ -346,11 +372,10 @@ def test_nonsense_is_answered_inside_bounds_and_forgotten(name, value):
 
 def test_few_iterations_are_reported_and_usable():
     problem = random_problem(12, N=20)
-    solution = solve_horizon(problem, iterations=2)
-    assert solution.status == "not converged"
+    solution = solved(problem, iterations=2)
+    assert not solution.converged
     assert solution.iterations == 2
     assert ((problem.u_min <= solution.controls) & (solution.controls <= problem.u_max)).all()
-    assert solution.to_dict()["status"] == "not converged"
 
 
 def solve_again_and_again(horizon):
@@ -360,7 +385,7 @@ def solve_again_and_again(horizon):
 
 def test_an_interrupt_leaves_nothing_that_breaks_the_next_solve():
     problem = random_problem(13, N=40, n=12, m=6)
-    horizon = written(problem)
+    horizon = written(problem.arrays)
     assert horizon.solve()
     expected = horizon.controls.copy()
     timer = threading.Timer(0.05, signal.raise_signal, [signal.SIGINT])
@@ -379,7 +404,7 @@ def test_an_interrupt_leaves_nothing_that_breaks_the_next_solve():
 def test_nothing_is_allocated():
     import tracemalloc
 
-    horizon = written(random_problem(14, N=20, n=8, m=4))
+    horizon = written(random_problem(14, N=20, n=8, m=4).arrays)
     horizon.solve()
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
@@ -390,39 +415,8 @@ def test_nothing_is_allocated():
     assert grown < 2000
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"A": np.full((6, 4, 4), np.nan)}, "A must be an array of shape"),
-        ({"A": np.zeros((6, 4, 3))}, "A must be an array of shape"),
-        ({"B": np.zeros((6, 4))}, "B must be an array of shape"),
-        ({"R": -np.tile(np.eye(3), (6, 1, 1))}, "convex"),
-        ({"R": np.triu(np.ones((6, 3, 3)))}, "R must be symmetric"),
-        ({"S": np.full((6, 3, 4), 100.0)}, "convex"),
-        ({"u_min": np.nan}, "u_min must be numbers"),
-        ({"u_min": 2.0, "u_max": 1.0}, "u_min must be at most u_max"),
-        ({"u_min": np.zeros(5)}, "u_min must be of shape"),
-        ({"penalty": -1.0, "d": np.zeros((6, 1)), "C": None, "D": None, "square": 0.0}, "penalty must be numbers >= 0"),
-        ({"d": None}, "d must be given"),
-        ({"start": np.full(4, 1e200)}, "start must be numbers below"),
-    ],
-)
-def test_wrong_problems_are_refused_in_one_line(change, message):
-    with pytest.raises(InputError, match=message) as caught:
-        random_problem(0, **change)
-    assert "\n" not in str(caught.value)
-
-
 def test_wrong_calls_are_refused():
-    problem = random_problem(0)
-    with pytest.raises(InputError, match="problem must be"):
-        solve_horizon(3)
-    with pytest.raises(InputError, match="start must be of the problem's sizes"):
-        solve_horizon(problem, solve_horizon(random_problem(0, N=2)))
-    with pytest.raises(InputError, match="start must be a HorizonSolution"):
-        solve_horizon(problem, 1)
-    with pytest.raises(InputError, match="iterations"):
-        solve_horizon(problem, iterations=0)
     with pytest.raises(InputError, match="N must be"):
         Horizon(0, 1, 1)
-    assert isinstance(solve_horizon(problem), HorizonSolution)
+    with pytest.raises(InputError, match="warm must be True or False"):
+        Horizon(1, 1, 1).solve(warm=3)
