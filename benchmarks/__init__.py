@@ -1,1 +1,1 @@
-"""Timings on this machine, each a module to run: `python -m towline.benchmarks.batch`."""
+"""Timings on this machine beside other software, and `soak`, which checks random cases."""

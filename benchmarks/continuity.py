@@ -1,18 +1,16 @@
 """Check whether the methods that claim continuity keep it, along random smooth motions of random robots.
 
-    python -m towline.benchmarks.continuity [--count 100]
+    python -m towline.benchmarks.soak continuity [--start 0] [--count 100] [--only min-norm,...]
 
 Robots of 7, 8 and 9 cables, and 3 to 6 cables to one point (rank three); of five motions three stay inside the
 available wrench set, one touches its boundary and one follows it for a while. Where a function is continuous with a
 bounded slope, halving the step ten times leaves 2^-10 of a change; at a jump all of it, however often it is halved.
-Methods that answer everywhere also go out of the set and back, and smooth ones give their derivative. The exit
-code is 1 if more than 0.05 of a change is left.
+Methods that answer everywhere also go out of the set and back, and smooth ones give their derivative. More than 0.05 of
+a change left is a jump.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -33,6 +31,7 @@ KINDS = ("inside", "inside", "touching", "inside", "following")
 SIZES = ((7, 6), (8, 6), (9, 6), (3, 3), (4, 3), (5, 3), (6, 3))  # cables, rank
 JUMP = 0.05
 
+METHODS = tuple(name for name, method in methods().items() if method.continuous or method.always_answers)
 SMOOTH: dict[str, dict[str, Any]] = {"log-barrier": {"barrier": 0.05}, "analytic-centre": {}}
 
 # Steps of the differences that stand for the derivative, and how often the interval may be halved until it is no longer
@@ -220,35 +219,21 @@ def _tensions(solution: TensionSolution, motion: Motion) -> Array:
     return np.full(motion.corner.size, 1e3 * T_MAX) if solution.tensions is None else solution.tensions
 
 
-def main() -> None:
-    """Print a line for each method that claims something."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=100, help="motions a method")
-    parser.add_argument("--start", type=int, default=0, help="the first seed")
-    options = parser.parse_args()
-    if options.count < 1 or options.start < 0:
-        parser.error("--count must be 1 or more, --start 0 or more")
-    seeds = range(options.start, options.start + options.count)
-    results: list[tuple[str, Result]] = []
-    for name, method in methods().items():
+def soak(start: int, count: int, names: Sequence[str]) -> bool:
+    """Take each method along `count` motions, print a line for each of its claims, and return whether all hold."""
+    seeds, well = range(start, start + count), True
+    for name in names:
+        method, claims = methods()[name], dict[str, Result]()
         if method.continuous:
-            results.append(_report(f"{name}: tensions", continuity(name, seeds)))
+            claims["tensions"] = continuity(name, seeds)
         if method.always_answers:
-            results.append(_report(f"{name}: out of the set and back", leaving(name, seeds)))
-            results.append(_report(f"{name}: the same with rho = 1", leaving(name, seeds, rho=1.0)))
+            claims["out of the set and back"] = leaving(name, seeds)
+            claims["the same with rho = 1"] = leaving(name, seeds, rho=1.0)
         if name in SMOOTH:
-            results.append(_report(f"{name}: derivative", smoothness(name, seeds, **SMOOTH[name])))
-    print(f"{sum(result.seconds for _, result in results):.0f} s")
-    sys.exit(any(result.worst > JUMP or result.unanswered for _, result in results))
-
-
-def _report(name: str, result: Result) -> tuple[str, Result]:
-    parts = [f"{name}: {result.motions} motions, {result.worst:.1e} of a change left (seed {result.worst_seed})"]
-    parts += [f"{result.inaccurate} instants inaccurate"] * bool(result.inaccurate)
-    parts += [f"{result.unanswered} without an answer"] * bool(result.unanswered)
-    print(", ".join([*parts, f"{result.seconds:.1f} s"]), flush=True)
-    return name, result
-
-
-if __name__ == "__main__":
-    main()
+            claims["derivative"] = smoothness(name, seeds, **SMOOTH[name])
+        for claim, result in claims.items():
+            well &= result.worst <= JUMP and not result.unanswered
+            left = f"{result.worst:.1e} of a change left (seed {result.worst_seed})"
+            off = f"{result.inaccurate} instants inaccurate, {result.unanswered} without an answer"
+            print(f"{name}: {claim}: {result.motions} motions, {left}, {off}, {result.seconds:.1f} s", flush=True)
+    return well

@@ -23,7 +23,7 @@ from ..simulation import simulate
 from .control_contenders import CONTENDERS, REFERENCE, TOWLINE
 from .control_programs import BLOCK, FAILED, Row, measure
 from .control_tasks import STANDARD, TASKS, Task, record
-from .machine import machine
+from .harness import machine, table
 
 __all__ = ["Error", "Report", "Step", "markdown", "run"]
 
@@ -192,6 +192,21 @@ def _programs(task: Task, robot: Robot, steps: int) -> list[Row]:
 
 def markdown(report: Report) -> str:
     """Return the report as a page."""
+    steps, programs, errors = [], [], []
+    for row in report.steps:
+        cells = [row.detail or "-", "-", "-"]
+        if row.median_us is not None:
+            cells = [f"{row.median_us:.0f}", f"{row.p99_us:.0f}", f"{row.ratio:.1f}"]
+        steps.append((row.task, row.controller, *cells))
+    order = list(dict.fromkeys(row.task for row in report.rows))
+    for row in sorted(report.rows, key=lambda row: (order.index(row.task), row.ratio)):
+        off = ["-" if value is None else f"{value:.0e}" for value in (row.max_error, row.residual)]
+        ratios = f"{row.ratio:.2f}", f"{row.ratio_to_horizon:.2f}"
+        cells = [f"{row.median_us:.0f}", f"{row.p99_us:.0f}", *ratios, *off, f"{row.failures} of {row.programs}"]
+        programs.append((row.task, row.contender, row.tolerance, *cells))
+    for row in report.errors:
+        cells = [f"{row.rms_mm:.3g}", f"{row.max_mm:.3g}", f"{row.ratio:.2g}"]
+        errors.append((row.task, row.controller, *cells, f"{100 * row.soft:.1f} %", f"{100 * row.slack:.1f} %"))
     lines = [
         "# Control",
         "",
@@ -202,15 +217,7 @@ def markdown(report: Report) -> str:
         "",
         f"Ratio: to {STANDARD}.",
         "",
-        "| task | controller | median us | p99 us | ratio |",
-        "|---|---|---:|---:|---:|",
-    ]
-    for row in report.steps:
-        cells = [row.detail or "-", "-", "-"]
-        if row.median_us is not None:
-            cells = [f"{row.median_us:.0f}", f"{row.p99_us:.0f}", f"{row.ratio:.1f}"]
-        lines.append(f"| {row.task} | {row.controller} | {' | '.join(cells)} |")
-    lines += [
+        *table("task | controller | median us | p99 us | ratio", steps, 2),
         "",
         "## Quadratic programs of predictive control",
         "",
@@ -218,29 +225,17 @@ def markdown(report: Report) -> str:
         "controls, in units of their range. Residual: of the conditions of optimality, in the same units, all stages.",
         f"Failures: no answer, or an error of more than {FAILED:g}.",
         "",
-        "| task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures |",
-        "|---|---|---|---:|---:|---:|---:|---:|---:|---:|",
-    ]
-    order = list(dict.fromkeys(row.task for row in report.rows))
-    for row in sorted(report.rows, key=lambda row: (order.index(row.task), row.ratio)):
-        off = " | ".join("-" if value is None else f"{value:.0e}" for value in (row.max_error, row.residual))
-        lines.append(
-            f"| {row.task} | {row.contender} | {row.tolerance} | {row.median_us:.0f} | {row.p99_us:.0f} | "
-            f"{row.ratio:.2f} | {row.ratio_to_horizon:.2f} | {off} | {row.failures} of {row.programs} |"
-        )
-    lines += [
+        *table(
+            "task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures",
+            programs,
+            3,
+        ),
         "",
         "## Errors of the position",
         "",
         f"{report.seeds} flights, the same gusts for all controllers. Ratio: of a flight's largest error to that with "
         f"{STANDARD}, median of the flights.",
         "",
-        "| task | controller | rms mm | largest mm | ratio | not as planned | slack |",
-        "|---|---|---:|---:|---:|---:|---:|",
+        *table("task | controller | rms mm | largest mm | ratio | not as planned | slack", errors, 2),
     ]
-    for row in report.errors:
-        lines.append(
-            f"| {row.task} | {row.controller} | {row.rms_mm:.3g} | {row.max_mm:.3g} | {row.ratio:.2g} | "
-            f"{100 * row.soft:.1f} % | {100 * row.slack:.1f} % |"
-        )
     return "\n".join(lines) + "\n"

@@ -1,20 +1,16 @@
 """Controllers on robots that are not as their files have them, in MuJoCo: errors, and how the steps were answered.
 
-    python -m towline.benchmarks.control_mujoco [--tasks wang-flying,...] [--cases gain,...] [--json]
+    python -m towline.benchmarks.soak mujoco [--start 0] [--count N] [--only wang-flying,...]
 
 Each task is a motion of a robot in gusts, each case something that differs from the robot's file (`mujoco_plant`). Both
 controllers fly each case with their default gains. `Predictive` is good if its error is at most 1.2 times that of
-`ComputedTorque`, or if the run reports that the robot does not move as predicted, and goes on with computed torque.
-The exit code is 0 if all are.
+`ComputedTorque`, or if the run reports that the robot does not move as predicted, and continues with computed torque.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from argparse import ArgumentParser
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,11 +21,12 @@ from ..models.dynamics import dynamics_of
 from ..ocp import plan
 from ..simulation import simulate
 from ..solvers import solve_batch
-from .machine import machine
+from .harness import head, row
 from .mujoco_plant import Hardware, World
 
 PERIOD = 1e-3  # [s]
 WORSE = 1.2  # than computed torque
+CONTROLLERS = {"computed torque": ComputedTorque, "predictive": Predictive}
 
 
 @dataclass(frozen=True)
@@ -220,107 +217,27 @@ def fly(task: Task, controller: Controller, seed: int = 0, air_of_carriers: floa
     return Flown(error, answered, True, unexplained)
 
 
-def controllers(task: Task) -> dict[str, Callable[[], Controller]]:
-    """Return what makes each controller of a task."""
-    return {
-        "computed torque": lambda: ComputedTorque(task.robot, reach=task.reach),
-        "predictive": lambda: Predictive(task.robot, reach=task.reach),
-    }
-
-
-@dataclass(frozen=True)
-class Row:
-    """A controller in a case.
-
-    Attributes
-    ----------
-    task, case, controller
-        The names.
-    rms_mm, max_mm, end_mm
-        Of the distance from the reference [mm]: root of the mean square, largest, and at the end.
-    handed_over
-        When computed torque took over from predictions [s]; 0 or less: from the start.
-    unexplained
-        Largest mean acceleration that was not predicted, over the robot's weight.
-    answers
-        How many steps were answered in each way.
-    good
-        Whether the error is at most `WORSE` times that of computed torque, or computed torque took over.
-    """
-
-    task: str
-    case: str
-    controller: str
-    rms_mm: float
-    max_mm: float
-    end_mm: float
-    handed_over: float | None
-    unexplained: float
-    answers: dict[str, int]
-    good: bool = True
-
-
-def run(tasks: Sequence[str], cases: Sequence[str] = (), show: Callable[[Row], None] | None = None) -> list[Row]:
-    """Fly the cases whose names contain one of `cases`, or all, and return a row for each controller."""
-    rows: list[Row] = []
-    for name in tasks:
-        make, of_task = TASKS[name]
-        task = make()
-        for case, differs in of_task.items():
-            if cases and not any(part in case for part in cases):
-                continue
-            standard = None
-            for kind, new in controllers(task).items():
-                controller = new()
-                flown = fly(task, controller, **differs)
-                over = getattr(controller, "handed_over", None)
-                counts = np.bincount(flown.answered, minlength=len(ANSWERS)).tolist()
-                standard = flown.rms if standard is None else standard
-                weight = task.robot.force_scale / task.robot.platform.mass
-                row = Row(
-                    task=name,
-                    case=case,
-                    controller=kind,
-                    rms_mm=1e3 * flown.rms,
-                    max_mm=1e3 * float(flown.error.max()),
-                    end_mm=1e3 * float(flown.error[-1]),
-                    handed_over=None if over is None else float(over.time),
-                    unexplained=float(np.nanmax(flown.unexplained, initial=0.0)) / weight,
-                    answers={answer: count for answer, count in zip(ANSWERS, counts, strict=True) if count},
-                    good=flown.rms <= WORSE * standard or over is not None,
-                )
-                rows.append(row)
-                if show is not None:
-                    show(row)
-    return rows
-
-
-def line(row: Row) -> str:
-    """Return a row of the table."""
-    over = "-" if row.handed_over is None else f"{row.handed_over:.3f}"
-    answers = ", ".join(f"{count} {answer}" for answer, count in row.answers.items())
-    cells = [row.task, row.case, row.controller, f"{row.rms_mm:.3g}", f"{row.max_mm:.3g}", f"{row.end_mm:.3g}"]
-    cells += [f"{row.unexplained:.3f}", over, answers, "" if row.good else "WORSE"]
-    return f"| {' | '.join(cells)} |"
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Fly and print."""
-    parser = ArgumentParser(prog="python -m towline.benchmarks.control_mujoco", description="Controllers in MuJoCo.")
-    parser.add_argument("--tasks", default=",".join(TASKS), help="names, by commas; default: all")
-    parser.add_argument("--cases", default="", help="parts of names, by commas; default: all")
-    parser.add_argument("--json", action="store_true", help="print rows as JSON")
-    given = parser.parse_args(arguments)
-    if not given.json:
-        print(f"# Controllers in MuJoCo\n\nMeasured on {machine(('mujoco', 'numpy', 'numba'))}.\n")
-        print("| task | case | controller | rms mm | largest mm | end mm | unexplained g | handed over s | steps | |")
-        print("|---|---|---|---:|---:|---:|---:|---:|---|---|")
-    show = None if given.json else lambda row: print(line(row), flush=True)
-    rows = run(given.tasks.split(","), [part for part in given.cases.split(",") if part], show)
-    if given.json:
-        print(json.dumps({"rows": [asdict(row) for row in rows]}, indent=2))
-    sys.exit(not all(row.good for row in rows))
-
-
-if __name__ == "__main__":
-    main()
+def soak(start: int, count: int, tasks: Sequence[str]) -> bool:
+    """Fly `count` cases of these tasks from number `start` on, print a table, and return whether all are good."""
+    columns = "rms mm | largest mm | end mm | unexplained g | handed over s | "
+    print(head(f"number | task | case | controller | steps | {columns}", 5))
+    cases = [(name, case) for name in tasks for case in TASKS[name][1]]
+    made, well = dict[str, Task](), True
+    for number, (name, case) in list(enumerate(cases))[start : start + count]:
+        task = made[name] = made.get(name) or TASKS[name][0]()
+        standard = np.inf
+        for kind, make in CONTROLLERS.items():
+            controller = make(task.robot, reach=task.reach)
+            flown = fly(task, controller, **TASKS[name][1][case])
+            over = getattr(controller, "handed_over", None)
+            standard = flown.rms if make is ComputedTorque else standard
+            good = flown.rms <= WORSE * standard or over is not None
+            well &= good
+            counts = np.bincount(flown.answered, minlength=len(ANSWERS))
+            answers = ", ".join(f"{n} {way}" for way, n in zip(ANSWERS, counts, strict=True) if n)
+            part = float(np.nanmax(flown.unexplained, initial=0.0)) * task.robot.platform.mass / task.robot.force_scale
+            errors = [f"{1e3 * error:.3g}" for error in (flown.rms, flown.error.max(), flown.error[-1])]
+            late = "-" if over is None else f"{over.time:.3f}"
+            last = f"{part:.3f}", late, "" if good else "WORSE"
+            print(row(number, name, case, kind, answers, *errors, *last), flush=True)
+    return well

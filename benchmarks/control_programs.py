@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control_contenders import REFERENCE, TOWLINE, Contender, Program, condense, exact
+from .harness import alternating, ratio
 
 __all__ = ["BLOCK", "FAILED", "Row", "measure"]
 
@@ -58,51 +58,43 @@ class Row:
 
 def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:
     """Measure contenders at the programs of one flight, alternating every few; `TOWLINE` and `REFERENCE` among them."""
-    times = {each.name: np.full(len(programs), np.nan) for each in contenders}
-    errors, residuals = ({each.name: np.full(len(programs), np.nan) for each in contenders} for _ in range(2))
     solvers = {each.name: each.prepare(programs[0]) for each in contenders}
     for solver in solvers.values():  # imports and machine code belong to no program
         solver.solve(solver.arrange(programs[0]))
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        for begin in range(0, len(programs), BLOCK):
-            block = range(begin, min(begin + BLOCK, len(programs)))
-            known = [_known(programs[k]) for k in block]
-            for name, solver in solvers.items():
-                for k, (best, cost, slope) in zip(block, known, strict=True):
-                    given = solver.arrange(programs[k])
-                    start = time.perf_counter_ns()
-                    controls = solver.solve(given)
-                    times[name][k] = (time.perf_counter_ns() - start) / 1e3
-                    if controls is not None:
-                        errors[name][k] = _error(programs[k], controls, best)
-                        residuals[name][k] = _residual(programs[k], controls, cost, slope)
-            gc.collect()
-    finally:
-        if collecting:
-            gc.enable()
-
-    def ratio(name: str, to: str) -> float:
-        turns = [slice(at, at + BLOCK) for at in range(0, len(programs), BLOCK)]
-        return float(np.median([np.median(times[name][turn]) / np.median(times[to][turn]) for turn in turns]))
-
+    count = len(programs)
+    spent: dict[str, dict[int, list[float]]] = {name: {} for name in solvers}  # [us] by turn
+    errors, residuals = ({name: np.full(count, np.nan) for name in solvers} for _ in range(2))
+    of_turn, known = -1, list[tuple[Array, Array, Array]]()
+    for turn, (name, solver) in alternating([*solvers.items()], -(-count // BLOCK)):
+        block = range(turn * BLOCK, min((turn + 1) * BLOCK, count))
+        if turn != of_turn:
+            of_turn, known = turn, [_known(programs[k]) for k in block]
+        spent[name][turn] = []
+        for k, (best, cost, slope) in zip(block, known, strict=True):
+            given = solver.arrange(programs[k])
+            start = time.perf_counter_ns()
+            controls = solver.solve(given)
+            spent[name][turn].append((time.perf_counter_ns() - start) / 1e3)
+            if controls is not None:
+                errors[name][k] = _error(programs[k], controls, best)
+                residuals[name][k] = _residual(programs[k], controls, cost, slope)
     rows = []
     for each in contenders:
         off, answered = errors[each.name], np.isfinite(errors[each.name])
+        times = np.concatenate([*spent[each.name].values()])
         rows.append(
             Row(
                 task=task,
                 contender=each.name,
                 tolerance=each.tolerance,
-                median_us=float(np.median(times[each.name])),
-                p99_us=float(np.percentile(times[each.name], 99)),
-                ratio=ratio(each.name, REFERENCE),
-                ratio_to_horizon=ratio(each.name, TOWLINE),
+                median_us=float(np.median(times)),
+                p99_us=float(np.percentile(times, 99)),
+                ratio=ratio(spent[each.name], spent[REFERENCE]),
+                ratio_to_horizon=ratio(spent[each.name], spent[TOWLINE]),
                 max_error=float(off[answered].max()) if answered.any() else None,
                 residual=float(residuals[each.name][answered].max()) if answered.any() else None,
                 failures=int((~(off <= FAILED)).sum()),
-                programs=len(programs),
+                programs=count,
             )
         )
     return rows

@@ -1,15 +1,13 @@
 """How often `Predictive` hands over to computed torque in flights with nothing wrong: never, if its rules are right.
 
-    python -m towline.benchmarks.control_silence [--runs 100] [--robots cogiro,...]
+    python -m towline.benchmarks.soak silence [--start 0] [--count 100] [--only cogiro,...]
 
 Each run holds home, with a push of up to 5 % of the weight, a mass up to 5 % off the robot's file, and noise up to that
-of `ENCODERS` or `CAPTURE`. The exit code is 0 if no run is handed over.
+of `ENCODERS` or `CAPTURE`.
 """
 
 from __future__ import annotations
 
-import sys
-from argparse import ArgumentParser
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,31 +51,16 @@ def fly(robot: Robot, controller: Predictive, seed: int) -> Flight:
     return simulate(true, robot.home, controller, duration=DURATION, noise=noise, disturbance=push, seed=seed)
 
 
-def run(runs: int, robots: Sequence[str] = ROBOTS) -> list[tuple[str, int, float]]:
-    """Return robot, seed and time [s] of the runs that were handed over."""
-    reported: list[tuple[str, int, float]] = []
+def soak(start: int, count: int, robots: Sequence[str]) -> bool:
+    """Fly `count` runs, print those that were handed over, and return whether none was."""
     known = {name: load(name) for name in robots}
     controllers = {name: Predictive(robot) for name, robot in known.items()}
-    for seed in range(runs):
+    reported = 0
+    for seed in range(start, start + count):
         name = robots[seed % len(robots)]
         over = fly(known[name], controllers[name], seed).handed_over
         if over is not None:
-            reported.append((name, seed, over))
-    return reported
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Fly and print."""
-    parser = ArgumentParser(prog="python -m towline.benchmarks.control_silence", description="Good flights.")
-    parser.add_argument("--runs", type=int, default=100, help="default: 100")
-    parser.add_argument("--robots", default=",".join(ROBOTS), help="names, by commas")
-    given = parser.parse_args(arguments)
-    reported = run(given.runs, given.robots.split(","))
-    for name, seed, time in reported:
-        print(f"{name}, seed {seed}: computed torque from t = {time:.3f} s on")
-    print(f"{len(reported)} of {given.runs} runs were handed over")
-    sys.exit(bool(reported))
-
-
-if __name__ == "__main__":
-    main()
+            reported += 1
+            print(f"{name}, seed {seed}: computed torque from t = {over:.3f} s on", flush=True)
+    print(f"{reported} of {count} runs were handed over")
+    return not reported

@@ -1,6 +1,6 @@
 """Random steps of closed loops over all robots: whether each is answered, inside limits and rates, and how.
 
-    python -m towline.benchmarks.control_steps [--count 1000000] [--robots wang-flying,...] [--seed 0]
+    python -m towline.benchmarks.soak control [--start 0] [--count 1000000] [--only wang-flying,...]
 
 Each robot of the library is simulated in a batch whose platforms are kicked and displaced, while sensors report
 nonsense now and then and references jump. Every command must be finite and inside the limits of tensions, rates and
@@ -9,21 +9,21 @@ actuators; every direction in which wrench is missing is checked against the ste
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
+from collections import Counter
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control import ANSWERS, Command, ComputedTorque, Reference, State
-from ..models import Robot, available, load
+from ..control import ANSWERS, Command, ComputedTorque, Predictive, Reference, State
+from ..models import Robot, load
 from ..plant import Plant
 from ..plant.periods import Periods
-from .machine import machine
+from . import harness
 
-__all__ = ["KINDS", "Steps", "random_steps"]
+__all__ = ["KINDS", "Steps", "kept", "random_steps", "soak"]
 
 KINDS = ("kicked", "far off", "at an anchor", "no number", "huge", "wrong tensions")
 ROWS = 250  # robots side by side
@@ -122,83 +122,69 @@ class Crowd:
             self._states[gone] = self._begun(int(gone.sum()))
 
 
+def kept(
+    controller: ComputedTorque | Predictive,
+    command: Command,
+    rate: Array,
+    now: float,
+    last: tuple[Array, float] | None,
+) -> dict[str, NDArray[np.bool_]]:
+    """Return whether each robot's command, of one or of many, keeps each promise, (rows,).
+
+    `rate` limits the tensions [N/s], and `last` has tensions and time of the command before. A direction proves that
+    wrench is missing if no tensions inside the bounds give as much along it as is required.
+    """
+    robot, t = controller.robot, np.atleast_2d(command.tensions)
+    rows = len(t)
+    parts = (t, command.carrier_pose, command.carrier_velocity, command.carrier_acceleration)
+    ways, direction = np.atleast_1d(command.answered), np.atleast_2d(command.direction)
+    problems = controller.problems
+    along = np.einsum("nj,nji->ni", direction, problems.A)
+    most = np.where(along > 0, along * problems.bounds[1], along * problems.bounds[0]).sum(axis=1)
+    found = {
+        "finite": np.all([np.isfinite(part).reshape(rows, -1).all(axis=1) for part in parts], axis=0),
+        "inside limits": ((t >= robot.t_min) & (t <= robot.t_max)).all(axis=1),
+        "answered": (ways >= 0) & (ways < len(ANSWERS)),
+        "proof": ~np.isfinite(direction).all(axis=1) | (np.einsum("nj,nj->n", direction, problems.w) > most),
+    }
+    if last is not None:
+        near = np.abs(t - last[0]) <= rate * (now - last[1]) + 1e-12 * robot.t_max
+        found["inside rates"] = (controller.cut | near).all(axis=1)
+    if command.actuation is not None:
+        ends = [(a.low, a.high) for carrier in robot.carriers for a in carrier.actuators]
+        (weakest, strongest), orders = np.array(ends).reshape(-1, 2).T, command.actuation.reshape(rows, -1)
+        found["actuators"] = ((orders >= weakest) & (orders <= strongest)).all(axis=1)  # false for nan
+    return found
+
+
 def random_steps(robot: Robot, count: int, seed: int) -> Steps:
     """Simulate at least `count` steps of a robot, a miss of the controller now and then."""
-    rng, low, high = np.random.default_rng([seed, 1]), robot.t_min, robot.t_max
-    rate = (high - low) / 0.02
-    crowd, rows = Crowd(robot, ROWS, seed), ROWS
-    controller = ComputedTorque(robot, rate=rate, reach=(0.3, 0.2))
-    ends = [(a.low, a.high) for carrier in robot.carriers for a in carrier.actuators]
-    weakest, strongest = np.array(ends).reshape(-1, 2).T if ends else np.zeros((2, 0))
-    broken = dict.fromkeys(("finite", "inside limits", "inside rates", "actuators", "answered", "proof"), 0)
+    rng, rate = np.random.default_rng([seed, 1]), (robot.t_max - robot.t_min) / 0.02
+    crowd, controller = Crowd(robot, ROWS, seed), ComputedTorque(robot, rate=rate, reach=(0.3, 0.2))
+    broken = Counter[str]()
     answered, proofs, seconds, now, last = np.zeros(len(ANSWERS), dtype=np.int64), 0, 0.0, 0.0, None
-    steps = -(-count // rows)
+    steps = -(-count // ROWS)
     for _ in range(steps):
         state, reference = crowd.measure(), crowd.reference()
         start = time.process_time()
         command = controller.step(now, state, reference)
         seconds += time.process_time() - start
-        t, cut = command.tensions, controller.cut
-        parts = (t, command.carrier_pose, command.carrier_velocity, command.carrier_acceleration)
-        finite = [np.isfinite(part).reshape(rows, -1).all(axis=1) for part in parts]
-        broken["finite"] += int((~np.logical_and.reduce(finite)).sum())
-        inside = ((t >= low) & (t <= high)).all(axis=1)
-        broken["inside limits"] += int((~inside).sum())
-        if last is not None:
-            near = cut | (np.abs(t - last[0]) <= rate * (now - last[1]) + 1e-12 * high)
-            broken["inside rates"] += int((~near.all(axis=1)).sum())
-        if command.actuation is not None:
-            orders = command.actuation.reshape(rows, -1)
-            well = (orders >= weakest) & (orders <= strongest)  # false for nan
-            broken["actuators"] += int((~well.all(axis=1)).sum())
-        ways = np.asarray(command.answered)
-        broken["answered"] += int(((ways < 0) | (ways >= len(ANSWERS))).sum())
-        answered += np.bincount(ways, minlength=len(ANSWERS))
-        proven = np.flatnonzero(np.isfinite(command.direction).all(axis=1))
-        problems = controller.problems
-        A, w, bounds = problems.A[proven], problems.w[proven], problems.bounds[:, proven]
-        along = np.einsum("nj,nji->ni", command.direction[proven], A)
-        most = np.where(along > 0, along * bounds[1], along * bounds[0]).sum(axis=1)
-        needed = np.einsum("nj,nj->n", command.direction[proven], w)
-        proofs += proven.size
-        broken["proof"] += int((~(needed > most)).sum())
-        last = t, now
+        broken.update({name: int((~well).sum()) for name, well in kept(controller, command, rate, now, last).items()})
+        answered += np.bincount(np.asarray(command.answered), minlength=len(ANSWERS))
+        proofs += int(np.isfinite(command.direction).all(axis=1).sum())
+        last = command.tensions, now
         crowd.move(command)
         now += PERIOD * (rng.integers(2, 60) if rng.random() < 0.02 else 1)
-    return Steps(answered, proofs, {name: n for name, n in broken.items() if n}, seconds / (steps * rows))
+    return Steps(answered, proofs, {name: n for name, n in broken.items() if n}, seconds / (steps * ROWS))
 
 
-def read_options(description: str | None, count: int) -> tuple[int, list[str], int]:
-    """Return how many steps, of which robots and from which seed the command line requires; `count` by default."""
-    parser = argparse.ArgumentParser(description=(description or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=count, help="steps of all robots together")
-    parser.add_argument("--robots", default=",".join(available()), help="names, separated by commas")
-    parser.add_argument("--seed", type=int, default=0, help="the first one; all are different")
-    options = parser.parse_args()
-    names = options.robots.split(",")
-    if options.count < 1:
-        parser.error(f"--count must be at least 1, got {options.count}")
-    if unknown := set(names) - {*available()}:
-        parser.error(f"--robots must be among {', '.join(available())}, got {', '.join(sorted(unknown))}")
-    return options.count, names, options.seed
-
-
-def main() -> None:
-    """Run and report."""
-    count, names, first = read_options(__doc__, 1_000_000)
-    print(f"# Random steps of closed loops\n\nMeasured on {machine()}.\n")
-    heads = [*ANSWERS, "directions proven", "broken promises", "controller [us]"]
-    print(f"| robot | {' | '.join(heads)} |\n|---|{'---:|' * len(heads)}")
-    total, well = 0, True
-    for seed, name in enumerate(names, first):
-        steps = random_steps(load(name), -(-count // len(names)), seed)
-        total, well = total + int(steps.answered.sum()), well and not steps.faults
+def soak(start: int, count: int, robots: Sequence[str]) -> bool:
+    """Simulate `count` steps of all robots together, print a table, and return whether each keeps every promise."""
+    print(harness.head(" | ".join(["robot", *ANSWERS, "directions proven", "broken promises", "controller [us]"])))
+    well = True
+    for seed, name in enumerate(robots, start):
+        steps = random_steps(load(name), -(-count // len(robots)), seed)
+        well &= not steps.faults
         faults = ", ".join(f"{count} not {promise}" for promise, count in steps.faults.items()) or "none"
-        cells = [*steps.answered, steps.proofs, faults, f"{1e6 * steps.seconds:.2f}"]
-        print(f"| {name} | {' | '.join(map(str, cells))} |", flush=True)
-    print(f"\n{total} steps, {'each answered as promised' if well else 'some not as promised'}.")
-    sys.exit(not well)
-
-
-if __name__ == "__main__":
-    main()
+        print(harness.row(name, *steps.answered, steps.proofs, faults, f"{1e6 * steps.seconds:.2f}"), flush=True)
+    return well

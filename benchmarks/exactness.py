@@ -1,6 +1,6 @@
 """Check that random problems of every awkward kind get the right status, optimal tensions and true certificates.
 
-    python -m towline.benchmarks.exactness [--count 1000000] [--start 0] [--family exact|random] [--float]
+    python -m towline.benchmarks.soak exactness [--start 0] [--count 1000000] [--only exact,random,float]
 
 Each problem is named by its seed. `solve`, `solve_batch` by its lanes and by the C core, and the distribution of an
 exported control step, which is compiled here, solve it. `exact_judge` judges their answers in integers. Wrong is
@@ -20,18 +20,15 @@ unsure of a rough problem, if the condition is above 100, on the boundary of wha
 tolerances or 1e-6 of the largest wrench of a cable of it.
 
 The family "exact" is made of integers and powers of two, and the truth is known. The family "random" has random digits
-instead; there each answer has to prove itself. With --float the float form of the step solves problems of 24 bits, and
-is judged by its own tolerances: it may always be unsure, but it must not call optimal what is out of reach by any
-amount. Each wrong answer is shown, and the exit code is 1.
+instead; there each answer has to prove itself. In "float" the float form of the step solves problems of 24 bits, and is
+judged by its own tolerances: it may always be unsure, but it must not call optimal what is out of reach by any amount.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -61,49 +58,41 @@ KINDS = (
     "weighted",
     "wished",
 )
-OPTIMAL = 1e-7  # error of the optimality conditions, relative to the gradient
-PROVING = 1e10  # larger multipliers prove nothing: w moved by rounding changes the cost by a part in a million
 BLOCK = 2000
 NEAR = 1000.0  # tolerances
 FAR = 1e-6  # of the largest wrench of a cable at a limit or at its t_ref
 CONDITION, WORST = 1e2, 1e5
 NEARLY = "singular to eleven digits"
+PARTS = ("exact", "random", "float")
 
 
-def main() -> None:
-    """Run and report."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--count", type=int, default=1_000_000)
-    parser.add_argument("--start", type=int, default=0, help="the first seed")
-    parser.add_argument("--family", choices=list(FAMILIES), default="exact")
-    parser.add_argument("--float", action="store_true", help="judge the float form of the exported step alone")
-    options = parser.parse_args()
-    if options.count < 1 or options.start < 0:
-        parser.error(f"--count must be at least 1 and --start at least 0, got {options.count} and {options.start}")
-    if options.float and options.family != "exact":
-        parser.error("--float takes the family exact")
+def soak(start: int, count: int, parts: Sequence[str]) -> bool:
+    """Check the problems of `count` seeds in each of `parts`, print what is wrong, and return whether nothing is."""
     compiled.load()
+    return all([_soak_part(part, range(start, start + count)) for part in parts])
+
+
+def _soak_part(part: str, seeds: range) -> bool:
     report = Report(Counter(), [], 0.0)
     with tempfile.TemporaryDirectory() as folder:
-        step = _step("float" if options.float else "double", Path(folder))
-        for first in range(options.start, options.start + options.count, BLOCK):
-            seeds = range(first, min(first + BLOCK, options.start + options.count))
-            block = check_float(seeds, step) if options.float else check(seeds, options.family, step)
+        step = _step("float" if part == "float" else "double", Path(folder))
+        for first in range(0, len(seeds), BLOCK):
+            some = seeds[first : first + BLOCK]
+            block = check_float(some, step) if part == "float" else check(some, part, step)
             for wrong in block.wrong:
                 print(wrong, flush=True)
             report = report.plus(block)
-            print(report.line(), end="\r", file=sys.stderr, flush=True)
-    print(report.line())
+    print(f"{part}: {report.line()}")
     for answer, count in sorted(report.answers.items()):
         print(f"{answer}: {count}")
-    sys.exit(bool(report.wrong))
+    return not report.wrong
 
 
 def _step(precision: str, folder: Path) -> StepDistribution | None:
     try:
         return StepDistribution(precision, folder)
     except InputError as error:
-        print(error, file=sys.stderr)
+        print(error)
         return None
 
 
@@ -263,37 +252,6 @@ def _reason(judge: Judge, solver: str, answer: Answer) -> tuple[str, float]:
     return "no status of such a problem", 0.0
 
 
-def optimality_error(problem: TensionProblem, t: Array) -> float:
-    """Return by how much tensions miss the optimality conditions, relative to their gradient; inf if beyond a limit.
-
-    The gradient omega (t - t_ref) is A^T y but for a part at the limits, of the sign that pushes against them.
-    """
-    from scipy.optimize import lsq_linear, nnls
-
-    if (t < problem.t_min).any() or (t > problem.t_max).any() or not np.isfinite(t).all():
-        return np.inf
-    if not np.linalg.norm(problem.scaled_A @ t - problem.scaled_w) <= problem.tolerance(t):
-        return np.inf
-    size = np.abs(t).max(initial=1e-300)
-    low, high = t - problem.t_min <= 1e-9 * size, problem.t_max - t <= 1e-9 * size
-    identity = np.eye(problem.m)
-    rows = problem.scaled_A.T / np.maximum(np.linalg.norm(problem.scaled_A, axis=1), 1e-300)
-    columns = np.hstack([rows, -rows, identity[:, low], -identity[:, high]])
-    gradient = problem.weights * (t - problem.t_ref)
-    largest = np.abs(gradient).max()
-    if largest == 0.0:
-        return 0.0
-    multipliers = nnls(columns, gradient / largest)[0].astype(np.longdouble)
-    if multipliers.max() > PROVING:
-        multipliers = lsq_linear(columns, gradient / largest, (0.0, PROVING), method="bvls", tol=1e-15).x
-    rest = gradient / largest - columns @ multipliers
-    if multipliers.max() * np.finfo(np.float64).eps > 1e-2 * OPTIMAL:  # their own rounding is in the rest: refine them
-        counts = multipliers > 0.0
-        multipliers[counts] += np.linalg.lstsq(columns[:, counts], rest.astype(np.float64), rcond=None)[0]
-        rest = gradient / largest - columns @ np.maximum(multipliers, 0.0)
-    return float(np.linalg.norm(rest.astype(np.float64)))
-
-
 def awkward_problem(seed: int, m: int | None = None, n: int | None = None) -> tuple[Array, ...]:
     """Return A, w, t_min, t_max, t_ref, weights of a random problem, m 1 to 12 cables and a rank from 1 to 6.
 
@@ -351,7 +309,3 @@ def _random_problem(seed: int) -> ExactProblem:
 
 
 FAMILIES: dict[str, Callable[[int], ExactProblem]] = {"exact": exact_problem, "random": _random_problem}
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """Random flights of predictive control: whether each command is finite, and inside limits and rates.
 
-    python -m towline.benchmarks.predictive_steps [--count 100000] [--robots wang-flying,...] [--seed 0]
+    python -m towline.benchmarks.soak predictive [--start 0] [--count 100000] [--only wang-flying,...]
 
 Each robot of the library that `Predictive` accepts is flown in short flights with random pushes, wind and gusts,
 sensors that have noise, bias and delay and report nonsense now and then, references that rest or move, cables that
@@ -10,7 +10,6 @@ bandwidth and horizon are random too. For each broken promise the first case is 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,8 +20,8 @@ from ..base.errors import InputError
 from ..control import ANSWERS, Command, Controller, Predictive, Reference, State
 from ..models import Robot, load
 from ..simulation import simulate
-from .control_steps import read_options
-from .machine import machine
+from .control_steps import kept
+from .harness import head, row
 
 __all__ = ["Checked", "fly_random"]
 
@@ -45,12 +44,9 @@ class Checked(Controller):
 
     def __init__(self, controller: Predictive, rate: np.ndarray, seed: int):
         self._controller, self._rate, self._rng = controller, rate, np.random.default_rng([seed, 7])
-        robot = controller.robot
-        ends = [(a.low, a.high) for carrier in robot.carriers for a in carrier.actuators]
-        self._actuators = np.array(ends).reshape(-1, 2).T
         self.answered = np.zeros(len(ANSWERS), dtype=np.int64)
         self.broken: dict[str, int] = {}
-        self._last: tuple[float, np.ndarray] | None = None
+        self._last: tuple[np.ndarray, float] | None = None
 
     @override
     def reset(self) -> None:
@@ -67,34 +63,12 @@ class Checked(Controller):
         if self._rng.random() < NONSENSE:
             state = self._nonsense(state)
         command = self._controller.step(time, state, reference)
-        robot, t, cut = self._controller.robot, command.tensions, self._controller.cut[0]
-        parts = (t, command.carrier_pose, command.carrier_velocity, command.carrier_acceleration)
-        self._check("finite", all(np.isfinite(part).all() for part in parts))
-        self._check("inside limits", bool(((t >= robot.t_min) & (t <= robot.t_max)).all()))
-        if self._last is not None:
-            room = self._rate * (time - self._last[0]) + 1e-12 * robot.t_max
-            self._check("inside rates", bool((cut | (np.abs(t - self._last[1]) <= room)).all()))
-        if command.actuation is not None:
-            orders, (weakest, strongest) = np.ravel(command.actuation), self._actuators
-            self._check("actuators", bool(((orders >= weakest) & (orders <= strongest)).all()))
-        way = int(command.answered)
-        self._check("answered", 0 <= way < len(ANSWERS))
-        if np.isfinite(command.direction).all():
-            self._check("proof", self._holds(command.direction))
-        self.answered[way] += 1
-        self._last = time, t.copy()
+        for promise, well in kept(self._controller, command, self._rate, time, self._last).items():
+            if not well.all():
+                self.broken.setdefault(promise, int(self.answered.sum()))
+        self.answered[int(command.answered)] += 1
+        self._last = command.tensions.copy(), time
         return command
-
-    def _check(self, promise: str, kept: bool) -> None:
-        if not kept:
-            self.broken.setdefault(promise, int(self.answered.sum()))
-
-    def _holds(self, direction: np.ndarray) -> bool:
-        """Return whether no tensions inside the bounds give the wrench along a direction."""
-        problem = self._controller.problems
-        along = direction @ problem.A[0]
-        most = np.where(along > 0, along * problem.bounds[1, 0], along * problem.bounds[0, 0]).sum()
-        return bool(direction @ problem.w[0] > most)
 
     def _nonsense(self, state: State) -> State:
         parts = [np.array(part) for part in (state.pose, state.velocity, state.carrier_pose, state.carrier_velocity)]
@@ -177,33 +151,23 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> dict[str, Any]:
     return given | {"faults": faults}
 
 
-def main() -> None:
-    """Run and report."""
-    count, names, seeds = read_options(__doc__, 100_000)
-    print(f"# Random flights of predictive control\n\nMeasured on {machine()}.\n")
-    print(f"| robot | {' | '.join(ANSWERS)} | broken promises |\n|---|{'---:|' * len(ANSWERS)}---|")
-    accepted = []
-    for name in names:
-        try:
-            Predictive(name, stages=1)
-        except InputError as error:
-            print(f"{name}: left out: {error}", file=sys.stderr)
-        else:
-            accepted.append(name)
-    flights, total, well = -(-count // (PERIODS * max(len(accepted), 1))), 0, True
-    for number, name in enumerate(accepted):
+def soak(start: int, count: int, robots: Sequence[str]) -> bool:
+    """Fly `count` steps of all robots together, print a table, and return whether each keeps every promise."""
+    print(head(" | ".join(["robot", *ANSWERS, "broken promises"])))
+    flights, well = -(-count // (PERIODS * len(robots))), True
+    for number, name in enumerate(robots):
         robot, answered, firsts = load(name), np.zeros(len(ANSWERS), dtype=np.int64), dict[str, str]()
-        first = seeds + number * flights
+        try:
+            Predictive(robot, stages=1)
+        except InputError as error:
+            print(row(name, *["-"] * len(ANSWERS), f"left out: {error}"))
+            continue
+        first = start + number * flights
         for seed in range(first, first + flights):
             counts, broken = fly_random(robot, seed)
             answered += counts
             for promise, step in broken.items():
                 firsts.setdefault(promise, f"not {promise}: seed {seed}, step {step}")
-        total, well = total + int(answered.sum()), well and not firsts
-        print(f"| {name} | {' | '.join(map(str, answered))} | {', '.join(firsts.values()) or 'none'} |", flush=True)
-    print(f"\n{total} steps, {'each answered as promised' if well else 'some not as promised'}.")
-    sys.exit(not well)
-
-
-if __name__ == "__main__":
-    main()
+        well &= not firsts
+        print(row(name, *answered, ", ".join(firsts.values()) or "none"), flush=True)
+    return well

@@ -23,55 +23,33 @@ import numpy as np
 
 from ..models import Robot, load
 from ..ocp import MotionStatus, Plan, plan
+from . import harness
 
 Scene = tuple[Robot, dict[str, Any]]
 
 LENGTH = 0.5  # [m], of the quadrotors' cables
 QUADROTOR, APART, LOAD = 0.1, 0.2, 0.01  # [m]
-ROUND = [(1.57, 1.0), (0.0, 1.0), (4.2, 1.0)]
-SIX = [(azimuth, 1.1) for azimuth in (1.04, 0.0, 2.08, 3.16, 4.2, 5.24)]
-FIVE = [(azimuth, 1.2) for azimuth in (1.25, 0.0, 2.5, 3.75, 5.0)]
-FOUR = [(azimuth, 1.1) for azimuth in (0.0, 1.57, 3.14, 4.71)]
 FOUR_AT_GOAL = [(azimuth, 1.2) for azimuth in (0.0, 5.0, 3.14, 4.0)]
 TEAMS = {  # azimuth and elevation of each cable [rad]
     1: [(0.0, np.pi / 2)],
     2: [(1.57, 1.0), (1.57 + np.pi, 1.0)],
-    3: ROUND,
-    4: FOUR,
-    5: FIVE,
-    6: SIX,
+    3: [(1.57, 1.0), (0.0, 1.0), (4.2, 1.0)],
+    4: [(azimuth, 1.1) for azimuth in (0.0, 1.57, 3.14, 4.71)],
+    5: [(azimuth, 1.2) for azimuth in (1.25, 0.0, 2.5, 3.75, 5.0)],
+    6: [(azimuth, 1.1) for azimuth in (1.04, 0.0, 2.08, 3.16, 4.2, 5.24)],
 }
 GATE = [(0.5, 0.4, 0.4), (0.5, -0.4, 0.4)]  # x and y of the middle, and the width [m]
-TREES = [
-    (x, y, 0.1)
-    for x, y in (
-        (0.75, -0.25),
-        (-0.2, -0.25),
-        (-0.75, -0.25),
-        (0.7, 0.5),
-        (0.3, 0.25),
-        (-0.6, 0.5),
-        (0.5, 1.25),
-        (-0.1, 1.0),
-        (-0.5, 1.0),
-    )
-]
-THIN_TREES = [
-    (x, y, 0.05)
-    for x, y in (
-        (1.98, 0.7785),
-        (0.8853, 1.0672),
-        (1.5711, -1.1581),
-        (0.4922, -0.9134),
-        (1.8408, -0.3093),
-        (0.3165, 0.0511),
-        (2.9604, -1.0162),
-        (2.6036, 0.1167),
-        (1.1281, 0.1223),
-        (2.854, 1.0161),
-        (0.0059, 1.0431),
-    )
-]
+# x and y of the trees [m]
+TREES_AT = (
+    (0.75, -0.2, -0.75, 0.7, 0.3, -0.6, 0.5, -0.1, -0.5),
+    (-0.25, -0.25, -0.25, 0.5, 0.25, 0.5, 1.25, 1.0, 1.0),
+)
+THIN_TREES_AT = (
+    (1.98, 0.8853, 1.5711, 0.4922, 1.8408, 0.3165, 2.9604, 2.6036, 1.1281, 2.854, 0.0059),
+    (0.7785, 1.0672, -1.1581, -0.9134, -0.3093, 0.0511, -1.0162, 0.1167, 0.1223, 1.0161, 1.0431),
+)
+TREES = [(x, y, 0.1) for x, y in zip(*TREES_AT, strict=True)]
+THIN_TREES = [(x, y, 0.05) for x, y in zip(*THIN_TREES_AT, strict=True)]
 
 
 def main() -> None:
@@ -86,7 +64,8 @@ def main() -> None:
     if options.list:
         print("\n".join(names))
         return
-    print(f"{'scene':14} {'robots':>6} {'status':11} {'CPU s':>6} {'violation':>10}  reason")
+    print(f"Measured on {harness.machine()}.\n")
+    print(harness.head("scene | status | reason | robots | CPU s | violation", 3))
     undecided = 0
     for name in names:
         robot, task = SCENES[name]()
@@ -103,7 +82,7 @@ def row(name: str, planned: Plan, seconds: float) -> str:
     violation = "-" if planned.status is MotionStatus.INFEASIBLE else f"{audit.violation.max():.1e} N"
     reason = planned.reason if not audit.excess else str(audit.excess[0])
     robots = len([carrier for carrier in planned.scenario.robot.carriers if carrier.moves])
-    return f"{name:14} {robots:6} {planned.status.value:11} {seconds:6.1f} {violation:>10}  {reason}"
+    return harness.row(name, planned.status.value, reason, robots, f"{seconds:.1f}", violation)
 
 
 def team(cables: list[tuple[float, float]]) -> Robot:

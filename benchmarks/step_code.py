@@ -22,6 +22,26 @@ FLAGS = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion",
 ROWS = Path(__file__).parent / "step_rows.c"
 
 
+def compiled_step(
+    robot: Robot,
+    precision: str,
+    folder: Path,
+    sources: tuple[str, ...],
+    compiler: str = "cc",
+    flags: tuple[str, ...] = ("-O2",),
+) -> ctypes.CDLL:
+    """Export the step of a robot, compile sources with it, and load the library; errors as of `StepCode`."""
+    if shutil.which(compiler) is None:
+        raise InputError(f"compiler must be a C compiler in PATH, got {compiler!r}")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in step_files(robot, precision).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    library = folder / "step.so"
+    command = [compiler, *FLAGS, *flags, f"-I{folder}", "-fPIC", "-shared", *sources, "-lm", "-o", str(library)]
+    subprocess.run(command, cwd=folder, check=True)
+    return ctypes.CDLL(str(library))
+
+
 class Steps(NamedTuple):
     """The answers to N states."""
 
@@ -89,17 +109,8 @@ class StepCode:
     def __init__(
         self, robot: Robot, precision: str, folder: Path, compiler: str = "cc", flags: tuple[str, ...] = ("-O2",)
     ):
-        if shutil.which(compiler) is None:
-            raise InputError(f"compiler must be a C compiler in PATH, got {compiler!r}")
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in step_files(robot, precision).items():
-            (folder / name).write_text(text, encoding="utf-8")
-        library = folder / "step.so"
-        command = [compiler, *FLAGS, *flags, f"-I{folder}", "-fPIC", "-shared", str(ROWS), "towline_step.c", "-lm"]
-        subprocess.run([*command, "-o", str(library)], cwd=folder, check=True)
-        self.robot = robot
-        self.precision = precision
-        self._library = ctypes.CDLL(str(library))
+        self.robot, self.precision = robot, precision
+        self._library = compiled_step(robot, precision, folder, (str(ROWS), "towline_step.c"), compiler, flags)
 
     def run(self, rows: Array) -> Steps:
         """Compute steps that do not depend on each other, of rows as from `States.rows`."""

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
-import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
-from ..export.step.export import step_files
 from ..models import Robot, load
-from .step_code import FLAGS
+from .step_code import compiled_step
 
 __all__ = ["CABLES", "Distributed", "StepDistribution"]
 
@@ -49,19 +45,11 @@ class StepDistribution:
     """
 
     def __init__(self, precision: str, folder: Path):
-        compiler = shutil.which("cc")
-        if compiler is None:
-            raise InputError("the exported step needs a C compiler, command cc, in PATH: there is none")
-        folder.mkdir(parents=True, exist_ok=True)
         robot = load("cogiro").model_dump()
         cables = [*robot["cables"], *robot["cables"]][:CABLES]
-        for name, text in step_files(Robot.model_validate({**robot, "cables": cables}), precision).items():
-            (folder / name).write_text(text, encoding="utf-8")
-        library = folder / "distribution.so"
-        command = [compiler, *FLAGS, "-O2", f"-I{folder}", "-fPIC", "-shared", str(SOURCE), "-lm", "-o", str(library)]
-        subprocess.run(command, check=True)
+        library = compiled_step(Robot.model_validate({**robot, "cables": cables}), precision, folder, (str(SOURCE),))
         self._real = np.float32 if precision == "float" else np.float64
-        self._solve = ctypes.CDLL(str(library)).distribute_rows
+        self._solve = library.distribute_rows
         self._solve.restype = None
 
     def solve(self, *problems: Array) -> Distributed:

@@ -9,7 +9,6 @@ down does so for all. A ratio is the median over the turns of a block's median t
 
 from __future__ import annotations
 
-import gc
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -23,7 +22,7 @@ from ..base.errors import InputError
 from ..base.writing import check_writable, whole_file
 from ..figures import style
 from ..solvers import TensionProblem
-from .machine import machine
+from .harness import alternating, machine, ratio, table
 from .tension_contenders import REFERENCE, Contender, contenders
 from .tension_tasks import KINDS, Task, make_task
 
@@ -203,23 +202,14 @@ def measure(
 ) -> list[Row]:
     """Measure contenders at one task, in blocks that take turns; the reference must be among them.
 
-    `show` is called after each turn with how many are done.
+    `show` is called with how many turns are done.
     """
     runners = [_Runner(contender, task, limit) for contender in who if task.kind in contender.kinds]
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        for turn in range(repeats + 1):
-            # Nobody is always the one who runs after the same neighbour.
-            first = turn % len(runners)
-            for runner in runners[first:] + runners[:first]:
-                if runner.running:
-                    runner.turn(turn)
-            gc.collect()
-            show(turn + 1)
-    finally:
-        if collecting:
-            gc.enable()
+    for turn, runner in alternating(runners, repeats + 1):
+        show(turn)
+        if runner.running:
+            runner.turn(turn)
+    show(repeats + 1)
     reference = next(runner for runner in runners if runner.contender.name == REFERENCE)
     return [_row(runner, reference.counted()) for runner in runners]
 
@@ -227,8 +217,6 @@ def measure(
 def _row(runner: _Runner, reference: dict[int, list[float]]) -> Row:
     blocks = runner.counted()
     times = [microseconds for block in blocks.values() for microseconds in block]
-    common = np.median(np.concatenate(list(reference.values()))) if reference else np.nan
-    ratios = [np.median(block) / np.median(reference.get(turn, [common])) for turn, block in blocks.items()]
     error, failures = _judge(runner.contender, runner.task, runner.answers)
     return Row(
         task=runner.task.name,
@@ -236,7 +224,7 @@ def _row(runner: _Runner, reference: dict[int, list[float]]) -> Row:
         tolerance=runner.contender.tolerance,
         median_us=float(np.median(times)) if times else float("nan"),
         p99_us=float(np.percentile(times, 99)) if times else float("nan"),
-        ratio=float(np.median(ratios)) if ratios else float("nan"),
+        ratio=ratio(blocks, reference),
         max_error=error,
         failures=failures,
         problems=len(runner.answers),
@@ -287,16 +275,15 @@ def markdown(report: Report) -> str:
         f"Failures: no answer, or off by more than {FAILED:g}; for infeasible problems, an answer.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):
-        lines += ["", f"## {task}", "", "| contender | required | median us | p99 us | ratio | error | failures |"]
-        lines += ["|---|---|---:|---:|---:|---:|---:|"]
-        rows = [row for row in report.rows if row.task == task]
-        for row in sorted(rows, key=lambda row: (np.isnan(row.ratio), row.ratio)):
+        rows = []
+        for row in sorted([r for r in report.rows if r.task == task], key=lambda row: (np.isnan(row.ratio), row.ratio)):
             error = "-" if row.max_error is None else f"{row.max_error:.0e}"
             name = f"{row.contender} ({row.detail})" if row.detail else row.contender
-            times = (
-                f"{row.median_us:.1f} | {row.p99_us:.1f} | {row.ratio:.2f}" if np.isfinite(row.ratio) else "- | - | -"
-            )
-            lines.append(f"| {name} | {row.tolerance} | {times} | {error} | {row.failures} of {row.problems} |")
+            times = f"{row.median_us:.1f}", f"{row.p99_us:.1f}", f"{row.ratio:.2f}"
+            times = times if np.isfinite(row.ratio) else "---"
+            rows.append((name, row.tolerance, *times, error, f"{row.failures} of {row.problems}"))
+        columns = "contender | required | median us | p99 us | ratio | error | failures"
+        lines += ["", f"## {task}", "", *table(columns, rows, 2)]
     return "\n".join(lines) + "\n"
 
 

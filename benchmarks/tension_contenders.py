@@ -94,9 +94,6 @@ def contenders() -> list[Contender]:
         "piqp": ("piqp, reuse", _piqp),
         "proxsuite": ("proxqp, reuse", _proxqp),
         "quadprog": ("quadprog, native", _quadprog),
-        "highspy": ("highs, reuse", _highs),
-        "scs": ("scs, native", _scs),
-        "moreau": ("moreau, reuse", _moreau),
     }
     for module, (name, prepare) in native.items():
         if find_spec(module) is not None:
@@ -335,62 +332,7 @@ def _quadprog(task: Task) -> Single:
     return run
 
 
-def _highs(task: Task) -> Single:
-    import highspy
-
-    rows = task.qps[0]["b"].size
-    n = task.qps[0]["q"].size
-    models = []
-    for qp in task.qps:
-        model = highspy.HighsModel()
-        lp = model.lp_
-        lp.num_col_, lp.num_row_ = n, rows
-        lp.col_cost_, lp.col_lower_, lp.col_upper_ = qp["q"], qp["lb"], qp["ub"]
-        lp.row_lower_ = lp.row_upper_ = qp["b"]
-        lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-        lp.a_matrix_.start_ = np.arange(n + 1, dtype=np.int32) * rows
-        lp.a_matrix_.index_ = np.tile(np.arange(rows, dtype=np.int32), n)
-        lp.a_matrix_.value_ = qp["A"].T.ravel()
-        model.hessian_.dim_ = n
-        model.hessian_.start_ = np.arange(n + 1, dtype=np.int32)
-        model.hessian_.index_ = np.arange(n, dtype=np.int32)
-        model.hessian_.value_ = np.diagonal(qp["P"]).copy()
-        models.append(model)
-    solver = highspy.Highs()
-    solver.setOptionValue("output_flag", False)
-    for name, value in _QPSOLVERS["highs"].items():
-        solver.setOptionValue(name, value)
-
-    def run(i: int) -> Array | None:
-        solver.passModel(models[i])
-        solver.run()
-        optimal = solver.getModelStatus() == highspy.HighsModelStatus.kOptimal
-        return np.array(solver.getSolution().col_value) if optimal else None
-
-    return run
-
-
-def _scs(task: Task) -> Single:
-    import scs
-    from scipy.sparse import csc_matrix
-
-    equations = task.qps[0]["b"].size
-    data = []
-    for qp in task.qps:
-        C, d = _one_sided(qp)
-        data.append({"P": csc_matrix(qp["P"]), "c": qp["q"], "A": csc_matrix(C), "b": d})
-    cone = {"z": equations, "l": data[0]["b"].size - equations}
-    settings = {"eps_abs": EPS, "eps_rel": 0.0, "max_iters": 10_000, "verbose": False}
-
-    def run(i: int) -> Array | None:
-        answer = scs.SCS(data[i], cone, **settings).solve()  # a new A cannot be given to an instance
-        return answer["x"] if answer["info"]["status_val"] == 1 else None
-
-    return run
-
-
-def _moreau_solver(task: Task, size: int) -> tuple[Any, Array, Array, Array, Array]:
-    """Return a compiled solver for `size` problems at once, and the values of P, A, q and b of all."""
+def _moreau_batch(task: Task) -> Batch:
     import moreau
 
     stacked = [_one_sided(qp) for qp in task.qps]
@@ -398,47 +340,25 @@ def _moreau_solver(task: Task, size: int) -> tuple[Any, Array, Array, Array, Arr
     pattern = stacked[0][0] != 0.0
     pattern[:equations] = True
     places = np.nonzero(pattern)
-    offsets = np.r_[0, np.cumsum(pattern.sum(axis=1))]
+    P = _over_and_over(np.array([np.diagonal(qp["P"]) for qp in task.qps]))
+    A = _over_and_over(np.array([C[places] for C, _ in stacked]))
+    q, b = _over_and_over(np.array([qp["q"] for qp in task.qps])), _over_and_over(np.array([d for _, d in stacked]))
     settings = moreau.Settings(
         device="cpu",
         solver="active_set",
-        batch_size=size,
+        batch_size=len(P),
         active_set_settings=moreau.ActiveSetSettings(primal_tol=EPS),
     )
-    solver = moreau.CompiledSolver(
+    solver: Any = moreau.CompiledSolver(
         n=n,
         m=pattern.shape[0],
         P_row_offsets=np.arange(n + 1),
         P_col_indices=np.arange(n),
-        A_row_offsets=offsets,
+        A_row_offsets=np.r_[0, np.cumsum(pattern.sum(axis=1))],
         A_col_indices=places[1],
         cones=moreau.Cones(num_zero_cones=equations, num_nonneg_cones=pattern.shape[0] - equations),
         settings=settings,
     )
-    P = np.array([np.diagonal(qp["P"]) for qp in task.qps])
-    A = np.array([C[places] for C, _ in stacked])
-    return solver, P, A, np.array([qp["q"] for qp in task.qps]), np.array([d for _, d in stacked])
-
-
-def _moreau(task: Task) -> Single:
-    import moreau
-
-    solver, P, A, q, b = _moreau_solver(task, 1)
-
-    def run(i: int) -> Array | None:
-        solver.setup(P[i : i + 1], A[i : i + 1])
-        answer = solver.solve(q[i : i + 1], b[i : i + 1])
-        return answer.x[0] if solver.info.status[0] == moreau.SolverStatus.Solved else None
-
-    return run
-
-
-def _moreau_batch(task: Task) -> Batch:
-    import moreau
-
-    size = len(_over_and_over(np.empty((len(task.qps), 0))))
-    solver, *values = _moreau_solver(task, size)
-    P, A, q, b = (_over_and_over(value) for value in values)
 
     def run() -> tuple[Array, NDArray[np.bool_]]:
         solver.setup(P, A)

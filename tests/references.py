@@ -4,8 +4,11 @@ from itertools import product
 
 import clarabel
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import linprog, lsq_linear, nnls
 from scipy.sparse import csc_matrix
+
+OPTIMAL = 1e-7  # error of the optimality conditions, relative to the gradient
+PROVING = 1e10  # larger multipliers prove nothing: w moved by rounding changes the cost by a part in a million
 
 
 def row_scale(n, length):
@@ -85,3 +88,32 @@ def optimum_by_enumeration(A, w, t_min, t_max, t_ref=None, weights=None):
         if cost < best_cost:
             best, best_cost = t, cost
     return best
+
+
+def optimality_error(problem, t):
+    """Return by how much tensions miss the optimality conditions, relative to their gradient; inf if beyond a limit.
+
+    The gradient omega (t - t_ref) is A^T y but for a part at the limits, of the sign that pushes against them.
+    """
+    if (t < problem.t_min).any() or (t > problem.t_max).any() or not np.isfinite(t).all():
+        return np.inf
+    if not np.linalg.norm(problem.scaled_A @ t - problem.scaled_w) <= problem.tolerance(t):
+        return np.inf
+    size = np.abs(t).max(initial=1e-300)
+    low, high = t - problem.t_min <= 1e-9 * size, problem.t_max - t <= 1e-9 * size
+    identity = np.eye(problem.m)
+    rows = problem.scaled_A.T / np.maximum(np.linalg.norm(problem.scaled_A, axis=1), 1e-300)
+    columns = np.hstack([rows, -rows, identity[:, low], -identity[:, high]])
+    gradient = problem.weights * (t - problem.t_ref)
+    largest = np.abs(gradient).max()
+    if largest == 0.0:
+        return 0.0
+    multipliers = nnls(columns, gradient / largest)[0].astype(np.longdouble)
+    if multipliers.max() > PROVING:
+        multipliers = lsq_linear(columns, gradient / largest, (0.0, PROVING), method="bvls", tol=1e-15).x
+    rest = gradient / largest - columns @ multipliers
+    if multipliers.max() * np.finfo(np.float64).eps > 1e-2 * OPTIMAL:  # their own rounding is in the rest: refine them
+        counts = multipliers > 0.0
+        multipliers[counts] += np.linalg.lstsq(columns[:, counts], rest.astype(np.float64), rcond=None)[0]
+        rest = gradient / largest - columns @ np.maximum(multipliers, 0.0)
+    return float(np.linalg.norm(rest.astype(np.float64)))

@@ -235,5 +235,7 @@ def test_all_plan_the_same_circle():
         np.testing.assert_allclose(theirs.carriers.pose, ours.carriers.pose, atol=1e-5)
         np.testing.assert_allclose(theirs.tensions, ours.tensions, atol=1e-4)
     lines = planning.table(runs)
-    assert len(lines) == 1 + len(runs)
-    assert "1.00, 1.00   passed" in lines[1]
+    assert len(lines) == 2 + len(runs)
+    assert lines[2].startswith("| towline | ")
+    assert lines[2].count(" s | 1.00 | ") == 2
+    assert "| passed, " in lines[2]

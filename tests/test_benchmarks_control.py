@@ -122,7 +122,7 @@ def test_wrong_numbers_are_refused(steps, seeds, name):
 
 @pytest.mark.parametrize("name", ["cogiro", "wang-flying", "wang-flying-quadrotor", "wang-ctmrts-4"])
 def test_random_flights_are_answered_as_promised(name):
-    """A few; `python -m towline.benchmarks.predictive_steps` flies many."""
+    """A few; `python -m towline.benchmarks.soak predictive` flies many."""
     robot = load(name)
     for seed in range(3):
         answered, broken = fly_random(robot, seed)

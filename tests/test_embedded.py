@@ -10,7 +10,7 @@ import pytest
 import towline
 from towline import Robot, available, load, solve_batch
 from towline.benchmarks import step as benchmark
-from towline.benchmarks import step_size
+from towline.benchmarks.step import robot_named
 from towline.benchmarks.step_code import FLAGS, States, StepCode
 from towline.benchmarks.step_states import random_states
 from towline.export.step.costs import costs
@@ -20,7 +20,7 @@ from towline.models import Dynamics
 from towline.models.tape_c import operations
 from towline.solvers.status import STATUSES
 
-from .steps import line, required, robot_named
+from .steps import deepest, line, measure_size, required, target
 
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID = range(5)
 ROBOTS = ["wang-flying", "cogiro", "ipanema-2", "wang-ctmrts-6", "planar-4", "caroca-pulleys", "twelve"]
@@ -269,7 +269,7 @@ def test_the_deepest_stack_is_that_of_the_longest_calls():
     edge: { sourcename: "a.c:long" targetname: "a.c:leaf" label: "a.c:7:5" }
     edge: { sourcename: "a.c:leaf" targetname: "sqrt" }
     """
-    assert step_size.deepest(graph, "top") == 160
+    assert deepest(graph, "top") == 160
 
 
 @pytest.mark.parametrize("name", ["cogiro", "twelve"])
@@ -278,7 +278,7 @@ def test_code_and_stack_are_small(tmp_path, name):
     required("gcc")
     if "Free Software Foundation" not in subprocess.check_output(["gcc", "--version"], text=True):
         pytest.skip("gcc is another compiler here, which does not report the stack")
-    size = step_size.measure_size(robot_named(name), "double", tmp_path, step_size.target())
+    size = measure_size(robot_named(name), "double", tmp_path, target())
     assert size.text < 25_000
     assert 2_000 < size.stack <= 6 * 1024
 

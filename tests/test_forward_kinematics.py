@@ -409,7 +409,7 @@ def test_wrong_input_of_a_tracker_is_one_line(call, message):
 
 
 def test_a_single_estimate_takes_microseconds():
-    """Loosely, against what a slow machine does; `benchmarks.forward_kinematics` has the ratios."""
+    """Loosely, against what a slow machine does; `benchmarks.batches` has the ratios."""
     robot = load("cogiro")
     lengths, start = dynamics_of(robot).cable_lengths(robot.home), robot.home + 1e-3
     pose_from_lengths(robot, lengths, start)

@@ -1,4 +1,4 @@
-"""Random tasks: what a plan says of itself is so. All 200 are `python -m towline.benchmarks.random_tasks`."""
+"""Random tasks: what a plan says of itself is so. More are `python -m towline.benchmarks.soak tasks`."""
 
 from dataclasses import replace
 

@@ -99,7 +99,6 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     step = {name for name in tracked if name.startswith("export/step/template/")} | {
         "benchmarks/step_rows.c",
         "benchmarks/step_distribution.c",
-        "benchmarks/step_osqp.c",
     }
     data = {f"towline/{name}" for name in robots | step | {"py.typed", "ocp/tasks/task.schema.json"}}
     core = re.compile(r"towline/solvers/core/(\w+\.[ch]|_core\.pyi|_core(\.abi3\.so|\.pyd))")

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from towline.benchmarks.exactness import optimality_error
 from towline.benchmarks.tension_tasks import make_task
 from towline.solvers import TensionProblem, methods, solve
 
 from .problems import geometric_matrix
+from .references import optimality_error
 
 # What a method may report instead of tensions, by its docstring.
 REFUSALS = {
