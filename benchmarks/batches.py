@@ -56,8 +56,8 @@ def measure(robot: Robot, count: int, runs: int) -> Iterator[tuple[str, float, s
         yield name, seconds / count, f"map {by_map / seconds:.1f}"
     lengths = dynamics.cable_lengths(poses) + rng.normal(0, 1e-3, (count, robot.m))
     seconds = timed(lambda: pose_from_lengths(robot, lengths, near), runs)[1] / count
-    some = list(zip(lengths[:FEW], near, strict=False))
-    peer = timed(lambda: [by_scipy(robot, *given) for given in some], 1)[1] / len(some)
+    pairs = list(zip(lengths[:FEW], near, strict=False))
+    peer = timed(lambda: [by_scipy(robot, *given) for given in pairs], 1)[1] / len(pairs)
     yield "pose from lengths, tracking", seconds, f"scipy {peer / seconds:.0f}"
     few = lengths[:10_000]
     search = timed(lambda: pose_from_lengths(robot, few), runs)[1] / len(few)

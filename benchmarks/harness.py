@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 __all__ = ["alternating", "head", "machine", "ratio", "row", "table", "timed"]
 
 T = TypeVar("T")
+Times = float | Sequence[float]  # of a turn
 
 
 def machine(packages: tuple[str, ...] = ("casadi", "numpy", "numba")) -> str:
@@ -53,7 +53,7 @@ def alternating(contenders: Sequence[T], turns: int) -> Iterator[tuple[int, T]]:
             gc.enable()
 
 
-def ratio(times: Mapping[int, ArrayLike], reference: Mapping[int, ArrayLike]) -> float:
+def ratio(times: Mapping[int, Times], reference: Mapping[int, Times]) -> float:
     """Return the median over the turns of the ratio of both medians; nan without times.
 
     A turn that the reference does not have is compared with the median of all its times.

@@ -45,7 +45,7 @@ class Soak(NamedTuple):
     """A check: `check(start, count, parts)` prints and returns whether all is well; its usual count, and its parts."""
 
     check: Callable[[int, int, Sequence[str]], bool]
-    count: int
+    cases: int
     parts: Sequence[str]
     usual: Sequence[str] = ()  # parts; default: all
 
@@ -72,7 +72,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="parts of the check, separated by commas")
     given = parser.parse_args()
     soak = SOAKS[given.name]
-    count = soak.count if given.count is None else given.count
+    count = soak.cases if given.count is None else given.count
     if count < 1 or given.start < 0:
         parser.error(f"--count must be 1 or more and --start 0 or more, got {count} and {given.start}")
     parts = given.only.split(",") if given.only else soak.usual or soak.parts

@@ -349,7 +349,7 @@ def _moreau_batch(task: Task) -> Batch:
         batch_size=len(P),
         active_set_settings=moreau.ActiveSetSettings(primal_tol=EPS),
     )
-    solver = moreau.CompiledSolver(
+    solver: Any = moreau.CompiledSolver(
         n=n,
         m=pattern.shape[0],
         P_row_offsets=np.arange(n + 1),
