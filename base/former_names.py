@@ -46,7 +46,7 @@ def renamed(name: str) -> str | None:
 
 
 def moved_name(package: str | None, name: str) -> Any:
-    """Return what a package, None: `towline`, once exported under a name, or raise AttributeError."""
+    """Return what a package, or `towline` itself (None), once exported under a name, or raise AttributeError."""
     whole = PACKAGE if package is None else f"{PACKAGE}.{package}"
     if (package, name) not in MOVED:
         raise AttributeError(f"module {whole!r} has no attribute {name!r}")
