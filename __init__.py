@@ -5,7 +5,8 @@ ground up: `towline.base` (what all stand on), `towline.models` (robots and thei
 distribution on plain arrays), `towline.figures` (matplotlib), `towline.statics` (one instant of a robot),
 `towline.plant` (motion in time), `towline.workspace` (reachable poses), `towline.estimation` (the pose from lengths,
 the robot as built), `towline.control` (one step of a controller), `towline.ocp` (planning), `towline.simulation`
-(runs), `towline.export` (a control step as C), `towline.studies` (the papers), `towline.cli`.
+(runs), `towline.export` (a control step as C), `towline.studies` (the papers), `towline.benchmarks`, `towline.viewer`,
+`towline.cli`.
 """
 
 from importlib import import_module
@@ -41,10 +42,10 @@ _HOMES = {
     "base.errors": ("InputError", "SolverError", "TowlineError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
-# Reached as attributes. The last two are short names, the rest of the former ones are imported by their paths.
+# Reached as attributes. The last two are short names that stay.
 _PACKAGES = {
     *("base", "control", "estimation", "export", "figures", "models", "ocp", "plant", "simulation", "solvers"),
-    *("statics", "workspace", "calibration", "errors"),
+    *("benchmarks", "cli", "statics", "studies", "viewer", "workspace", "calibration", "errors"),
 }
 
 __all__ = [
@@ -91,7 +92,7 @@ def __getattr__(name: str) -> Any:
         return value
     if (None, name) in former_names.MOVED:
         return former_names.moved_name(None, name)
-    if name in _PACKAGES:
+    if name in _PACKAGES or former_names.renamed(name):
         return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -112,11 +112,13 @@ def brief(value: Any) -> str:
     if isinstance(value, str):
         return printable(value, SHORT)
     if isinstance(value, Sequence | Mapping | set | frozenset):
+        if not value:
+            return "none"
         if isinstance(value, tuple | list) and len(value) <= FEW and all(isinstance(one, float | int) for one in value):
             return f"({quantity_row(value)})"
         if isinstance(value, tuple | list) and len(value) <= FEW and all(isinstance(one, str) for one in value):
-            return printable(", ".join(value), SHORT) or "none"
-        return f"{quantity(len(value))} entries" if value else "none"
+            return printable(", ".join(value), SHORT)
+        return f"{quantity(len(value))} entries"
     return "none" if value is None else type(value).__name__
 
 

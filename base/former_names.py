@@ -1,4 +1,4 @@
-"""Former names of modules, which can be imported for one more release: `install`, `renamed`, `moved_name`."""
+"""Former names of packages, most of which can be imported for one more release: `install`, `renamed`, `moved_name`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NOW = {
     "models.statics": "statics.equilibria",
     "robust": "statics.robust",
 }
-# Names that packages are still asked for: the package now, and the name where it is another one, which goes next.
+# Where each name is now, and its new name if it was renamed: the old one goes with the next release.
 MOVED = {
     (None, "Flight"): ("simulation", "Simulation"),
     ("simulation", "Flight"): ("simulation", "Simulation"),
@@ -59,7 +59,7 @@ def moved_name(package: str | None, name: str) -> Any:
 def install() -> None:
     """Let former names be imported."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
-        sys.meta_path.append(_Finder())
+        sys.meta_path.insert(0, _Finder())  # before that of paths, which finds folders that were left behind
 
 
 class _Finder(MetaPathFinder):

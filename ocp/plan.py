@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Plan"]
 
 
+@dataclass(frozen=True, eq=False)
 class Plan(PlanData, Filmed):
     """A planned motion and its audit; its numbers are those of `PlanData`."""
 

@@ -1,6 +1,6 @@
 """Forward time: a plant, wind, slack, sensors, faults and a controller make a flight, `simulate`."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.former_names import moved_name
 from .noise import Noise
@@ -10,6 +10,8 @@ from .simulation import Simulation
 __all__ = ["Noise", "Simulation", "simulate"]
 
 
-def __getattr__(name: str) -> Any:
-    """Return what a name stood for that goes with the next release."""
-    return moved_name("simulation", name)
+if not TYPE_CHECKING:  # a type checker would accept any name
+
+    def __getattr__(name: str) -> Any:
+        """Return what a former name stands for."""
+        return moved_name("simulation", name)

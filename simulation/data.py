@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from ..control.command import OTHERWISE
 from ..models.robot import Robot
 from .conditions import Conditions
 from .record import Record
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["TENSION_TOLERANCE", "SimulationData"]
 

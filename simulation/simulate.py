@@ -83,8 +83,9 @@ def simulate(
     noise
         Of the sensors, see `Noise`; default: none.
     events
-        Lines: "cut 3 at 2.5", a cable tears (they count from 1; times in [s]); "stick 2 at 1", its winch stops; "lose
-        quad-1 at 2", the actuators of a carrier give nothing any more; "miss 0.05 at 1.2", the controller is late.
+        What happens to the robot on the way, a line each: "cut 3 at 2.5", a cable tears (they count from 1; times in
+        [s]); "stick 2 at 1", its winch stops; "lose quad-1 at 2", the actuators of a carrier give nothing any more;
+        "miss 0.05 at 1.2", the controller is late.
     duration
         [s]; default: that of the reference. A reference that ends earlier rests at its end.
     seed
@@ -130,6 +131,8 @@ def simulate(
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
     if faults is not None:
+        if events:
+            raise InputError(f"faults must be left out with events, whose former name it is, got {shown(faults)}")
         warn("faults is called events now; the former name goes with the next release", DeprecationWarning, 2)
         events = faults
     the_robot = as_robot(robot)

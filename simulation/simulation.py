@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Simulation"]
 
 
+@dataclass(frozen=True, eq=False)
 class Simulation(SimulationData, Filmed):
     """A flown motion; its numbers are those of `SimulationData`."""
 

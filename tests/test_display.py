@@ -2,6 +2,7 @@
 
 import ast
 import re
+from dataclasses import FrozenInstanceError
 from importlib import import_module
 from pathlib import Path
 from xml.etree import ElementTree
@@ -136,6 +137,14 @@ def test_headlines_state_the_result(results):
         proof.direction @ problem.A, problem.t_min, problem.t_max, strict=True))  # fmt: skip
     assert f"short by {proof.direction @ problem.w - reach:.4g} N" in of["infeasible TensionSolution"]
     assert of["Sweep"] == "ipanema-1, lift: 1 of 2 plans feasible, 1 infeasible"
+
+
+def test_results_cannot_be_changed(results):
+    """Neither what was computed, nor a name that is not there."""
+    for name in ("Plan", "Simulation", "Calibration", "TensionSolution"):
+        for attribute in ("report", "robot", "warnings", "typo"):
+            with pytest.raises((FrozenInstanceError, AttributeError, TypeError)):
+                setattr(results[name], attribute, 1)
 
 
 def test_a_half_made_result_is_displayed():

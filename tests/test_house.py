@@ -132,6 +132,16 @@ def test_former_names_can_be_imported():
         importlib.import_module("towline.embedding")
     import towline
 
+    with pytest.warns(DeprecationWarning, match=r"towline\.models\.plant\.plant is called towline\.plant\.plant now"):
+        assert importlib.import_module("towline.models.plant.plant").Plant is towline.plant.Plant
+    assert importlib.import_module("towline.calibration.solving") is towline.estimation.calibration.solving
+    (ROOT / "calibration").mkdir()  # as `git pull` leaves one with the compiled modules of before
+    try:
+        for name in [name for name in sys.modules if name.startswith("towline.calibration")]:
+            del sys.modules[name]
+        assert importlib.import_module("towline.calibration") is towline.estimation.calibration
+    finally:
+        (ROOT / "calibration").rmdir()
     for package in (towline, towline.simulation):
         with pytest.warns(DeprecationWarning, match="Flight is called Simulation now"):
             assert package.Flight is towline.Simulation

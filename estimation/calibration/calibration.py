@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Calibration"]
 
 
+@dataclass(frozen=True, eq=False)
 class Calibration(CalibrationData, Drawn):
     """The result of `calibrate`; its numbers are those of `CalibrationData`."""
 
