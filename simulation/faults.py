@@ -38,7 +38,7 @@ class Fault(NamedTuple):
     lasting: float = 0.0
 
 
-def read_faults(robot: Robot, faults: Sequence[str], duration: float) -> tuple[Fault, ...]:
+def read_faults(robot: Robot, faults: Sequence[str], duration: float, name: str = "events") -> tuple[Fault, ...]:
     """Return faults, the earliest first.
 
     Parameters
@@ -49,6 +49,8 @@ def read_faults(robot: Robot, faults: Sequence[str], duration: float) -> tuple[F
         Lines: "cut 3 at 2.5", "stick 2 at 1", "lose quad-1 at 2", "miss 0.05 at 1.2" (times in [s]).
     duration
         Of the flight [s]: faults begin before its end.
+    name
+        Of the argument, for errors.
 
     Raises
     ------
@@ -56,11 +58,11 @@ def read_faults(robot: Robot, faults: Sequence[str], duration: float) -> tuple[F
         If a line has another form, there is no such cable or carrier, or the flight ends before.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
-        raise InputError(f"events must be a list of texts, each {ACCEPTED}, got {shown(faults)}")
-    read = [_read(robot, text, f"events[{number}]") for number, text in enumerate(faults)]
+        raise InputError(f"{name} must be a list of texts, each {ACCEPTED}, got {shown(faults)}")
+    read = [_read(robot, text, f"{name}[{number}]") for number, text in enumerate(faults)]
     for number, fault in enumerate(read):
         if fault.at >= duration:
-            raise InputError(f"events[{number}] must begin before the end at {duration:g} s, got {fault.at:g} s")
+            raise InputError(f"{name}[{number}] must begin before the end at {duration:g} s, got {fault.at:g} s")
     return tuple(sorted(read, key=lambda fault: fault.at))
 
 

@@ -116,6 +116,8 @@ def simulate(
         Whether to continue the checkpoint if the file exists. It must be of the same flights.
     progress
         Function that is called with (flights done, flights in total, those that passed) of many flights.
+    faults
+        The former name of `events`.
 
     Returns
     -------
@@ -155,7 +157,7 @@ def simulate(
         wind=read_wind(the_robot, wind, number("gusts", gusts, 0.0, 100.0)),
         disturbance=finite_array("disturbance", np.zeros(6) if disturbance is None else disturbance, (6,)),
         noise=noise if isinstance(noise, Noise) else validate({} if noise is None else noise, Noise, "noise"),
-        faults=read_faults(the_robot, events, periods * step),
+        faults=read_faults(the_robot, events, periods * step, "events" if faults is None else "faults"),
     )
     pilot = ComputedTorque(the_robot) if controller is None else controller
     first, error = whole_number("seed", seed, 0, 2**63 - 1), number("tolerance", tolerance, 0.0, 1e6)

@@ -460,7 +460,7 @@ def test_wrong_input_is_one_line():
         Plant(load("cogiro")).command(np.ones(8), wind=[1, 0, 0])
     with pytest.raises(InputError, match="lengths must be None where tensions are given"):
         plant.start(tensions=np.ones(6), lengths=np.ones(6))
-    with pytest.raises(InputError, match="stiffness must be numbers >= 0"):
+    with pytest.raises(InputError, match="stiffness must be finite numbers >= 0"):
         Plant(robot, stiffness=-1.0)
     with pytest.raises(SolverError, match=r"grows beyond all numbers in steps of 0\.5 s"):
         plant.run(plant.start(lengths=np.full(6, 0.5)), held(plant, 1000, np.full(6, 0.5)), 0.5)
