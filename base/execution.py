@@ -244,7 +244,7 @@ class _Spawning(SpawnContext):
         with self._launching:
             self._ended = True
             for each in self._launched:
-                with suppress(OSError):  # it has ended by itself
+                with suppress(OSError):  # it has already ended
                     each.kill()
 
 

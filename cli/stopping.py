@@ -2,8 +2,8 @@
 
 SIGTERM is how Slurm, systemd and containers end a command. Python raises KeyboardInterrupt between two of its own
 instructions. Compiled code may run for seconds before the next one, a library may swallow the exception, and worker
-processes may be waited for. So a thread listens too, which the signal wakes at once: what has not ended by itself after
-a moment, it ends.
+processes may be waited for. So a thread listens too, which the signal wakes at once, and ends what is still running a
+moment later.
 """
 
 from __future__ import annotations

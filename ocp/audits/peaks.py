@@ -33,7 +33,7 @@ UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 
 
 def _corners(scenario: Scenario, seen: Instants) -> np.ndarray:
-    """Return the instants at corners of the motion, and just before those at which it or its load may jump, (k,)."""
+    """Return the instants at corners of the motion, and just before those at which its load may jump, (k,)."""
     nodes = np.zeros(0) if seen.deviation is None else seen.deviation.nodes
     boundaries, duration = scenario.phases.boundaries, float(seen.times[-1])
     corners = np.unique(np.concatenate([nodes, boundaries]))

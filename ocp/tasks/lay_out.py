@@ -71,7 +71,7 @@ def lay_out(robot: Robot, task: Task) -> Scenario:
     _check_start_and_end(scenario, where)
     _check_times(task, where)
     _check_waypoints(task, where)
-    _check_transcription(task, limits, where)
+    _check_periodic_end(task, where)
     return replace(scenario, phases=lay_out_phases(scenario))
 
 
@@ -165,8 +165,8 @@ def _frame(robot: Robot, task: Task, where: str) -> bool:
     return frame != "world"
 
 
-def _check_transcription(task: Task, limits: Limits, where: str) -> None:
-    """Refuse what the scheme or the solver cannot do."""
+def _check_periodic_end(task: Task, where: str) -> None:
+    """Refuse a final pose of the carriers that their periodic motion contradicts."""
     if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
         raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
 
