@@ -30,6 +30,7 @@ Kind = TypeVar("Kind")
 
 _LONGEST = 60  # letters of a value in a message
 LONGEST_TEXT = 240  # letters of a path or of a part of a message
+MOST_ROWS = 100_000  # of a list of rows of numbers in a field
 
 
 def shown(value: object) -> str:

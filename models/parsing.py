@@ -18,7 +18,7 @@ from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.scanner import Scanner, ScannerError
 
 from ..base.errors import InputError
-from ..base.inputs import LONGEST_TEXT, check_ending, file_path, printable, shown
+from ..base.inputs import LONGEST_TEXT, MOST_ROWS, check_ending, file_path, printable, shown
 from ..base.reading import read_bytes
 from ..base.writing import whole_file
 from .schema import json_schema
@@ -220,7 +220,8 @@ def _without_lengths(details: list[Any]) -> list[Any]:
         if length is None:
             result[number] = detail
         else:  # of missing numbers the last one has the largest index
-            result[place] = detail | {"type": "length", "loc": place, "msg": f"must be {length} numbers"}
+            accepted = f"{length} numbers" if length < MOST_ROWS else f"a list of at most {length} items"
+            result[place] = detail | {"type": "length", "loc": place, "msg": f"must be {accepted}"}
     return list(result.values())
 
 

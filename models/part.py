@@ -7,14 +7,23 @@ R = Rz(yaw) Ry(pitch) Rx(roll).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 from typing_extensions import override
 
 from ..base.display import Displayed, Fact, brief
 from ..base.errors import InputError
+from ..base.inputs import MOST_ROWS
 
 LARGEST = 1e9  # of any number in a file: beyond it squares and products stop being exact enough
 
@@ -33,6 +42,9 @@ Share = Annotated[float, BeforeValidator(_plain_number), Field(gt=0, lt=1, allow
 Vector3 = tuple[Finite, Finite, Finite]
 Pose = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 Inertia = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+Item = TypeVar("Item")
+# A long list of rows of numbers. Its first wrong row is the only one reported: to collect all takes minutes.
+Rows: TypeAlias = Annotated[tuple[Item, ...], Field(min_length=1, max_length=MOST_ROWS, fail_fast=True)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 
 Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]

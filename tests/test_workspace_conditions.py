@@ -3,6 +3,7 @@
 import itertools
 import json
 import pickle
+import time
 
 import numpy as np
 import pytest
@@ -469,3 +470,18 @@ def test_conditions_that_do_not_apply_to_a_robot():
     for condition in (EquilibriumPosture(), ExistsPlacement(condition=ForceBalance()), Lengths(max=(1.0, 2.0))):
         with pytest.raises(InputError, match="must have"):
             condition.holds(robot, places)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line"),
+    [
+        ([["a"] * 6] * 500_000, r"accelerations\[0\]\[0\] must be a number, got 'a'; 5 more errors"),
+        (["x"] * 500_000, r"accelerations\[0\] must be a list, got 'x'"),
+        (np.broadcast_to(0.0, (10**8, 6)), r"accelerations must be a list of at most 100000 items, got an array of"),
+    ],
+)
+def test_long_lists_are_refused_at_their_first_wrong_row(wrong, line):
+    started = time.perf_counter()
+    with pytest.raises(InputError, match=line):
+        Dynamic(accelerations=wrong)
+    assert time.perf_counter() - started < 5

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ...models import Robot
 from ...models.dynamics import dynamics_of
-from ...models.part import Finite
+from ...models.part import Finite, Rows
 from ..condition import TensionCondition
 from ..feasibility import feasible
 from ..places import Places
@@ -27,8 +27,8 @@ class Dynamic(TensionCondition):
     takes_every_row: ClassVar[bool] = True
 
     kind: Literal["dynamic"] = "dynamic"
-    accelerations: tuple[tuple[Finite, Finite, Finite, Finite, Finite, Finite], ...] = Field(
-        min_length=1, description="second derivatives of (x, y, z, roll, pitch, yaw) [m/s^2, rad/s^2]"
+    accelerations: Rows[tuple[Finite, Finite, Finite, Finite, Finite, Finite]] = Field(
+        description="second derivatives of (x, y, z, roll, pitch, yaw) [m/s^2, rad/s^2]"
     )
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...models import Robot
-from ...models.part import Finite
+from ...models.part import Finite, Rows
 from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
@@ -33,9 +33,7 @@ class WrenchFeasible(TensionCondition):
         default=None,
         description="minimum and maximum of (fx, fy, fz, mx, my, mz) on the platform, about the CoM [N, N m]",
     )
-    vertices: tuple[Wrench, ...] | None = Field(
-        default=None, min_length=1, description="corners of a polytope of such wrenches [N, N m]"
-    )
+    vertices: Rows[Wrench] | None = Field(default=None, description="corners of a polytope of such wrenches [N, N m]")
 
     @model_validator(mode="after")
     def _one_set(self) -> Self:
