@@ -172,6 +172,8 @@ def test_a_plan_is_shown_as_it_was_saved(folder):
     frames = replay.frames(5.0)
     assert (frames[0], frames[-1]) == (0, len(replay.times) - 1)
     assert np.diff(replay.times[frames]).max() == pytest.approx(0.2, abs=0.051)
+    recorded = (len(replay.times) - 1.5) / replay.duration  # [1/s]: one instant too few if it were rounded down
+    np.testing.assert_array_equal(replay.frames(recorded), np.arange(len(replay.times)))
     for points in (replay.path, seen.points.anchors):
         assert (points > replay.extent.low - 0.2).all()
         assert (points < replay.extent.high + 0.2).all()

@@ -120,7 +120,7 @@ def check(subject, frames, late):
     length = times[-1] - times[0]
     clock = np.where(clock < -length / 2, clock + length, clock)
     assert (clock > -0.051).all()
-    assert (clock < late).all(), clock[clock >= late]
+    assert (clock < late).all(), [frame for frame, ahead in zip(frames, clock, strict=True) if ahead >= late]
 
 
 def test_frames_of_a_playing_view_are_of_one_instant(subject, page):
@@ -135,4 +135,4 @@ def test_frames_of_a_playing_page_are_of_one_instant(subject, page, tmp_path):
     page.goto(save_page(subject, tmp_path / "circle.html").as_uri())
     page.wait_for_function("parseFloat(document.querySelector('input')?.value) > 0.5")
     frames = page.evaluate(WATCH, FRAMES)
-    check(subject, frames, 0.1)
+    check(subject, frames, np.diff(subject.replay.times).max() + 0.051)
