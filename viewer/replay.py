@@ -124,7 +124,7 @@ class Replay:
         return int(np.abs(self.times - time).argmin())
 
     def frames(self, rate: float) -> np.ndarray:
-        """Return the indices of instants at equal intervals, `rate` per second or more, at most `MOST_FRAMES` in all."""
+        """Return the indices of instants at equal intervals: `rate` per second or more, at most `MOST_FRAMES`."""
         count = min(math.ceil(self.duration * rate) + 1, MOST_FRAMES, len(self.times))
         instants = np.linspace(self.times[0], self.times[-1], count)
         return np.unique([self.index_at(time) for time in instants])
