@@ -126,7 +126,7 @@ def derivatives(
     x, p
         Unknowns and parameters.
     costs
-        What the objective sums, with the weight of each set, but for linear terms.
+        What the objective sums, with the weight of each set.
     blocks
         The rows, in their order.
     """

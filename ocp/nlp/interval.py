@@ -18,6 +18,7 @@ from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import Layout
 from .near import is_local
+from .objective import cost_function, costs_at
 from .rows import (
     OTHER_COSTS,
     Mesh,
@@ -99,13 +100,16 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     values.append(x_end[layout.shared] - x[layout.shared])
     rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
     _inner_rows(scenario, layout, h, columns, own, values, rows)
-    cost = _jerk_cost(scenario, h, own)
-    cost += _rate_cost(scenario, layout, h, columns, take_up)
-    cost *= OTHER_COSTS if mesh.elastic else 1.0
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
-    _rate_rows(scenario, mesh, layout, h, columns, moving, values, rows)
+    whole = [
+        [ca.vertcat(*body) for body in (in_world(scenario, bodies[0], bodies[1:]), *bodies[1:])] for bodies in moving
+    ]
+    cost = _jerk_cost(scenario, h, own)
+    cost += _rate_cost(scenario, layout, h, columns, whole, take_up)
+    cost *= OTHER_COSTS if mesh.elastic else 1.0
+    _rate_rows(scenario, mesh, layout, h, columns, whole, values, rows)
     local = []
-    for index, more, named in _way_rows(scenario, mesh, layout, columns, moving):
+    for index, more, named in _way_rows(scenario, mesh, layout, columns, whole):
         if is_local(scenario.limits.all[index]):
             inputs, names = [x, x_end, parameters, parameters_end], ["x", "x_end", "p", "p_end"]
             its = ca.Function("near", inputs, [ca.vertcat(*more)], names, ["values"], differentiated(4, 2))
@@ -129,9 +133,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     inputs = [x, x_end, parameters, parameters_end, numbers]
     names = ["x", "x_end", "p", "p_end", "grid"]
     function = ca.Function("interval", inputs, [ca.vertcat(*values)], names, ["values"], differentiated(5, 2))
-    names = ["x", "x_end", "grid"]
-    costs = ca.Function("interval_cost", [x, x_end, numbers], [cost], names, ["cost"], differentiated(3, 2))
-    return Interval(costs, function, rows, local)
+    ends, given_at = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end}
+    return Interval(cost_function("interval_cost", cost, ends, given_at, {"grid": numbers}), function, rows, local)
 
 
 def _numbers(grid: np.ndarray) -> tuple[ca.SX, list[ca.SX]]:
@@ -189,26 +192,25 @@ def _inner_rows(
 
 def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points) -> ca.SX:
     """Return the mean square of the jerk in units of the objective's."""
-    scale = scenario.task.objective.jerk
+    scale = scenario.costs.jerk
     return bernstein.mean_square([point / scale for point in bernstein.derivative(h, own.acceleration)], ca.dot)
 
 
 def _rate_cost(
-    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], take_up: ca.SX
+    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: list[list[ca.SX]], take_up: ca.SX
 ) -> ca.SX | float:
-    """Return what the rates of the tensions from point to point cost.
+    """Return what rates from point to point cost.
 
-    On the ground they cost by default, so that the load is taken up over the whole phase.
+    On the ground those of tensions cost by default, so that the load is taken up over the whole phase.
     """
-    objective, costing = scenario.task.objective, scenario.task.objective.tension_rate
-    if costing is None and not scenario.phases.rest:
-        return 0.0
-    gentle = TAKE_UP * take_up / (objective.tension or scenario.robot.force_scale)
-    per_second = gentle if costing is None else 1.0 / costing
+    objective, robot = scenario.task.objective, scenario.robot
+    changing = [costs_at(scenario, layout, *at)[1] for at in zip(columns, whole, strict=True)]
+    if scenario.phases.rest and objective.tension_rate is None:
+        gentle = TAKE_UP * take_up * robot.force_scale / (objective.tension or robot.force_scale)
+        changing = [ca.vertcat(its, gentle * x[layout.tensions]) for its, x in zip(changing, columns, strict=True)]
     cost: ca.SX | float = 0.0
-    for share, first, second in _pieces(scenario, columns):
-        rise = second[layout.tensions] - first[layout.tensions]
-        cost += share * ca.sumsqr(scenario.robot.force_scale * rise / (h * share) * per_second)
+    for share, first, second in _pieces(scenario, changing):
+        cost += share * ca.sumsqr((second - first) / (h * share))
     return cost
 
 
@@ -224,7 +226,7 @@ def _rate_rows(
     layout: Layout,
     h: ca.SX | float,
     columns: list[ca.SX],
-    moving: list[list[list[ca.SX]]],
+    whole: list[list[ca.SX]],
     values: list[ca.SX],
     rows: list[Row],
 ) -> None:
@@ -233,11 +235,9 @@ def _rate_rows(
     if not any(isinstance(limit, Rate) for limit in limits):
         return
     at_points = []
-    for column, bodies in zip(columns, moving, strict=True):
-        platform, *carriers = bodies
-        whole = [ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)]
+    for column, bodies in zip(columns, whole, strict=True):
         tensions = scenario.robot.force_scale * column[layout.tensions]
-        at_points.append(limits.function(*whole, tensions, spread(scenario, None) @ column[layout.q]))
+        at_points.append(limits.function(*bodies, tensions, spread(scenario, None) @ column[layout.q]))
     for limit, place in zip(limits, limits.places, strict=True):
         if isinstance(limit, Rate):
             for share, first, second in _pieces(scenario, at_points):
@@ -248,16 +248,14 @@ def _rate_rows(
 
 
 def _way_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], moving: list[list[list[ca.SX]]]
+    scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: list[list[ca.SX]]
 ) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
     """Yield index, values and rows of the distances from thin places on the straight way from point to point."""
-    at_points, held = [], mesh.held(scenario)
-    for platform, *carriers in moving:
-        at_points.append([ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)])
+    held = mesh.held(scenario)
     for limit, on_the_way in swept(scenario, mesh).items():
         values: list[ca.SX] = []
         rows: list[Row] = []
-        for first, second in pairwise(at_points):
+        for first, second in pairwise(whole):
             more, named = bounded(limit, on_the_way(*first, *second), mesh, layout.slack(columns[0], limit), held)
             values += more
             rows += named

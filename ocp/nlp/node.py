@@ -11,10 +11,11 @@ import numpy as np
 from ...models.rotation import rotation
 from ...models.wind import aerodynamic_wrench
 from ..limits import Rate
-from ..tasks.scenario import POSITION, Scenario
+from ..tasks.scenario import Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
 from .near import is_local
+from .objective import cost_function, costs_at
 from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread
 from .thin import swept
 
@@ -32,7 +33,8 @@ class Node(NamedTuple):
     Attributes
     ----------
     cost
-        x -> cost. It is a function of its own, since IPOPT evaluates objective and constraints one after the other.
+        x -> cost, or (x, p) where costs of the user's own depend on where the robot is. It is a function of its own,
+        since IPOPT evaluates objective and constraints one after the other.
     function
         (x, p, carried) -> values, with the reference motions p, loads and columns of the ground.
     rows
@@ -78,7 +80,8 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
     balances = [balance]
     for others, push in _in_decisive_winds(scenario, layout, x, bodies[0], carriers):
         balances.append(((A @ others - w + push) / ca.DM(scale))[moving])
-    cost = _node_cost(scenario, layout, x)
+    whole = [ca.vertcat(*body) for body in bodies]
+    cost = _node_cost(scenario, layout, x, costs_at(scenario, layout, x, whole)[0])
     if mesh.elastic:
         missing = ca.reshape(x[layout.missing], 6, 1 + layout.winds)
         balances = [each - missing[moving, i] for i, each in enumerate(balances)]
@@ -99,7 +102,7 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
     cost += _slack_cost(scenario, mesh, layout, x)
     off_path = spread(scenario, None) @ x[layout.q]
     local = []
-    state = [*(ca.vertcat(*body) for body in bodies), tensions, off_path]
+    state = [*whole, tensions, off_path]
     for index, more, named in _limit_rows(scenario, mesh, layout, x, state):
         if is_local(scenario.limits.all[index]):
             function = ca.Function(
@@ -113,8 +116,7 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
     function = ca.Function(
         "node", inputs, [ca.vertcat(*values)], ["x", "p", "carried"], ["values"], differentiated(3, 1)
     )
-    costs = ca.Function("node_cost", [x], [cost], ["x"], ["cost"], {"cse": True})
-    return Node(costs, function, rows, local)
+    return Node(cost_function("node_cost", cost, {"x": x}, {"p": parameters}), function, rows, local)
 
 
 def _in_frame(scenario: Scenario, wrench: ca.SX, carriers: list[list[ca.SX]]) -> ca.SX:
@@ -165,27 +167,11 @@ def _limit_rows(
         yield index, *bounded(limit, evaluated[place], mesh, layout.slack(x, limit), held)
 
 
-def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX) -> ca.SX:
-    robot, objective = scenario.robot, scenario.task.objective
-    tension_scale = objective.tension or robot.force_scale
-    deviation_scale = objective.deviation or _tenth_of_tube(scenario)
-    cost = ca.sumsqr(robot.force_scale * x[layout.tensions] / tension_scale)
+def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX, cost: ca.SX) -> ca.SX:
+    """Return the cost of the task, and the little that tensions in other winds and forces of the ground cost."""
     if layout.winds:
         # Enough to choose among those that spare cables leave free.
-        cost += WIND_COST / layout.winds * ca.sumsqr(robot.force_scale * x[layout.wind_tensions] / tension_scale)
-    cost += SUPPORT_COST * ca.sumsqr(x[layout.supports])
-    q, a = x[layout.q], x[layout.a]
-    for column, (owner, coordinate) in enumerate(scenario.owners()):
-        if owner is None:
-            arm = 1.0 if coordinate in POSITION else robot.length
-            if np.isfinite(deviation_scale):
-                cost += (arm * q[column] / deviation_scale) ** 2
-        else:
-            cost += (q[column] / objective.carrier_offset) ** 2 + (a[column] / objective.carrier_acceleration) ** 2
-    return cost
-
-
-def _tenth_of_tube(scenario: Scenario) -> float:
-    tube = scenario.task.tube
-    turn = 0.0 if tube.attitude == "free" else tube.turn
-    return 0.1 * max(tube.radius, scenario.robot.length * turn)
+        amount = scenario.task.objective.tension or scenario.robot.force_scale
+        others = scenario.robot.force_scale * x[layout.wind_tensions] / amount
+        cost += WIND_COST / layout.winds * ca.sumsqr(others)
+    return cost + SUPPORT_COST * ca.sumsqr(x[layout.supports])

@@ -3,7 +3,7 @@
 Unknown at each point k are the free coordinates q_k, their rates v_k and accelerations a_k, and the tensions t_k; the
 duration T too where the task leaves it free:
 
-    min   mean over time of sum |quantity / what costs one|^2  (+ T / time - margin)   (`task.Objective`)
+    min   mean over time of the costs, such as sum |quantity / what costs one|^2       (`costs`)
     s.t.  A(q_k) t_k + S n_k = w(q_k, v_k, a_k)                         at every point
           (q, v)_{k+1} = integral of the acceleration's polynomial      (`scheme`, `spline`)
           t_min + margin <= t_k <= t_max - margin
@@ -59,7 +59,7 @@ class Program(Displayed):
     near
         Where it has the rows of local limits.
     costs
-        What the objective sums but for linear terms, and the weights of their sets.
+        What the objective sums, and the weights of their sets.
     blocks
         The rows of g, in their order.
     local
@@ -179,7 +179,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         (columns.at_nodes(node.cost), grid.weights),
         (columns.between(interval.cost), grid.steps / scenario.duration),
     ]
-    objective = _shared_cost(scenario, layout, X)
+    objective = ca.MX(0.0)
     for cost, weights in costs:
         objective += ca.dot(cost.values, ca.DM(weights).T)
 
@@ -262,16 +262,6 @@ def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
         return np.zeros((0, len(nodes)))
     columns = phases.columns_at(nodes).swapaxes(1, 2).reshape(len(nodes), -1)
     return np.hstack([phases.loads_at(nodes), columns]).T
-
-
-def _shared_cost(scenario: Scenario, layout: Layout, X: ca.MX) -> ca.MX:
-    """Return the cost of the duration less the value of the margin; it is linear."""
-    objective, cost, x = scenario.task.objective, ca.MX(0.0), X[:, 0]
-    if (place := layout.at(DURATION)) is not None and objective.time is not None:
-        cost += x[place] * scenario.duration / objective.time
-    if (place := layout.at(MARGIN)) is not None and objective.margin is not None:
-        cost -= x[place] * scenario.robot.force_scale / objective.margin
-    return cost
 
 
 def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray) -> list[Block]:

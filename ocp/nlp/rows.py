@@ -25,6 +25,7 @@ __all__ = [
     "differentiated",
     "in_world",
     "motions",
+    "offsets",
     "reference_symbols",
     "spread",
     "stretch",
@@ -147,6 +148,13 @@ def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> 
             [at / scale**k + chosen @ off for k, (at, off) in enumerate(zip(reference, deviation, strict=True))]
         )
     return each
+
+
+def offsets(scenario: Scenario, layout: Layout, x: ca.SX) -> list[ca.SX]:
+    """Return the deviations of platform and carriers from their references, (18, 1) each, as `motions` has them."""
+    owners: list[int | None] = [None, *range(len(scenario.robot.carriers))]
+    deviation = (x[layout.q], x[layout.v], x[layout.a])
+    return [ca.vertcat(*(spread(scenario, owner) @ part for part in deviation)) for owner in owners]
 
 
 def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.SX]]) -> list[ca.SX]:

@@ -221,7 +221,8 @@ def _audited(
     others = {**given["limits"], "soft": kept.without_own().soft}
     task = validate({**given, "limits": others}, Task, "task")
     held = {"own": kept.own, "soft": kept.soft}
-    task = task.model_copy(update={"limits": task.limits.model_copy(update=held)})
+    changed = {"limits": task.limits.model_copy(update=held), "objective": scenario.task.objective}
+    task = task.model_copy(update=changed)
     looser = replace(lay_out(scenario.robot, task), path=scenario.path, duration=scenario.duration)
     return looser, search.audit_motion(looser, deviation, "audit, looser limits")
 

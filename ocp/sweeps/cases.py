@@ -34,8 +34,9 @@ class Cases:
         self.robot, self.task, self.axes = robot, task, axes
         self.shape = tuple(len(axis.values) for axis in axes)
         self._data = task.model_dump(exclude_unset=True)
-        if task.limits.own:
-            self._data["limits"]["own"] = task.limits.own
+        for key, own in (("limits", task.limits.own), ("objective", task.objective.own)):
+            if own:
+                self._data.setdefault(key, {})["own"] = own
         self._robots: dict[tuple[int, ...], Robot] = {}
 
     def __len__(self) -> int:

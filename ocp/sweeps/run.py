@@ -146,6 +146,7 @@ def _header(cases: Cases, folder: Path | None) -> dict[str, Any]:
         "robot": f"{robot.name} {_digest(robot.model_dump(mode='json'))}",
         "task": f"{task.name} {_digest(task.in_file().model_dump(mode='json'))}",
         "limits.own": [limit.name for limit in task.limits.own],
+        "objective.own": [f"{cost.name} {cost.amount}" for cost in task.objective.own],
         "order of vary": [axis.field.key for axis in cases.axes],
         **{f"vary {axis.field.key}": list(axis.values) for axis in cases.axes},
         "keep": folder is not None,

@@ -7,6 +7,7 @@ its home. The deviations are the unknowns of the planner, piecewise polynomials 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
 from ...models.part import Vector3
 from ...models.ranges import PositiveRange
+from ..costs.costs import Costs
 from ..limits.limit import Hull
 from ..limits.limits import Limits
+from .cost_list import cost_list
 from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath
 from .phases import LaidPhase, Phases
@@ -64,6 +67,11 @@ class Scenario(Displayed):
     duration: float  # [s]; of a task that leaves it free: where the planner starts, then what it chose
     phases: Phases = field(default_factory=Phases, repr=False)
     tightened: np.ndarray | None = None
+
+    @cached_property
+    def costs(self) -> Costs:
+        """Return the costs of the task."""
+        return cost_list(self.robot, self.task)
 
     @property
     def scheme(self) -> Scheme:

@@ -7,14 +7,16 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import override
 
 from ...base.errors import InputError
-from ...base.inputs import file_path
+from ...base.inputs import file_path, number
 from ...models.parsing import read_yaml, validate
 from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3, Whole
 from ...models.ranges import PositiveRange
+from ..costs.cost import Cost
 from .initial import Final, Initial
 from .paths import AnyPath
 from .phase import Phase, path_of
@@ -109,6 +111,8 @@ class Objective(Part):
     applies only where its quantity is free to choose.
     """
 
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
     tension: Positive | None = Field(
         default=None, description="tension of each cable [N]; default: the platform's weight"
     )
@@ -130,6 +134,16 @@ class Objective(Part):
         description="smallest distance of any tension from its limits that reduces the cost by one, not squared [N]; "
         "default: no reward",
     )
+    own: SkipJsonSchema[tuple[Cost, ...]] = Field(
+        default=(), exclude=True, description="costs of your own, in Python alone (docs/adding-a-cost.md)"
+    )
+
+    @field_validator("own")
+    @classmethod
+    def _own_have_amounts(cls, own: tuple[Cost, ...]) -> tuple[Cost, ...]:
+        for cost in own:
+            number(f"amount of cost {cost.name!r}", cost.amount, 1e-9, 1e9)
+        return own
 
 
 def _or_phases(schema: dict[str, Any]) -> None:
@@ -227,21 +241,24 @@ class Task(Part):
         Raises
         ------
         InputError
-            In mode "json", as for a file, if the task has limits of its own, which only Python can hold.
+            In mode "json", as for a file, if the task has limits or costs of its own, which only Python can hold.
         """
-        if self.limits.own and options.get("mode") == "json":
-            names = ", ".join(repr(limit.name) for limit in self.limits.own)
-            raise InputError(
-                f"task {self.name!r}: limits.own must be empty to be saved, since a file holds no Python, got {names}"
-            )
+        for key, own in (("limits", self.limits.own), ("objective", self.objective.own)):
+            if own and options.get("mode") == "json":
+                names = ", ".join(repr(each.name) for each in own)
+                must = f"{key}.own must be empty to be saved, since a file holds no Python"
+                raise InputError(f"task {self.name!r}: {must}, got {names}")
         fields = super().model_dump(**options)
         if self.phases is not None:
             fields.pop("path", None)
         return fields
 
     def in_file(self) -> Task:
-        """Return the task without the limits that only Python can hold."""
-        return self.model_copy(update={"limits": self.limits.without_own()}) if self.limits.own else self
+        """Return the task without the limits and costs that only Python can hold."""
+        if not (self.limits.own or self.objective.own):
+            return self
+        objective = self.objective.model_copy(update={"own": ()})
+        return self.model_copy(update={"limits": self.limits.without_own(), "objective": objective})
 
     @property
     def seconds(self) -> float:
