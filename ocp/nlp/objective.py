@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import casadi as ca
 
@@ -23,8 +24,8 @@ def costs_at(scenario: Scenario, layout: Layout, x: ca.SX, bodies: Sequence[ca.S
     margin = 0.0 if place is None else force * x[place]
     tensions = force * x[layout.tensions]
     inputs = [*bodies, *offsets(scenario, layout, x), tensions, duration, margin]
-    total, changing = scenario.costs.function.call(inputs)
-    return total, changing
+    outputs: Any = scenario.costs.function.call(inputs)
+    return tuple(outputs)
 
 
 def cost_function(
