@@ -18,11 +18,12 @@ from towline.benchmarks.control_contenders import (
 )
 from towline.benchmarks.control_programs import measure
 from towline.benchmarks.control_tasks import TASKS, Task, record
-from towline.benchmarks.predictive_steps import Checked, fly_random
 from towline.cli.bench import app
 from towline.control import Predictive
 from towline.models import load
 from towline.simulation import simulate
+
+from .soak.predictive_steps import Checked, fly_random
 
 FREE, TEAM = TASKS[0], TASKS[-1]
 LIMITS = Task("limits", lambda: load("wang-flying"), (8, 5, 1), 2.0, reach=0.5, stage=0.015)
@@ -122,7 +123,7 @@ def test_wrong_numbers_are_refused(steps, seeds, name):
 
 @pytest.mark.parametrize("name", ["cogiro", "wang-flying", "wang-flying-quadrotor", "wang-ctmrts-4"])
 def test_random_flights_are_answered_as_promised(name):
-    """A few; `python -m towline.benchmarks.soak predictive` flies many."""
+    """A few; `python -m tests.soak predictive` flies many."""
     robot = load(name)
     for seed in range(3):
         answered, broken = fly_random(robot, seed)

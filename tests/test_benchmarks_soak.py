@@ -6,8 +6,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from towline.benchmarks import exactness, soak
 from towline.benchmarks.harness import alternating, ratio, table
+
+from .soak import __main__ as soak
+from .soak import exactness
 
 
 def run(monkeypatch, *arguments):

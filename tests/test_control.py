@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.benchmarks.control_steps import random_steps
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Reference, State, mechanics
 from towline.control.computed_torque import reach_of
 from towline.control.machine import move_on
@@ -18,6 +17,8 @@ from towline.plant.lines import run_cables
 from towline.simulation import simulate
 from towline.solvers import TensionProblem, solve
 from towline.statics.distribution import tensions as distribute
+
+from .soak.control_steps import random_steps
 
 ROBOTS = ["cogiro", "wang-flying", "caroca-pulleys", "planar-4", "wang-ctmrts-6", "multi-quadrotor-4", "flycrane"]
 

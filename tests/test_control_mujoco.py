@@ -5,12 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline import simulate
-from towline.benchmarks.control_mujoco import TEAMS, WINCHES, Task, cogiro, fly, team, wang_flying
-from towline.benchmarks.mujoco_plant import Hardware
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference
 from towline.control.turning import Turning
 from towline.models import Robot, load
 from towline.statics.distribution import tensions
+
+from .soak.control_mujoco import TEAMS, WINCHES, Task, cogiro, fly, team, wang_flying
+from .soak.mujoco_plant import Hardware
 
 OTHERWISE, SOFT = ANSWERS.index("not as modelled"), ANSWERS.index("soft wrench")
 

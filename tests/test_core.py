@@ -13,13 +13,13 @@ from scipy.optimize import lsq_linear
 
 from towline import Dynamics, load
 from towline.base import tolerances
-from towline.benchmarks.exactness import awkward_problem
 from towline.solvers import TensionProblem, certify, solve
 from towline.solvers import core as extension
 from towline.solvers.kernels import codes
 from towline.solvers.status import STATUSES
 
 from .references import linear_program_status, optimality_error, support_value
+from .soak.exactness import awkward_problem
 
 CORE = Path(__file__).parent.parent / "solvers" / "core"
 SOURCES = sorted(set(CORE.glob("*.c")) - {CORE / "extension.c"})

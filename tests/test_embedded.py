@@ -9,10 +9,6 @@ import pytest
 
 import towline
 from towline import Robot, available, load, solve_batch
-from towline.benchmarks import step as benchmark
-from towline.benchmarks.step import robot_named
-from towline.benchmarks.step_code import FLAGS, States, StepCode
-from towline.benchmarks.step_states import random_states
 from towline.export.step.costs import costs
 from towline.export.step.export import step_files
 from towline.export.step.mechanics import mechanics, moving_carriers
@@ -20,6 +16,10 @@ from towline.models import Dynamics
 from towline.models.tape_c import operations
 from towline.solvers.status import STATUSES
 
+from .soak import step as benchmark
+from .soak.step import robot_named
+from .soak.step_code import FLAGS, States, StepCode
+from .soak.step_states import random_states
 from .steps import deepest, line, measure_size, required, target
 
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID = range(5)

@@ -8,11 +8,11 @@ import pytest
 import towline
 from towline import TensionProblem, load, solve, tensions
 from towline.base.errors import InputError
-from towline.benchmarks.step_code import FLAGS
-from towline.benchmarks.step_states import random_states
 from towline.models import Dynamics
 from towline.solvers import limit_rate
 
+from .soak.step_code import FLAGS
+from .soak.step_states import random_states
 from .steps import line, required
 from .warm import towline as run
 

@@ -5,14 +5,14 @@ import shutil
 import numpy as np
 import pytest
 
-from towline.benchmarks.exact_judge import DOUBLE, Judge
-from towline.benchmarks.exact_problems import exact_problem
-from towline.benchmarks.exactness import check, check_float
-from towline.benchmarks.step_distribution import StepDistribution
 from towline.solvers import TensionProblem, capacity_margin, certify, solve, solve_batch
 from towline.solvers.core import CABLES
 
 from .references import linear_program_status
+from .soak.exact_judge import DOUBLE, Judge
+from .soak.exact_problems import exact_problem
+from .soak.exactness import check, check_float
+from .soak.step_distribution import StepDistribution
 
 BACKENDS = ("lanes", *(("c",) if CABLES else ()))
 COUNT = 1200

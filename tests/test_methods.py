@@ -10,12 +10,12 @@ import pytest
 from scipy.optimize import linprog
 
 from towline.base.errors import InputError
-from towline.benchmarks.continuity import JUMP, KINDS, SMOOTH, Motion, continuity, leaving, smoothness
-from towline.benchmarks.exactness import awkward_problem
 from towline.solvers import TensionProblem, capacity_margin, certify, limit_rate, methods, solve
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
 from .references import optimum_by_enumeration
+from .soak.continuity import JUMP, KINDS, SMOOTH, Motion, continuity, leaving, smoothness
+from .soak.exactness import awkward_problem
 
 # The methods that test_solvers does not take through the zoo already.
 NEW = [name for name in methods() if name not in ("active-set", "qp", "min-norm")]
@@ -329,7 +329,7 @@ CONTINUOUS = [name for name, method in methods().items() if method.continuous]
 
 @pytest.mark.parametrize("method", CONTINUOUS)
 def test_methods_that_claim_continuity_do_not_jump(method):
-    """Check twenty motions; `python -m towline.benchmarks.soak continuity` takes a hundred."""
+    """Check twenty motions; `python -m tests.soak continuity` takes a hundred."""
     result = continuity(method, range(20))
     print(method, result)
     assert result.worst <= JUMP

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from towline.benchmarks.recheck import cable_distance, least_along, point_distance
 from towline.models import Robot, load
 from towline.ocp.audits.audit import audit
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
+
+from .soak.recheck import cable_distance, least_along, point_distance
 
 START, WAY = np.array([0.1, -0.4, 1.0]), np.array([0.5, 0.8, 0.1])
 MIDDLE = START + 0.53 * WAY

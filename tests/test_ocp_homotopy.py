@@ -3,7 +3,8 @@
 import numpy as np
 
 from towline import plan
-from towline.benchmarks.random_families import random_task
+
+from .soak.random_families import random_task
 
 
 def test_a_minimum_time_past_a_ball_is_found_from_a_slow_motion():

@@ -1,15 +1,16 @@
-"""Random tasks: what a plan says of itself is so. More are `python -m towline.benchmarks.soak tasks`."""
+"""Random tasks: what a plan says of itself is so. More are `python -m tests.soak tasks`."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from towline.benchmarks import random_families
-from towline.benchmarks.random_families import FAMILIES, ROBOTS, random_task
-from towline.benchmarks.random_tasks import attempt, wrong
 from towline.models import load
 from towline.ocp import MotionStatus, plan
+
+from .soak import random_families
+from .soak.random_families import FAMILIES, ROBOTS, random_task
+from .soak.random_tasks import attempt, wrong
 
 
 @pytest.mark.parametrize("seed", range(len(ROBOTS), 2 * len(ROBOTS)))

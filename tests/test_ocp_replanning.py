@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from towline.base.errors import InputError
-from towline.benchmarks.replanning import CIRCLE, RATE, fly
 from towline.control import State
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, Planner, Task, plan
+
+from .soak.replanning import CIRCLE, RATE, fly
 
 ROBOT = load("wang-flying")
 GROUND = load("ipanema-1")

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline.benchmarks.exactness import awkward_problem
 from towline.solvers import TensionProblem, solve
 from towline.solvers.box_least_squares import project
 from towline.solvers.exact_arithmetic import exact_optimum, minimum_in_box
+
+from .soak.exactness import awkward_problem
 
 
 def test_twin_cables_share_on_the_boundary():

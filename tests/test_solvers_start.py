@@ -7,11 +7,11 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from towline.benchmarks.exactness import awkward_problem
 from towline.solvers import TensionProblem, compiled, solve, solve_batch
 from towline.solvers.core import CABLES
 
 from .problems import ZOO
+from .soak.exactness import awkward_problem
 
 KEYS = ("A", "w", "t_min", "t_max", "t_ref", "weights", "length")
 

@@ -1,6 +1,6 @@
 """Controllers on robots that are not as their files have them, in MuJoCo: errors, and how the steps were answered.
 
-    python -m towline.benchmarks.soak mujoco [--start 0] [--count N] [--only wang-flying,...]
+    python -m tests.soak mujoco [--start 0] [--count N] [--only wang-flying,...]
 
 Each task is a motion of a robot in gusts, each case something that differs from the robot's file (`mujoco_plant`). Both
 controllers fly each case with their default gains. `Predictive` is good if its error is at most 1.2 times that of
@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from ..control import ANSWERS, ComputedTorque, Controller, Predictive, Reference
-from ..models import Robot, air, load
-from ..models.dynamics import dynamics_of
-from ..ocp import plan
-from ..simulation import simulate
-from ..solvers import solve_batch
-from .harness import head, row
+from towline.benchmarks.harness import head, row
+from towline.control import ANSWERS, ComputedTorque, Controller, Predictive, Reference
+from towline.models import Robot, air, load
+from towline.models.dynamics import dynamics_of
+from towline.ocp import plan
+from towline.simulation import simulate
+from towline.solvers import solve_batch
+
 from .mujoco_plant import Hardware, World
 
 PERIOD = 1e-3  # [s]

@@ -1,6 +1,6 @@
 """Check exported control steps: their answers against Python's, and how long they take.
 
-    python -m towline.benchmarks.soak step [--start 0] [--count 1000000] [--only wang-flying,...]
+    python -m tests.soak step [--start 0] [--count 1000000] [--only wang-flying,...]
 
 The states are those of `step_states`, easy and impossible ones. Python's answers are those of `Dynamics` and
 `solve_batch`. In float, where a rank cannot be distinguished from a nearly lower one, infeasible and singular count as
@@ -20,10 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..models import Dynamics, Robot, load
-from ..solvers import Status, solve_batch
-from ..solvers.status import STATUSES
-from . import harness
+from towline.benchmarks import harness
+from towline.models import Dynamics, Robot, load
+from towline.solvers import Status, solve_batch
+from towline.solvers.status import STATUSES
+
 from .step_code import Array, StepCode, Steps
 from .step_states import random_states, twelve_cables
 

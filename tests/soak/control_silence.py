@@ -1,6 +1,6 @@
 """How often `Predictive` hands over to computed torque in flights with nothing wrong: never, if its rules are right.
 
-    python -m towline.benchmarks.soak silence [--start 0] [--count 100] [--only cogiro,...]
+    python -m tests.soak silence [--start 0] [--count 100] [--only cogiro,...]
 
 Each run holds home, with a push of up to 5 % of the weight, a mass up to 5 % off the robot's file, and noise up to that
 of `ENCODERS` or `CAPTURE`.
@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..control import Predictive
-from ..models import Robot, load
-from ..simulation import Simulation, simulate
+from towline.control import Predictive
+from towline.models import Robot, load
+from towline.simulation import Simulation, simulate
 
 ROBOTS = (
     "wang-flying",

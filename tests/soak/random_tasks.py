@@ -1,6 +1,6 @@
 """Plan random tasks of several families, and check what each plan claims.
 
-    python -m towline.benchmarks.soak tasks [--start 0] [--count 200] [--only rack,...]
+    python -m tests.soak tasks [--start 0] [--count 200] [--only rack,...]
 
 A family and a seed determine a task (`random_families`). A feasible plan must have tensions inside their limits that
 give the force, by equations that are written here again, and keep its platform outside every ball and box. An
@@ -18,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..base.errors import TowlineError
-from ..models import load
-from ..ocp import MotionStatus, Plan, plan
-from ..statics.distribution import wrench_problem
+from towline.base.errors import TowlineError
+from towline.models import load
+from towline.ocp import MotionStatus, Plan, plan
+from towline.statics.distribution import wrench_problem
+
 from .random_families import random_task
 from .recheck import rechecked
 

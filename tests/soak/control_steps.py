@@ -1,6 +1,6 @@
 """Random steps of closed loops over all robots: whether each is answered, inside limits and rates, and how.
 
-    python -m towline.benchmarks.soak control [--start 0] [--count 1000000] [--only wang-flying,...]
+    python -m tests.soak control [--start 0] [--count 1000000] [--only wang-flying,...]
 
 Each robot of the library is simulated in a batch whose platforms are kicked and displaced, while sensors report
 nonsense now and then and references jump. Every command must be finite and inside the limits of tensions, rates and
@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control import ANSWERS, Command, ComputedTorque, Predictive, Reference, State
-from ..models import Robot, load
-from ..plant import Plant
-from ..plant.periods import Periods
-from . import harness
+from towline.benchmarks import harness
+from towline.control import ANSWERS, Command, ComputedTorque, Predictive, Reference, State
+from towline.models import Robot, load
+from towline.plant import Plant
+from towline.plant.periods import Periods
 
 __all__ = ["KINDS", "Steps", "kept", "random_steps", "soak"]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models import Dynamics, Robot
+from towline.models import Dynamics, Robot
+
 from .step_code import Array, States
 
 __all__ = ["KINDS", "random_states", "twelve_cables"]

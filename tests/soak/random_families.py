@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from ..models import Dynamics, Robot, load
-from ..ocp import Task
-from ..solvers import solve
-from ..statics.distribution import wrench_problem
+from towline.models import Dynamics, Robot, load
+from towline.ocp import Task
+from towline.solvers import solve
+from towline.statics.distribution import wrench_problem
+
 from .recheck import cable_distance, point_distance, rotation
 
 __all__ = ["FAMILIES", "ROBOTS", "random_task"]

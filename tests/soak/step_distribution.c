@@ -1,4 +1,4 @@
-/* Solve many problems by the core inside an exported step, for benchmarks/exactness.py. */
+/* Solve many problems by the core inside an exported step, for exactness.py. */
 #include "towline_step.c"
 
 void distribute_rows(int count, int n, int m, const towline_real *A, const towline_real *w, const towline_real *t_min,

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from ..control import Command, State
-from ..models import Robot
+from towline.control import Command, State
+from towline.models import Robot
 
 __all__ = ["Hardware", "World"]
 

@@ -1,6 +1,6 @@
 """Check random cases for as long as you like: each is determined by its number.
 
-    python -m towline.benchmarks.soak NAME [--start 0] [--count N] [--only PART,...]
+    python -m tests.soak NAME [--start 0] [--count N] [--only PART,...]
 
 NAME is what is checked; the module of each states how. PARTs are families of problems and tasks, methods, or robots.
 The exit code is 1 if anything is wrong, and each wrong case is printed with its number.
@@ -23,7 +23,9 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from ..models import available
+from towline.benchmarks.harness import machine
+from towline.models import available
+
 from . import (
     continuity,
     control_mujoco,
@@ -36,7 +38,6 @@ from . import (
     replanning,
     step,
 )
-from .harness import machine
 
 __all__ = ["SOAKS", "Soak"]
 
@@ -65,7 +66,7 @@ SOAKS = {
 
 def main() -> None:
     """Run a check."""
-    parser = argparse.ArgumentParser(prog="python -m towline.benchmarks.soak", description="Check random cases.")
+    parser = argparse.ArgumentParser(prog="python -m tests.soak", description="Check random cases.")
     parser.add_argument("name", choices=SOAKS, metavar="NAME", help=", ".join(SOAKS))
     parser.add_argument("--start", type=int, default=0, help="the first seed (default: 0)")
     parser.add_argument("--count", type=int, help="number of cases (default: that of the check)")

@@ -1,4 +1,4 @@
-/* Compute and time many control steps, for benchmarks/step.py; compiled with the towline_step.c of a robot. */
+/* Compute and time many control steps, for step.py; compiled with the towline_step.c of a robot. */
 #define _POSIX_C_SOURCE 199309L
 #include <time.h>
 

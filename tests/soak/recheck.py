@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from ..models import Robot
+from towline.models import Robot
 
 __all__ = ["cable_distance", "least_along", "point_distance", "rechecked", "rotation"]
 

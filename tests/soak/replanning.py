@@ -1,6 +1,6 @@
 """Measure how long planning again takes in flight, and what jumps.
 
-    python -m towline.benchmarks.soak replanning [--start 0] [--count 100]
+    python -m tests.soak replanning [--start 0] [--count 100]
 
 Paper F's robot flies the circle of 1 m that its quadrotor can follow, in gusts, with predictive control. On the way the
 rest is planned `--count` times from where the robot is, and the controller continues with the new plan. It is wrong if
@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from typing_extensions import override
 
-from ..control import Command, Controller, Predictive, Reference, State
-from ..models import load
-from ..ocp import Plan, Planner
-from ..simulation import Simulation, simulate
+from towline.control import Command, Controller, Predictive, Reference, State
+from towline.models import load
+from towline.ocp import Plan, Planner
+from towline.simulation import Simulation, simulate
 
 __all__ = ["CIRCLE", "Replanned", "Replanning", "fly"]
 

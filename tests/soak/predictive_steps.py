@@ -1,6 +1,6 @@
 """Random flights of predictive control: whether each command is finite, and inside limits and rates.
 
-    python -m towline.benchmarks.soak predictive [--start 0] [--count 100000] [--only wang-flying,...]
+    python -m tests.soak predictive [--start 0] [--count 100000] [--only wang-flying,...]
 
 Each robot of the library that `Predictive` accepts is flown in short flights with random pushes, wind and gusts,
 sensors that have noise, bias and delay and report nonsense now and then, references that rest or move, cables that
@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from ..base.errors import InputError
-from ..control import ANSWERS, Command, Controller, Predictive, Reference, State
-from ..models import Robot, load
-from ..simulation import simulate
+from towline.base.errors import InputError
+from towline.benchmarks.harness import head, row
+from towline.control import ANSWERS, Command, Controller, Predictive, Reference, State
+from towline.models import Robot, load
+from towline.simulation import simulate
+
 from .control_steps import kept
-from .harness import head, row
 
 __all__ = ["Checked", "fly_random"]
 

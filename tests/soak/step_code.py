@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
-from ..export.step.export import step_files
-from ..export.step.mechanics import moving_carriers
-from ..models import Dynamics, Robot
+from towline.base.errors import InputError
+from towline.export.step.export import step_files
+from towline.export.step.mechanics import moving_carriers
+from towline.models import Dynamics, Robot
 
 Array = NDArray[np.float64]
 

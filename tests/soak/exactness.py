@@ -1,6 +1,6 @@
 """Check that random problems of every awkward kind get the right status, optimal tensions and true certificates.
 
-    python -m towline.benchmarks.soak exactness [--start 0] [--count 1000000] [--only exact,random,float]
+    python -m tests.soak exactness [--start 0] [--count 1000000] [--only exact,random,float]
 
 Each problem is named by its seed. `solve`, `solve_batch` by its lanes and by the C core, and the distribution of an
 exported control step, which is compiled here, solve it. `exact_judge` judges their answers in integers. Wrong is
@@ -35,10 +35,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError, SolverError
-from ..solvers import TensionProblem, compiled, solve, solve_batch
-from ..solvers.core import CABLES
-from ..solvers.status import STATUSES
+from towline.base.errors import InputError, SolverError
+from towline.solvers import TensionProblem, compiled, solve, solve_batch
+from towline.solvers.core import CABLES
+from towline.solvers.status import STATUSES
+
 from .exact_judge import DOUBLE, FLOAT, Judge
 from .exact_problems import ExactProblem, exact_problem
 from .step_distribution import StepDistribution

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models import Robot, load
+from towline.models import Robot, load
+
 from .step_code import compiled_step
 
 __all__ = ["CABLES", "Distributed", "StepDistribution"]

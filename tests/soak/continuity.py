@@ -1,6 +1,6 @@
 """Check whether the methods that claim continuity keep it, along random smooth motions of random robots.
 
-    python -m towline.benchmarks.soak continuity [--start 0] [--count 100] [--only min-norm,...]
+    python -m tests.soak continuity [--start 0] [--count 100] [--only min-norm,...]
 
 Robots of 7, 8 and 9 cables, and 3 to 6 cables to one point (rank three); of five motions three stay inside the
 available wrench set, one touches its boundary and one follows it for a while. Where a function is continuous with a
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import TensionProblem, TensionSolution, methods, solve
+from towline.solvers import TensionProblem, TensionSolution, methods, solve
 
 __all__ = ["JUMP", "KINDS", "Leaving", "Motion", "Result", "continuity", "jump", "leaving", "smoothness"]
 

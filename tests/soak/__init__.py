@@ -1,0 +1,1 @@
+"""Random checks of everything that towline claims: `python -m tests.soak NAME`."""
