@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.inputs import file_path
+from .drawing import Drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,6 +46,10 @@ class Drawn:
         from .style import save_all
 
         return save_all(self.figures, folder, format)
+
+    def _drawings(self) -> list[Drawing]:
+        """Draw the figures of a report's page, with their names as captions."""
+        return [Drawing(name.replace("_", " ").capitalize(), figure) for name, figure in self.figures().items()]
 
 
 class Filmed(Drawn):

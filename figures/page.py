@@ -137,7 +137,8 @@ def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str | Link
     first = "".join(f'<th scope="col">{_safe(head)}</th>' for head in heads)
     lines = ["<tr>" + "".join(map(_cell, heads, row)) + "</tr>" for row in rows]
     inner = "\n".join([f'<tr class="heads">{first}</tr>', *lines])
-    return f'{heading(title)}\n<div class="wide"><table class="columns">\n{inner}\n</table></div>'
+    above = f"{heading(title)}\n" if title else ""
+    return f'{above}<div class="wide"><table class="columns">\n{inner}\n</table></div>'
 
 
 def side_by_side(pictures: Iterable[str]) -> str:

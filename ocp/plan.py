@@ -14,9 +14,9 @@ import numpy as np
 from ..base.display import Fact
 from ..base.inputs import check_ending, file_path
 from ..base.netcdf import save_netcdf
-from ..base.writing import whole_file
 from ..figures.drawn import Filmed
-from .reports.report import as_text, facts_at_once, headline
+from ..figures.report import Report, Reported
+from .reports.report import facts_at_once, headline, report
 from .result import PlanData
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ __all__ = ["Plan"]
 
 
 @dataclass(frozen=True, eq=False)
-class Plan(PlanData, Filmed):
+class Plan(PlanData, Filmed, Reported):
     """A planned motion and its audit; its numbers are those of `PlanData`."""
 
     def _headline(self) -> str:
@@ -78,24 +78,7 @@ class Plan(PlanData, Filmed):
 
         return scene(self, times)
 
-    def report(self) -> str:
-        """Return the report as text: the result in the first line, then the facts behind it."""
-        return as_text(self)
+    def _report(self) -> Report:
+        from .reports.drawings import drawings
 
-    def save_report(self, file: str | os.PathLike[str]) -> Path:
-        """Write the report as one HTML file with its figures inside, atomically.
-
-        The file loads nothing from anywhere, so that it can be mailed and kept. This is a method of its own, not an
-        argument of `report`: what returns text writes no files.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        from .reports.report_page import page
-
-        path = file_path("file", file)
-        with whole_file(path) as temporary:
-            temporary.write_text(page(self, self.trajectory), encoding="utf-8")
-        return path
+        return report(self, lambda: drawings(self, self.trajectory).values())

@@ -17,6 +17,7 @@ from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import quantity
 from ..control import ANSWERS
 from ..figures.drawn import Filmed
+from ..figures.report import Report, Reported, Section
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
 from .data import SimulationData
@@ -32,7 +33,7 @@ __all__ = ["Simulation"]
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation(SimulationData, Filmed):
+class Simulation(SimulationData, Filmed, Reported):
     """A flown motion; its numbers are those of `SimulationData`."""
 
     def figures_of_merit(self) -> dict[str, Any]:
@@ -164,15 +165,19 @@ class Simulation(SimulationData, Filmed):
 
         return scene(self, times)
 
-    def report(self) -> str:
-        """Return the report as text: the result in the first line, then the facts behind it."""
-        return "\n".join([self._headline(), *(f"    {name:<24}{text}" for name, text in self._facts())])
+    def _report(self) -> Report:
+        largest = f"error of at most {quantity(1e3 * self.error.max(), 'mm')}"
+        return Report(
+            about=f"{self.robot.name}, flight of {quantity(self.lasted * self.period, 's')}",
+            status="passed" if self.passed else "failed",
+            summary="; ".join(self.failures) or largest,
+            parts=[Section("", self._facts())],
+            drawings=self._drawings,
+            files=[("The robot's file", to_yaml(self.robot))],
+        )
 
     def _headline(self) -> str:
-        largest = f"error of at most {quantity(1e3 * self.error.max(), 'mm')}"
-        lasted = quantity(self.lasted * self.period, "s")
-        word = "PASSED" if self.passed else "FAILED"
-        return f"{self.robot.name}, flight of {lasted}: {word}, {'; '.join(self.failures) or largest}"
+        return self._report().headline
 
     def _facts(self) -> list[Fact]:
         merit, happened = self.figures_of_merit(), events(self)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ...base.display import Fact
 from ...base.errors import InputError
 from ...figures.drawn import Drawn
+from ...figures.report import Report, Reported
 from .report import facts, headline, report
 from .result import CalibrationData
 
@@ -21,7 +22,7 @@ __all__ = ["Calibration"]
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration(CalibrationData, Drawn):
+class Calibration(CalibrationData, Drawn, Reported):
     """The result of `calibrate`; its numbers are those of `CalibrationData`."""
 
     def _headline(self) -> str:
@@ -60,6 +61,5 @@ class Calibration(CalibrationData, Drawn):
 
         return drawings(self)
 
-    def report(self) -> str:
-        """Return the result as text, for people."""
-        return report(self)
+    def _report(self) -> Report:
+        return report(self, self._drawings)

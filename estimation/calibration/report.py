@@ -1,12 +1,16 @@
-"""The result of a calibration as text."""
+"""The report of a calibration."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.text import quantity
+from ...figures.drawing import Drawing
+from ...figures.report import Part, Report, Section, Table
+from ...models.parsing import to_yaml
 
 if TYPE_CHECKING:
     from ...base.display import Fact
@@ -20,19 +24,20 @@ LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually bett
 HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
 
 
-def report(result: CalibrationData) -> str:
-    """Return the result for people: how well lengths fit, the parameters, and what is not determined."""
-    lines = [
-        headline(result),
-        f"  residual of the lengths {_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)",
-        *([] if result.refused is None else [f"  DO NOT USE THIS RESULT: {result.refused}"]),
+def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = tuple) -> Report:
+    """Return how well lengths fit, the parameters, and what is not determined."""
+    residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
+    about, _, summary = headline(result).partition(": ")
+    parts: list[Part] = [
+        f"residual of the lengths {residual}",
+        *([] if result.refused is None else [f"DO NOT USE THIS RESULT: {result.refused}"]),
         *_of_held_out(result),
         *_of_noise(result),
         *_of_parameters(result),
         *_of_exceptions(result),
         *_of_open(result),
     ]
-    return "\n".join(lines)
+    return Report(about, "", summary, parts, drawings, [("The robot's file", to_yaml(result.robot))])
 
 
 def headline(result: CalibrationData) -> str:
@@ -53,7 +58,10 @@ def facts(result: CalibrationData) -> list[Fact]:
         ("residual of the lengths", residual),
         *((name, quantity(len(of))) for name, of in counts if of),
         ("parameters", quantity(len(by_size))),
-        *((one.name, " ".join(_one(one).split()[1:])) for one in by_size[:MOST_LISTED]),
+        *(
+            (name, f"{value} +- {sigma} change {change}")
+            for name, value, sigma, change in map(_one, by_size[:MOST_LISTED])
+        ),
     ]
 
 
@@ -66,17 +74,17 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         return []
     held_out = result.held_out
     if not np.isfinite(held_out.after):
-        return ["  too few samples, or no convergence: half of them do not determine these parameters to confirm them"]
-    lines = [f"  on samples left out {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
+        return ["too few samples, or no convergence: half of them do not determine these parameters to confirm them"]
+    lines = [f"on samples left out {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
     fitted = held_out.sets[-1].fitted
     if not held_out.best:
-        return lines if held_out.after > held_out.before else [*lines, "  the file predicts samples left out as well"]
+        return lines if held_out.after > held_out.before else [*lines, "the file predicts samples left out as well"]
     if set(held_out.best) < set(result.free):
         lines.append(
-            f"  {', '.join(held_out.best)} alone predict samples left out as well: the other parameters do not help"
+            f"{', '.join(held_out.best)} alone predict samples left out as well: the other parameters do not help"
         )
     elif held_out.after > 1.5 * fitted:
-        lines.append(f"  fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
+        lines.append(f"fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
     return lines
 
 
@@ -85,73 +93,76 @@ def _of_noise(result: CalibrationData) -> list[str]:
     lines = []
     if np.isfinite(result.noise) and result.noise > 1.05 * stated:
         lines.append(
-            f"  lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the sigmas below are larger "
+            f"lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the sigmas below are larger "
             f"by {quantity(result.noise / stated, digits=3)}"
         )
     if result.alike > 1:
         lines.append(
-            "  residuals of neighbouring samples are alike, since the model is not complete: the sigmas below are "
+            "residuals of neighbouring samples are alike, since the model is not complete: the sigmas below are "
             f"larger by {quantity(result.alike**0.5, digits=2)}"
         )
     return lines
 
 
-def _of_parameters(result: CalibrationData) -> list[str]:
+def _of_parameters(result: CalibrationData) -> list[Part]:
     from .solving import length_of
 
-    lines = ["  parameters, with standard deviations and their change from the file:"]
+    lines: list[Part] = []
     length = length_of(result.file)  # on which a scale acts
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
     shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
-    lines += [f"    {_one(one)}" for one in result.parameters if one.name in shown]
+    rows = [_one(one) for one in result.parameters if one.name in shown]
+    columns = ("parameter", "value", "standard deviation", "change from the file")
+    lines.append(Table("Parameters", columns, rows, (1, 2, 3)))
     if len(result.parameters) > len(shown):
-        lines.append(f"    and {len(result.parameters) - len(shown)} with smaller changes")
+        lines.append(f"and {len(result.parameters) - len(shown)} with smaller changes")
     if result.beyond_prior:
         named = ", ".join(
             f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior[:MOST_LISTED]
         )
         more = len(result.beyond_prior) - MOST_LISTED
         others = f" and {more} more" if more > 0 else ""
-        lines.append(f"  beyond 5 sigmas of the prior: {named}{others}; check the log, the file and the prior")
+        lines.append(f"beyond 5 sigmas of the prior: {named}{others}; check the log, the file and the prior")
     return lines
 
 
-def _one(one: Parameter) -> str:
+def _one(one: Parameter) -> tuple[str, str, str, str]:
+    """Return name, value, standard deviation and change of a parameter."""
     factor, unit = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm")}[one.unit]
     sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
     change = quantity(factor * one.correction, unit, digits=4)
-    return f"{one.name:26} {one.value:12.6f} {one.unit:2} +- {sigma:14} change {change}"
+    return one.name, f"{one.value:.6f} {one.unit}", sigma, change
 
 
 def _of_exceptions(result: CalibrationData) -> list[str]:
     lines = [
-        f"  winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(abs(slip.size))} "
+        f"winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(abs(slip.size))} "
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip in result.slips
     ]
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
     lines += [
-        f"  left out: cable {one.cable + 1} at sample {one.sample}, off by {_mm(one.error)}"
+        f"left out: cable {one.cable + 1} at sample {one.sample}, off by {_mm(one.error)}"
         for one in wrong[:MOST_LISTED]
     ]
     if len(wrong) > MOST_LISTED:
-        lines.append(f"  and {len(wrong) - MOST_LISTED} more readings left out")
+        lines.append(f"and {len(wrong) - MOST_LISTED} more readings left out")
     return lines
 
 
-def _of_open(result: CalibrationData) -> list[str]:
+def _of_open(result: CalibrationData) -> list[Part]:
     texts = result.not_identifiable
     loose = [one.name for one in result.parameters if one.unit == "m" and LOOSE < one.sigma < np.inf]
     if loose:
         names = ", ".join(loose[:MOST_NAMED]) + (
             f" and {len(loose) - MOST_NAMED} more" if len(loose) > MOST_NAMED else ""
         )
-        return [f"  hardly determined: {names}; measure other poses, or give a prior", *_directions(texts)]
+        return [f"hardly determined: {names}; measure other poses, or give a prior", *_directions(texts)]
     return _directions(texts)
 
 
-def _directions(texts: tuple[str, ...]) -> list[str]:
+def _directions(texts: tuple[str, ...]) -> list[Part]:
     if not texts:
-        return ["  no direction of the parameters is open"]
-    lines = [f"  the measurements leave {len(texts)} directions open, along which the file's values are kept:"]
-    return lines + [f"    {text}" for text in texts]
+        return ["no direction of the parameters is open"]
+    title = f"the measurements leave {len(texts)} directions open, along which the file's values are kept:"
+    return [Section(title, [("", text) for text in texts])]

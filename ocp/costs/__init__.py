@@ -1,5 +1,5 @@
 """Costs of a motion, one class each: what the objective of a task sums. `Cost` is the base of them all."""
 
-from .cost import Cost, RateCost, State
+from .cost import Cost, CostState, RateCost
 
-__all__ = ["Cost", "RateCost", "State"]
+__all__ = ["Cost", "CostState", "RateCost"]

@@ -1,6 +1,6 @@
 """`Cost`: what a plan makes small, averaged over the motion.
 
-A cost is one formula, `values`, of everything that there is at one instant (`State`). The objective of a task is the
+A cost is one formula, `values`, of everything that there is at one instant (`CostState`). The objective of a task is the
 mean over time of sum (values / amount)^2 over all its costs. So `amount` is what adds one (Bryson's rule), and a larger
 one makes a cost less important.
 """
@@ -12,14 +12,13 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..limits import state as instant
-from ..limits.state import Body
+from ..limits.state import Body, State
 
-__all__ = ["Cost", "RateCost", "State"]
+__all__ = ["Cost", "CostState", "RateCost"]
 
 
 @dataclass(frozen=True)
-class State(instant.State):
+class CostState(State):
     """Everything that there is at one instant, in {G}, and what the planner chooses for the whole motion.
 
     Attributes
@@ -69,7 +68,7 @@ class Cost(ABC):
             self.amount = amount
 
     @abstractmethod
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         """Return the values at one instant, (k, 1), as an expression of its symbols."""
 
 

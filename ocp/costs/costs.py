@@ -12,7 +12,7 @@ from ...base.display import Displayed
 from ...models import Robot
 from ..limits.limits import BLOCK, Motion, in_blocks, motions
 from ..limits.state import Body
-from .cost import Cost, RateCost, State
+from .cost import Cost, CostState, RateCost
 from .terms import Jerk
 
 __all__ = ["Costs"]
@@ -46,7 +46,7 @@ class Costs(Displayed):
         parts = [[ca.SX.sym(name, 6) for name in "xva"] for _ in range(2 * count)]
         bodies = [Body(*part) for part in parts]
         tensions, duration, margin = (ca.SX.sym(name, size) for name, size in (("t", self.robot.m), ("T", 1), ("e", 1)))
-        state = State(
+        state = CostState(
             robot=self.robot,
             platform=bodies[0],
             carriers=tuple(bodies[1:count]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from typing_extensions import override
 
-from .cost import Cost, RateCost, State
+from .cost import Cost, CostState, RateCost
 
 __all__ = ["CarrierAcceleration", "CarrierOffset", "Jerk", "Margin", "PathDeviation", "Tension", "TensionRate", "Time"]
 
@@ -16,7 +16,7 @@ class Tension(Cost):
     name, unit = "tension", "N"
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return state.tensions
 
 
@@ -26,7 +26,7 @@ class TensionRate(RateCost):
     name, unit = "tension_rate", "N/s"
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return state.tensions
 
 
@@ -36,7 +36,7 @@ class PathDeviation(Cost):
     name, unit = "deviation", "m"
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(state.off_path[:3], state.robot.length * state.off_path[3:])
 
 
@@ -46,7 +46,7 @@ class CarrierOffset(Cost):
     name, unit = "carrier_offset", "m, rad"
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.pose for offset in state.offsets[1:]))
 
 
@@ -56,7 +56,7 @@ class CarrierAcceleration(Cost):
     name, unit = "carrier_acceleration", "m/s^2, rad/s^2"
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.acceleration for offset in state.offsets[1:]))
 
 
@@ -66,7 +66,7 @@ class Jerk(RateCost):
     name, unit = "jerk", "m/s^3, rad/s^3"
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.acceleration for offset in state.offsets))
 
 
@@ -76,7 +76,7 @@ class Time(Cost):
     name, unit, squared = "time", "s", False
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return state.duration
 
 
@@ -86,5 +86,5 @@ class Margin(Cost):
     name, unit, squared = "margin", "N", False
 
     @override
-    def values(self, state: State) -> ca.SX:
+    def values(self, state: CostState) -> ca.SX:
         return -state.margin

@@ -1,33 +1,21 @@
-"""The report of a plan in sections of named facts, and as text; `report_page` shows them as HTML."""
+"""The report of a plan, in sections of named facts."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from ...base.text import quantity, quantity_row
+from ...figures.drawing import Drawing
+from ...figures.report import Report, Section, Table
+from ...models.parsing import to_yaml
 from ...solvers import Certificate
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
 from .motion_facts import Fact, millimetres, motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
-
-
-class Section(NamedTuple):
-    """Facts that belong together."""
-
-    title: str
-    facts: list[Fact]
-
-
-class Table(NamedTuple):
-    """Rows of equal kind under named columns."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
 
 
 def headline(plan: PlanData) -> str:
@@ -115,28 +103,21 @@ def stages_table(plan: PlanData) -> Table | None:
     return Table("Stages", ("stage", "computed in", "result"), rows) if rows else None
 
 
-def as_text(plan: PlanData) -> str:
-    """Return the whole report for a terminal."""
-    parts = sections(plan)
-    width = max(len(name) for section in parts for name, _ in section.facts)
-    lines = [headline(plan)]
-    for index, (title, facts) in enumerate(parts):
-        lines.append(f"  {title}")
-        lines += [f"    {name:<{width}}  {fact}" for name, fact in facts]
-        table = spans_table(plan) if index == 0 else None
-        if table is not None:
-            lines += _in_columns(table)
-    for table in (phases_table(plan), stages_table(plan)):
-        lines += [] if table is None else _in_columns(table)
-    return "\n".join(lines)
-
-
-def _in_columns(table: Table) -> list[str]:
-    """Return a table's lines, columns as wide as they need."""
-    rows = [table.columns, *table.rows]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
-    lines = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return [f"  {table.title}", *(f"    {line}" for line in lines)]
+def report(plan: PlanData, drawings: Callable[[], Iterable[Drawing]] = tuple) -> Report:
+    """Return the report of a plan; the spans without tensions follow the first section, which states why."""
+    robot, task, (first, *others), spans = plan.scenario.robot, plan.scenario.task, sections(plan), spans_table(plan)
+    tables = [table for table in (phases_table(plan), stages_table(plan)) if table is not None]
+    return Report(
+        about=f"{robot.name}, {task.name}",
+        status=plan.status.value,
+        summary=decisive(plan),
+        parts=[first, *([] if spans is None else [spans]), *others, *tables],
+        drawings=drawings,
+        files=[
+            ("The robot's file", to_yaml(robot)),
+            ("The task with all keys (frame: world is {G})", to_yaml(task.in_file())),
+        ],
+    )
 
 
 def _up(plan: PlanData) -> np.ndarray:

@@ -9,6 +9,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +24,8 @@ from ...base.netcdf import Contents, Variable, save_netcdf
 from ...base.text import column, quantity
 from ...base.version import __version__
 from ...base.writing import check_writable, whole_file
+from ...figures.drawing import Drawing
+from ...figures.report import Report, Reported, Section, Table
 from ...models.parsing import to_yaml
 from ..plan import Plan
 from ..planner import plan
@@ -62,7 +65,7 @@ _NUMBERS = ("cost", "duration", "margin", "tension_max")  # what a report shows 
 
 
 @dataclass(frozen=True)
-class Sweep(Displayed):
+class Sweep(Displayed, Reported):
     """The plans of one task for all combinations of some values of its fields.
 
     Attributes
@@ -219,12 +222,16 @@ class Sweep(Displayed):
                 quantities[title if unit == "1" else f"{title} [{unit}]"] = values
         return sweep(axes, self._values("status"), quantities)
 
-    def report(self) -> str:
-        """Return the counts, the best plans and, unless it is long, the table, as text."""
-        lines = [self._headline(), *(f"  {name:<15}  {text}" for name, text in self._best())]
-        if len(self.rows) > MOST_LINES:
-            return "\n".join(lines)
-        return "\n".join([*lines, *(f"  {line}" for line in self._table())])
+    def _report(self) -> Report:
+        about, _, summary = self._headline().partition(": ")
+        tables = [self._table()] if len(self.rows) <= MOST_LINES else []
+        best = [Section("", self._best())] if self._best() else []
+        return Report(about, "", summary, [*best, *tables], self._drawings)
+
+    def _drawings(self) -> list[Drawing]:
+        with suppress(InputError):  # too many fields for a figure
+            return [Drawing("Results by the varied fields", self.figure())]
+        return []
 
     def _best(self) -> list[tuple[str, str]]:
         """Return which feasible plans have the lowest cost, the shortest duration and the largest margin."""
@@ -241,28 +248,18 @@ class Sweep(Displayed):
                 lines.append((title, f"{quantity(values[best], unit)} with {self.cases.described(best)}"))
         return lines
 
-    def _table(self) -> list[str]:
-        """Return the table with columns as wide as they need."""
+    def _table(self) -> Table:
         units = {name: unit for name, unit, _ in _RESULTS}
         indices = [self.cases.indices(number) for number in range(len(self.rows))]
-        columns = [
-            [axis.field.key, *(axis.texts[index[place]] for index in indices)]
-            for place, axis in enumerate(self.cases.axes)
-        ]
-        columns.append(["status", *(row.status for row in self.rows)])
-        for name in _NUMBERS:
-            heading = name if units[name] == "1" else f"{name} [{units[name]}]"
-            columns.append([heading, *column([getattr(row, name) for row in self.rows])])
-        columns.append(["reason", *(row.reason for row in self.rows)])
-        widths = [max(map(len, cells)) for cells in columns]
-        rights = [*[axis.numeric for axis in self.cases.axes], False, *[True] * len(_NUMBERS), False]
-        return [
-            "  ".join(
-                cell.rjust(width) if right else cell.ljust(width)
-                for cell, width, right in zip(cells, widths, rights, strict=True)
-            ).rstrip()
-            for cells in zip(*columns, strict=True)
-        ]
+        heads = [axis.field.key for axis in self.cases.axes]
+        columns = [[axis.texts[index[place]] for index in indices] for place, axis in enumerate(self.cases.axes)]
+        columns.append([row.status for row in self.rows])
+        columns += [column([getattr(row, name) for row in self.rows]) for name in _NUMBERS]
+        columns.append([row.reason for row in self.rows])
+        named = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in _NUMBERS]
+        numeric = [k for k, axis in enumerate(self.cases.axes) if axis.numeric]
+        numeric += range(len(heads) + 1, len(heads) + 1 + len(_NUMBERS))
+        return Table("", [*heads, "status", *named, "reason"], list(zip(*columns, strict=True)), numeric)
 
 
 def _is_known(cases: Cases, durations: np.ndarray) -> bool:

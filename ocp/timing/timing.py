@@ -16,6 +16,7 @@ from ...base.errors import InputError
 from ...base.inputs import file_path, real_array, required, shown
 from ...base.text import quantity
 from ...base.writing import whole_file
+from ...figures.report import Part, Report, Reported, Section
 from ...models.parsing import to_yaml
 from ...solvers import Certificate, TensionProblem
 from ..audits.waypoint_distance import WaypointDistance, waypoint_distance
@@ -38,7 +39,7 @@ LOOKS = 2001  # at the motion, for warnings and the distance from waypoints
 
 
 @dataclass(frozen=True, eq=False)
-class Timing(Displayed):
+class Timing(Displayed, Reported):
     """The fastest time law along a path, or where along the path there is none.
 
     Attributes
@@ -88,14 +89,20 @@ class Timing(Displayed):
     blocked: np.ndarray = field(default_factory=lambda: np.zeros(0))
     name: str = "task"
 
+    @property
+    def _about(self) -> str:
+        return f"{self.parametrised.robot.name}, {self.name}"
+
     def _headline(self) -> str:
-        head = f"{self.parametrised.robot.name}, {self.name}: {self.status.value.upper()}"
+        return f"{self._about}: {self.status.value.upper()}, {self._summary()}"
+
+    def _summary(self) -> str:
         if self.feasible:
-            return f"{head}, shortest duration {quantity(self.duration, 's', 6)}"
+            return f"shortest duration {quantity(self.duration, 's', 6)}"
         place = f"s = {self.at:.4g}"
         if self.certificate is None:
-            return f"{head}, the search ended at {place}"
-        return f"{head}, short by {quantity(self.certificate.shortfall, 'N')} at {place}"
+            return f"the search ended at {place}"
+        return f"short by {quantity(self.certificate.shortfall, 'N')} at {place}"
 
     def _facts(self) -> Iterable[Fact]:
         why = [] if self.certificate is None else self.certificate._facts()
@@ -220,21 +227,23 @@ class Timing(Displayed):
             temporary.write_text(text, encoding="utf-8")
         return path
 
-    def report(self) -> str:
-        """Return status, duration and bottlenecks, or the certificate, as text."""
-        head, ends = self._headline(), "0 at its start, 1 at its end"
+    def _report(self) -> Report:
+        ends = "0 at its start, 1 at its end"
+        parts: list[Part] = [f"warning: {sentence}" for sentence in self.warnings]
         if self.feasible:
-            lines = [head, *(f"  warning: {sentence}" for sentence in self.warnings)]
-            lines += [f"  audit: worst violation {quantity(self.violation, 'N', 3)}"]
+            facts = [("audit", f"worst violation {quantity(self.violation, 'N', 3)}")]
             if self.waypoint_distance is not None:
-                lines += [f"  waypoints: {self.waypoint_distance.describe()}"]
-            lines += [f"  What is at its limit along the path (s = {ends})"]
-            return "\n".join(lines + [f"    {each.describe()}" for each in self.bottlenecks])
-        place = f"s = {self.at:.4g}"
-        if self.certificate is None:
-            return f"{head}\n  s is the fraction of the path, {ends}"
-        lines = [head, f"  {place} is the worst place of the path (s = {ends}); no time law is feasible there:"]
-        return "\n".join(lines + [f"    {line}" for line in self.certificate.describe().splitlines()])
+                facts.append(("waypoints", self.waypoint_distance.describe()))
+            title = f"What is at its limit along the path (s = {ends})"
+            parts += [Section("", facts), Section(title, [("", each.describe()) for each in self.bottlenecks])]
+        elif self.certificate is None:
+            parts.append(f"s is the fraction of the path, {ends}")
+        else:
+            parts.append(
+                f"s = {self.at:.4g} is the worst place of the path (s = {ends}); no time law is feasible there:"
+            )
+            parts.append(Section("", self.certificate._facts()))
+        return Report(self._about, self.status.value, self._summary(), parts)
 
     def timed(self, path: Curve) -> TimedPath:
         """Return a path of the platform or of a carrier with the time law.

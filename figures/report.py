@@ -1,0 +1,168 @@
+"""`Report`: what a result says to people, as text, page or data; `Reported`: the base of results that have one."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..base.display import Displayed, Fact
+from ..base.inputs import file_path
+from ..base.writing import whole_file
+from .drawing import Drawing
+
+__all__ = ["Part", "Report", "Reported", "Section", "Table"]
+
+# The colour of each status in `style.colour`; distinct with any kind of colour vision, and the word stands beside it.
+COLOURS = {"feasible": 0, "passed": 0, "infeasible": 1, "failed": 1}
+OTHER = 5
+
+
+class Section(NamedTuple):
+    """Facts that belong together; a fact without a name continues the one before it."""
+
+    title: str
+    facts: Sequence[Fact]
+
+
+class Table(NamedTuple):
+    """Rows of equal kind under named columns; those of `numeric` are aligned on the right."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    numeric: Sequence[int] = ()
+
+
+Part = Section | Table | str  # of a report; the last is a sentence
+
+
+@dataclass(frozen=True)
+class Report(Displayed):
+    """A report: one line with the result, then the facts behind it.
+
+    Attributes
+    ----------
+    about
+        What the result is of, such as robot and task.
+    status
+        The result in one word; empty where there is none.
+    summary
+        What decided it, in one line.
+    parts
+        Sections, tables and sentences, in order.
+    drawings
+        Draws the figures of the page.
+    files
+        Title and text of each file that the page has.
+    """
+
+    about: str
+    status: str
+    summary: str
+    parts: Sequence[Part]
+    drawings: Callable[[], Iterable[Drawing]] = tuple
+    files: Sequence[tuple[str, str]] = ()
+
+    @property
+    def headline(self) -> str:
+        """Return the result in one line."""
+        return f"{self.about}: {f'{self.status.upper()}, ' if self.status else ''}{self.summary}"
+
+    def text(self) -> str:
+        """Return the report for a terminal."""
+        named = [name for part in self.parts if isinstance(part, Section) for name, _ in part.facts]
+        width, lines = max(map(len, named), default=0), [self.headline]
+        for part in self.parts:
+            if isinstance(part, str):
+                lines.append(f"  {part}")
+            elif isinstance(part, Table):
+                lines += _in_columns(part)
+            else:
+                lines += [f"  {part.title}"] if part.title else []
+                wide = width + 2 if any(name for name, _ in part.facts) else 0
+                lines += [f"    {name:<{wide}}{fact}" for name, fact in part.facts]
+        return "\n".join(lines)
+
+    def html(self) -> str:
+        """Return the report as a page with its figures inside, which loads nothing."""
+        from . import page, style
+
+        parts = []
+        for part in self.parts:
+            if isinstance(part, str):
+                parts.append(page.paragraph(part))
+            elif isinstance(part, Table):
+                parts.append(page.columns(part.title, part.columns, part.rows))
+            elif any(name for name, _ in part.facts):
+                parts.append(page.facts(part.title or "Result", part.facts))
+            else:
+                parts += [page.heading(part.title), *(page.paragraph(fact) for _, fact in part.facts)]
+        parts += [page.picture(drawing) for drawing in self.drawings()]
+        parts += [page.file(*file) for file in self.files]
+        word, colour = self.status or "result", style.colour(COLOURS.get(self.status, OTHER))
+        return page.page(self.about, word, self.summary, colour, parts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as data, ready for JSON."""
+        parts: list[Any] = []
+        for part in self.parts:
+            if isinstance(part, Section):
+                parts.append({"title": part.title, "facts": [list(fact) for fact in part.facts]})
+            elif isinstance(part, Table):
+                rows = [list(row) for row in part.rows]
+                parts.append({"title": part.title, "columns": list(part.columns), "rows": rows})
+            else:
+                parts.append(part)
+        return {"about": self.about, "status": self.status, "summary": self.summary, "parts": parts}
+
+
+class Reported:
+    """The base of results that have a report."""
+
+    __slots__ = ()
+
+    def _report(self) -> Report:
+        raise NotImplementedError
+
+    def report(self) -> str:
+        """Return the report as text: the result in the first line, then the facts behind it."""
+        return self._report().text()
+
+    def save_report(self, file: str | os.PathLike[str]) -> Path:
+        """Write the report atomically, by the file's suffix: as text (.txt), data (.json), or else an HTML page.
+
+        The page has the figures inside and loads nothing from anywhere, so that it can be mailed and kept.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        path, report = file_path("file", file), self._report()
+        with whole_file(path) as temporary:
+            if path.suffix == ".txt":
+                content = report.text() + "\n"
+            elif path.suffix == ".json":
+                content = json.dumps(report.to_dict(), indent=2) + "\n"
+            else:
+                content = report.html()
+            temporary.write_text(content, encoding="utf-8")
+        return path
+
+
+def _in_columns(table: Table) -> list[str]:
+    """Return a table's lines, columns as wide as they need."""
+    rows = [table.columns, *table.rows]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
+    lines = [
+        "  ".join(
+            cell.rjust(width) if k in table.numeric else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+    return [*([f"  {table.title}"] if table.title else []), *(f"    {line}" for line in lines)]
