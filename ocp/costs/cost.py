@@ -1,8 +1,8 @@
 """`Cost`: what a plan makes small, averaged over the motion.
 
-A cost is one formula, `values`, of everything that there is at one instant (`CostState`). The objective of a task is the
-mean over time of sum (values / amount)^2 over all its costs. So `amount` is what adds one (Bryson's rule), and a larger
-one makes a cost less important.
+A cost is one formula, `values`, of everything that there is at one instant (`CostState`). The objective of a task is
+the mean over time of sum (values / amount)^2 over all its costs. So `amount` is what adds one (Bryson's rule), and a
+larger one makes a cost less important.
 """
 
 from __future__ import annotations
