@@ -26,10 +26,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar
 from weakref import WeakSet
 
 from . import processors
+from .checkpoint import checkpoint_path
 from .errors import InputError, SolverError
 from .inputs import shown, whole_number
 from .quiet import quiet
@@ -45,6 +46,66 @@ LEFT_TO_PARENT = {signal.SIGINT, signal.SIGTERM}
 
 _running: WeakSet[_Spawning] = WeakSet()
 Result = TypeVar("Result")
+Progress = Callable[[int, int, int], None]
+
+
+class ExecutionOptions(TypedDict, total=False):
+    """The fields of `Execution`, by their names."""
+
+    workers: int
+    scheduler: str | None
+    checkpoint: str | os.PathLike[str] | None
+    resume: bool
+    progress: Progress | None
+
+
+@dataclass(frozen=True)
+class Execution:
+    """A choice of where many jobs are computed and stored.
+
+    Attributes
+    ----------
+    workers
+        Processes of this machine that share the jobs; 1: this process. Results do not depend on it.
+    scheduler
+        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
+    checkpoint
+        File to which results are written every few seconds.
+    resume
+        Whether to continue the checkpoint if the file exists. It must be of the same jobs.
+    progress
+        Function that is called with (jobs done, jobs in total, those with a good result).
+
+    Raises
+    ------
+    InputError
+        If a field has a wrong value.
+    """
+
+    workers: int = 1
+    scheduler: str | None = None
+    checkpoint: str | os.PathLike[str] | None = None
+    resume: bool = False
+    progress: Progress | None = None
+
+    def __post_init__(self) -> None:
+        """Check all fields, and make a path of the checkpoint."""
+        check_workers(self.workers, self.scheduler)
+        object.__setattr__(self, "checkpoint", checkpoint_path(self.checkpoint, self.resume, self.progress))
+
+    def check_alone(self) -> None:
+        """Check that nothing is asked for that a single run has no use for.
+
+        Raises
+        ------
+        InputError
+            If something is.
+        """
+        if self.workers != 1:
+            raise InputError(f"workers must be 1 without runs, got {self.workers}")
+        if self.checkpoint is not None or self.scheduler is not None:
+            name, value = ("scheduler", self.scheduler) if self.checkpoint is None else ("checkpoint", self.checkpoint)
+            raise InputError(f"{name} must be None without runs, got {shown(str(value))}")
 
 
 @dataclass(frozen=True)

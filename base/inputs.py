@@ -1,7 +1,9 @@
 """Check arguments, and refuse wrong ones in one line: the field, what is accepted, the value."""
 
+import difflib
 import os
 from collections.abc import Collection
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +26,7 @@ __all__ = [
     "required",
     "shown",
     "whole_number",
+    "with_fields",
 ]
 
 Kind = TypeVar("Kind")
@@ -47,6 +50,24 @@ def printable(text: str, longest: int = LONGEST_TEXT) -> str:
     """Return text in one line that a terminal shows as it is: paths and files may hold line breaks and escapes."""
     line = "".join(char if char.isprintable() else repr(char)[1:-1] for char in " ".join(text.splitlines()))
     return line if len(line) <= longest else f"{line[: longest - 3]}..."
+
+
+def with_fields(function: str, given: dict[str, Any], *objects: Any) -> list[Any]:
+    """Return dataclasses with the fields that are `given`, each in the one that has it.
+
+    Raises
+    ------
+    InputError
+        If none has a field: `function` has no such argument.
+    """
+    names = [field.name for one in objects for field in fields(one)]
+    for name in given:
+        if name not in names:
+            close = difflib.get_close_matches(name, names, n=1)
+            meant = f", did you mean {close[0]!r}?" if close else f"; the options are {', '.join(names)}"
+            raise InputError(f"{function} has no argument {printable(name, _LONGEST)!r}{meant}")
+    own = [{field.name for field in fields(one)} & set(given) for one in objects]
+    return [replace(one, **{name: given[name] for name in its}) for one, its in zip(objects, own, strict=True)]
 
 
 def required(name: str, value: object, kind: type[Kind]) -> Kind:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -52,7 +53,7 @@ def checkpoint_of(checkpoint: Path | None, resume: Path | None) -> Path | None:
 
 
 def resumable(
-    show: Callable[[int, int, int], None], checkpoint: Path | None, unit: str
+    show: Callable[[int, int, int], None], checkpoint: str | os.PathLike[str] | None, unit: str
 ) -> Callable[[int, int, int], None]:
     """Return a function that shows progress in `unit`, such as "plans", and keeps the line for Ctrl-C true."""
     if checkpoint is not None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -31,7 +34,9 @@ from .stopping import add_to_message
 from .watching import COMPILING, counting, watching
 
 if TYPE_CHECKING:
-    from ..models import Robot
+    import xarray as xr
+
+    from ..simulation import Execution, Simulation
 
 _MANY = "With --runs: "
 CONTROLLERS = ("computed-torque", "predictive", "open-loop")
@@ -133,7 +138,7 @@ def simulate(
         from ..control import ComputedTorque, OpenLoop, Predictive
         from ..models import load
         from ..models.parsing import read_yaml
-        from ..simulation import Noise
+        from ..simulation import Conditions, Execution, Noise, simulate
 
         loaded = load(robot)
         if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
@@ -147,24 +152,23 @@ def simulate(
         outputs = {"the checkpoint": stored, "--out": target, "--animate": animate}
         outputs["--figures"] = figures and figures / f"error.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise})
-        conditions = {
-            "wind": None if wind is None else numbers("--wind", wind, 3),
-            "controller": {"predictive": Predictive, "open-loop": OpenLoop}.get(controller, ComputedTorque)(loaded),
-            "gusts": gusts,
-            "noise": None if noise is None else read_yaml(noise, Noise),
-            "events": event or (),
-            "duration": duration,
-            "tolerance": tolerance,
-            "seed": seed,
-        }
+        pilot = {"predictive": Predictive, "open-loop": OpenLoop}.get(controller, ComputedTorque)(loaded)
+        conditions = Conditions(
+            wind=None if wind is None else numbers("--wind", wind, 3),
+            gusts=gusts,
+            noise=None if noise is None else read_yaml(noise, Noise),
+            events=event or (),
+            duration=duration,
+            tolerance=tolerance,
+        )
+        run = partial(simulate, loaded, plan, pilot, seed=seed, conditions=conditions)
         try:
             if runs is None:
                 film = None if animate is None else (animate, speed, fps)
-                passed = _fly_once(loaded, plan, conditions, target, (figures, form), film, as_json)
+                passed = _once(run, plan.stem, target, (figures, form), film, as_json)
             else:
-                conditions |= {"runs": runs, "workers": workers, "scheduler": scheduler, "checkpoint": stored}
-                conditions |= {"resume": resume is not None}
-                passed = _fly_often(loaded, plan, conditions, target, (figures, form), as_json)
+                where = Execution(workers, scheduler, stored, resume is not None)
+                passed = _often(partial(run, runs=runs), plan.stem, where, target, (figures, form), as_json)
         except InputError as error:
             raise _of_option(error, event or []) from None
     if not passed:
@@ -176,21 +180,18 @@ def _of_option(error: InputError, events: list[str]) -> InputError:
     return InputError(re.sub(r"^events\[(\d+)\]", lambda item: f"--event {shown(events[int(item[1])])}", str(error)))
 
 
-def _fly_once(
-    robot: Robot,
-    plan: Path,
-    conditions: dict[str, Any],
+def _once(
+    run: Callable[[], Simulation],
+    plan: str,
     target: Path,
     drawn: tuple[Path | None, str],
     film: tuple[Path, float, float] | None,
     as_json: bool,
 ) -> bool:
-    """Fly once, save, draw and print; return whether the flight passed."""
-    from ..simulation import simulate
-
+    """Simulate once, save, draw and print; return whether the run passed."""
     figures, form = drawn
-    with watching(f"flying {plan.stem} {COMPILING}", quiet=as_json) as watch:
-        flight = simulate(robot, plan, **conditions)
+    with watching(f"flying {plan} {COMPILING}", quiet=as_json) as watch:
+        flight = run()
         written = {"file": flight.save(target)}
         watch.now("drawing")
         pictures = [] if figures is None else flight.plot(figures, form)
@@ -204,22 +205,25 @@ def _fly_once(
     return flight.passed
 
 
-def _fly_often(
-    robot: Robot, plan: Path, conditions: dict[str, Any], target: Path, drawn: tuple[Path | None, str], as_json: bool
+def _often(
+    run: Callable[..., xr.Dataset],
+    plan: str,
+    where: Execution,
+    target: Path,
+    drawn: tuple[Path | None, str],
+    as_json: bool,
 ) -> bool:
-    """Fly with many seeds, save, draw and print; return whether all flights passed."""
+    """Simulate with many seeds, save, draw and print; return whether all runs passed."""
     from ..figures import flight as figure
     from ..figures import style
-    from ..simulation import simulate
     from ..simulation.flights import report, save, summary
     from ..simulation.machine import prepare
 
     figures, form = drawn
-    with watching(f"flying {plan.stem} {COMPILING}", quiet=as_json):
+    with watching(f"flying {plan} {COMPILING}", quiet=as_json):
         prepare()
-    with counting(f"flying {plan.stem}", "passed", quiet=as_json) as show:
-        progress = resumable(show, conditions["checkpoint"], "flights")
-        flights = simulate(robot, plan, **conditions, progress=progress)
+    with counting(f"flying {plan}", "passed", quiet=as_json) as show:
+        flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "flights")))
     add_to_message("")
     file = save(flights, target)
     pictures = [] if figures is None else [style.save(figure.errors(flights), figures / f"errors.{form}")]

@@ -2,12 +2,14 @@
 
 from typing import TYPE_CHECKING, Any
 
+from ..base.execution import Execution
 from ..base.former_names import moved_name
+from .conditions import Conditions
 from .noise import Noise
 from .simulate import simulate
 from .simulation import Simulation
 
-__all__ = ["Noise", "Simulation", "simulate"]
+__all__ = ["Conditions", "Execution", "Noise", "Simulation", "simulate"]
 
 
 if not TYPE_CHECKING:  # a type checker would accept any name

@@ -13,7 +13,7 @@ from ..base.text import quantity
 from ..control import ANSWERS, Reference
 from ..control.command import OTHERWISE
 from ..models.robot import Robot
-from .conditions import Conditions
+from .experiment import Experiment
 from .record import Record
 
 __all__ = ["TENSION_TOLERANCE", "SimulationData"]
@@ -30,7 +30,7 @@ class SimulationData(Displayed):
     robot
         The robot.
     conditions
-        References, faults and noise, see `Conditions`.
+        References, faults and noise, see `Experiment`.
     seed
         Of wind and noise.
     record
@@ -48,7 +48,7 @@ class SimulationData(Displayed):
     """
 
     robot: Robot
-    conditions: Conditions
+    conditions: Experiment
     seed: int
     record: Record
     lasted: int

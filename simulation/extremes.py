@@ -6,7 +6,7 @@ import numpy as np
 
 from ..control import ANSWERS
 from ..control.command import PLANNED
-from .conditions import Conditions
+from .experiment import Experiment
 from .recorder import Period
 
 __all__ = ["Extremes"]
@@ -27,7 +27,7 @@ class Extremes:
         How many steps were answered in each way of `ANSWERS`, (N, 4).
     """
 
-    def __init__(self, conditions: Conditions, t_min: np.ndarray, t_max: np.ndarray, flights: int):
+    def __init__(self, conditions: Experiment, t_min: np.ndarray, t_max: np.ndarray, flights: int):
         self._references, self._t_max, self._range = conditions.references, t_max, t_max - t_min
         periods = np.arange(len(conditions.references))
         self._taut = conditions.should_pull(t_min, periods)

@@ -18,8 +18,8 @@ from ..control import ANSWERS, Controller
 from ..models.parsing import parse_yaml, to_yaml
 from ..models.robot import Robot
 from ..plant import Plant
-from .conditions import Conditions
 from .data import TENSION_TOLERANCE
+from .experiment import Experiment
 from .extremes import Extremes
 from .flying import fly
 
@@ -61,7 +61,7 @@ def copies(controller: Controller, count: int) -> list[Controller]:
         ) from None
 
 
-def fly_block(plant: Plant, controller: Controller, conditions: Conditions, seeds: Sequence[int]) -> np.ndarray:
+def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seeds: Sequence[int]) -> np.ndarray:
     """Fly a block of flights side by side, and return the figures of each, (N,) of `FIGURES`."""
     robot = plant.robot
     kept = Extremes(conditions, robot.t_min, robot.t_max, len(seeds))
@@ -80,7 +80,7 @@ def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
     return lasted_near & (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
 
 
-def flights(robot: Robot, conditions: Conditions, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
+def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
     """Return the figures of all flights, (N,) of `FIGURES`, as a dataset, by their seeds."""
     periods, period = len(conditions.references), conditions.period
 

@@ -14,7 +14,7 @@ from ..control.command import HOLD
 from ..plant import Plant
 from ..plant.periods import Periods
 from .checking import check_command
-from .conditions import Conditions
+from .experiment import Experiment
 from .machine import sense_rows
 from .noise import Noise
 from .orders import Orders
@@ -60,7 +60,7 @@ class Sensors:
 class Pilot:
     """The controllers of all flights: one that accepts batches, or one for each."""
 
-    def __init__(self, controllers: Sequence[Controller], flights: int, conditions: Conditions):
+    def __init__(self, controllers: Sequence[Controller], flights: int, conditions: Experiment):
         self._controllers, self._alone = controllers, flights == 1
         self._together = controllers[0].batches
         for each in self._controllers:
@@ -100,7 +100,7 @@ def _stacked(commands: list[Command]) -> Command:
 def fly(
     plant: Plant,
     controllers: Sequence[Controller],
-    conditions: Conditions,
+    conditions: Experiment,
     seeds: Sequence[int],
     recorder: Recorder,
 ) -> tuple[np.ndarray, list[float]]:

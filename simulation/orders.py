@@ -9,7 +9,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..control import Command
 from ..plant import Plant, layout
-from .conditions import Conditions, Wind
+from .experiment import Experiment, Wind
 from .machine import write_lengths
 
 __all__ = ["Orders"]
@@ -34,7 +34,7 @@ class Orders:
         One for each flight: of its wind.
     """
 
-    def __init__(self, plant: Plant, conditions: Conditions, seeds: Sequence[int]):
+    def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int]):
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
         self._period, self._drive, self._fixed = conditions.period, plant.drive, robot.fixed_lengths
         columns = plant.arrays[1]

@@ -8,22 +8,22 @@ from collections.abc import Callable, Iterator
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..base.checkpoint import Kind, open_checkpoint
 from ..base.errors import InputError
-from ..base.execution import start_workers
+from ..base.execution import Execution, start_workers
 from ..base.version import __version__
 from ..control import Controller
 from ..plant import Plant
-from .conditions import Conditions, Wind
+from .experiment import Experiment, Wind
 from .flights import FIGURES, copies, fly_block, passed
 from .identity import identity
 from .winds import ConstantWind
 
-__all__ = ["Execution", "fly_many"]
+__all__ = ["fly_many"]
 
 SIDE_BY_SIDE = 250  # flights in one block, at most
 BLOCK_TIME = 3.0  # [s] that a block should take: what is computed is stored so often, and lost if the process ends
@@ -33,24 +33,13 @@ PARTS = 4  # blocks for each worker, as far as there are flights, so that none w
 FEWEST = 25  # flights in a block, unless they take long; with fewer side by side each takes longer
 
 KIND = Kind("flights", "block")  # a result is the figures of a block, by the number of its first flight
-Progress = Callable[[int, int, int], None]
 Part = tuple[int, np.ndarray, float]  # of all flights: the first, figures, and the time that they took [s]
-
-
-class Execution(NamedTuple):
-    """A choice of where many flights are computed and stored, see `simulate`."""
-
-    workers: int = 1
-    scheduler: str | None = None
-    checkpoint: Path | None = None
-    resume: bool = False
-    progress: Progress | None = None
 
 
 def fly_many(
     plant: Plant,
     controller: Controller,
-    conditions: Conditions,
+    conditions: Experiment,
     seeds: range,
     tolerance: float,
     execution: Execution,
@@ -68,10 +57,10 @@ def fly_many(
     copies(controller, 1)  # before anything else that needs one: this is the message that names what to do
     everything = plant, controller, conditions
     figures, done = np.zeros(len(seeds), dtype=FIGURES), np.zeros(len(seeds), dtype=bool)
-    workers, scheduler, checkpoint, resume, progress = execution
+    workers, scheduler, progress = execution.workers, execution.scheduler, execution.progress
     opened = nullcontext()
-    if checkpoint is not None:
-        opened = open_checkpoint(checkpoint, KIND, _header(*everything, seeds), resume)
+    if execution.checkpoint is not None:
+        opened = open_checkpoint(Path(execution.checkpoint), KIND, _header(*everything, seeds), execution.resume)
     packed = None if workers == 1 and scheduler is None else _packed(everything, scheduler)
     with start_workers(workers, scheduler) as started, opened as stored:
         for first, content in () if stored is None else stored.items():
@@ -112,7 +101,7 @@ class _Sizes:
         return max(1, min(SIDE_BY_SIDE, left, self._longest, int(BLOCK_TIME / max(self._each, 1e-9))))
 
 
-def _estimated(everything: tuple[Plant, Controller, Conditions], seeds: range) -> float:
+def _estimated(everything: tuple[Plant, Controller, Experiment], seeds: range) -> float:
     """Return how long a flight takes by itself [s], from the first periods of one."""
     plant, controller, conditions = everything
 
@@ -123,7 +112,7 @@ def _estimated(everything: tuple[Plant, Controller, Conditions], seeds: range) -
     return max(lasts(1 + TRIED) - lasts(1), 0.0) / TRIED * len(conditions.references)
 
 
-def fly_part(everything: tuple[Plant, Controller, Conditions], first: int, seeds: range) -> Part:
+def fly_part(everything: tuple[Plant, Controller, Experiment], first: int, seeds: range) -> Part:
     """Fly a block; return the number of its first flight, its figures and how long it took [s]."""
     start = perf_counter()
     return first, fly_block(*everything, seeds), perf_counter() - start
@@ -134,7 +123,7 @@ def fly_packed(packed: bytes, first: int, seeds: range) -> Part:
     return fly_part(pickle.loads(packed), first, seeds)
 
 
-def _packed(everything: tuple[Plant, Controller, Conditions], scheduler: str | None) -> bytes:
+def _packed(everything: tuple[Plant, Controller, Experiment], scheduler: str | None) -> bytes:
     dumps = pickle.dumps
     if scheduler is not None:
         with suppress(ModuleNotFoundError):  # Dask's own, which also sends classes and functions of a script
@@ -159,7 +148,7 @@ def _blocks(done: np.ndarray, sizes: _Sizes) -> Iterator[range]:
             left, start = left - (stop - start), stop
 
 
-def _header(plant: Plant, controller: Controller, conditions: Conditions, seeds: range) -> dict[str, Any]:
+def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds: range) -> dict[str, Any]:
     """Return everything that the figures depend on."""
     controller.reset()  # what an earlier flight has left in it
     references = [part for reference in conditions.references for part in reference if part is not None]

@@ -5,23 +5,23 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 from warnings import warn
 
 import numpy as np
+from typing_extensions import Unpack
 
-from ..base.checkpoint import checkpoint_path
 from ..base.errors import InputError
-from ..base.execution import check_workers
-from ..base.inputs import finite_array, number, shown, whole_number
+from ..base.execution import Execution, ExecutionOptions
+from ..base.inputs import required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, Reference
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
-from ..models.parsing import validate
 from ..models.robot import Robot
 from ..plant import Plant
 from ..solvers import solve_batch
 from .conditions import Conditions
+from .experiment import Experiment
 from .faults import read_faults
 from .flights import flights
 from .flying import fly
@@ -29,11 +29,14 @@ from .machine import prepare
 from .noise import Noise
 from .orders import Orders
 from .record import Record
-from .runs import Execution, Progress, fly_many
+from .runs import fly_many
 from .simulation import Simulation
 from .steps import steps_in
 from .trajectory import Motion, Trajectory, read_trajectory
 from .winds import read_wind
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["simulate"]
 
@@ -42,30 +45,69 @@ SOFT = 1e8  # weight of the wrench where no tensions give it
 MOST_RUNS = 10_000_000
 
 
+AnyRobot: TypeAlias = Robot | str | os.PathLike[str]
+AnyNoise: TypeAlias = Noise | dict[str, Any] | None
+
+
+class Options(ExecutionOptions, total=False):
+    """The fields of `Conditions` and of `Execution` that are no parameters of `simulate`, by their names."""
+
+    gusts: float
+    disturbance: Any
+    period: float
+    substeps: int | None
+    drive: str | None
+    tolerance: float
+    faults: Sequence[str]
+
+
+@overload
 def simulate(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     reference: Any,
     controller: Controller | None = None,
     wind: Any = None,
-    noise: Noise | dict[str, Any] | None = None,
+    noise: AnyNoise = None,
     events: Sequence[str] = (),
     duration: float | None = None,
     seed: int = 0,
     *,
-    gusts: float = 0.0,
-    disturbance: Any = None,
-    period: float = 1e-3,
-    substeps: int | None = None,
-    tolerance: float = 0.05,
-    drive: str | None = None,
+    runs: None = None,
+    conditions: Conditions | None = None,
+    execution: Execution | None = None,
+    **options: Unpack[Options],
+) -> Simulation: ...
+@overload
+def simulate(
+    robot: AnyRobot,
+    reference: Any,
+    controller: Controller | None = None,
+    wind: Any = None,
+    noise: AnyNoise = None,
+    events: Sequence[str] = (),
+    duration: float | None = None,
+    seed: int = 0,
+    *,
+    runs: int,
+    conditions: Conditions | None = None,
+    execution: Execution | None = None,
+    **options: Unpack[Options],
+) -> xr.Dataset: ...
+def simulate(
+    robot: AnyRobot,
+    reference: Any,
+    controller: Controller | None = None,
+    wind: Any = None,
+    noise: AnyNoise = None,
+    events: Sequence[str] = (),
+    duration: float | None = None,
+    seed: int = 0,
+    *,
     runs: int | None = None,
-    workers: int = 1,
-    scheduler: str | None = None,
-    checkpoint: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    progress: Progress | None = None,
-    faults: Sequence[str] | None = None,
-) -> Any:
+    conditions: Conditions | None = None,
+    execution: Execution | None = None,
+    **options: Unpack[Options],
+) -> Simulation | xr.Dataset:
     """Simulate a robot along a reference: the plant, a controller, wind, sensors and events, step by step.
 
     Parameters
@@ -77,109 +119,83 @@ def simulate(
     controller
         Default: `ComputedTorque(robot)`. One run calls its `reset` and uses it as it is; many use copies, unless it
         accepts batches.
-    wind
-        Velocity of the air in {G} [m/s], (3,), or a function of times (K,) [s] and a seed that returns (K, 3); default:
-        no air, and so no drag.
-    noise
-        Of the sensors, see `Noise`; default: none.
-    events
-        What happens to the robot on the way, a line each: "cut 3 at 2.5", a cable tears (they count from 1; times in
-        [s]); "stick 2 at 1", its winch stops; "lose quad-1 at 2", the actuators of a carrier give nothing any more;
-        "miss 0.05 at 1.2", the controller is late.
-    duration
-        [s]; default: that of the reference. A reference that ends earlier rests at its end.
+    wind, noise, events, duration
+        As in `Conditions`.
     seed
-        Of wind and noise. The same seed gives the same flight.
-    gusts
-        Intensity of Dryden turbulence about a constant wind [m/s].
-    disturbance
-        Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
-    period
-        Of the controller [s].
-    substeps
-        Runge-Kutta steps of the plant in a period; default: as many as the stiffness and the damping of the cables
-        require, see `steps.steps_in`.
-    tolerance
-        Largest error of the position of a flight that passes [m].
-    drive
-        What the plant is commanded, see `Plant`; default: "forces" if all cables have winches, "lengths" if all stretch
-        or keep their lengths, else "tensions".
+        Of wind and noise. The same seed gives the same run.
     runs
-        How many flights, with the seeds from `seed` on; default: one.
-    workers
-        Processes of this machine that share many flights; 1: this process. The figures do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
-    checkpoint
-        File to which the figures of many flights are appended every few seconds.
-    resume
-        Whether to continue the checkpoint if the file exists. It must be of the same flights.
-    progress
-        Function that is called with (flights done, flights in total, those that passed) of many flights.
-    faults
-        The former name of `events`.
+        How many runs, with the seeds from `seed` on; default: one.
+    conditions
+        `Conditions`; fields that are given by their names replace its own.
+    execution
+        Where many runs are computed and stored, see `Execution`.
+    options
+        Other fields of `Conditions` and `Execution`, by their names. `faults` is the former name of `events`.
 
     Returns
     -------
     Simulation or xarray.Dataset
-        With `runs`, a dataset with the figures of each flight.
+        With `runs`, a dataset with the numbers of each run.
 
     Raises
     ------
     InputError
         If an argument has a wrong value, the reference belongs to another robot, the checkpoint cannot be written, is
-        damaged or of other flights, or there is no such scheduler.
+        damaged or of other runs, or there is no such scheduler.
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
-    if faults is not None:
+    given: dict[str, Any] = dict(options)
+    if (former := given.pop("faults", None)) is not None:
         if events:
-            raise InputError(f"faults must be left out with events, whose former name it is, got {shown(faults)}")
+            raise InputError(f"faults must be left out with events, whose former name it is, got {shown(former)}")
         warn("faults is called events now; the former name goes with the next release", DeprecationWarning, 2)
-        events = faults
+        events = former
+    named = {
+        "wind": wind,
+        "noise": noise,
+        "events": None if isinstance(events, tuple) and not events else events,
+        "duration": duration,
+    }
+    given |= {name: value for name, value in named.items() if value is not None}
+    meets = required("conditions", Conditions() if conditions is None else conditions, Conditions)
+    where = required("execution", Execution() if execution is None else execution, Execution)
+    meets, where = with_fields("simulate", given, meets, where)
     the_robot = as_robot(robot)
-    trajectory = read_trajectory(the_robot, reference, duration)
-    if duration is None and trajectory.duration is None:
-        raise InputError("duration must be the time of the flight [s] where the reference is a pose, got None")
-    step = number("period", period, 1e-6, 10.0)
-    lasting = trajectory.duration if duration is None else number("duration", duration, step, 1e6)
-    assert lasting is not None
-    periods = max(1, round(lasting / step))
-    if periods > LONGEST:
-        raise InputError(f"duration must be at most {LONGEST:g} periods of {step:g} s, got {lasting:g} s")
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
-    plant = Plant(the_robot, drive=_drive(the_robot) if drive is None else drive)
-    conditions = Conditions(
-        period=step,
-        substeps=steps_in(step, plant) if substeps is None else whole_number("substeps", substeps, 1, 1000),
-        references=_references(the_robot, trajectory, step * np.arange(periods)),
-        wind=read_wind(the_robot, wind, number("gusts", gusts, 0.0, 100.0)),
-        disturbance=finite_array("disturbance", np.zeros(6) if disturbance is None else disturbance, (6,)),
-        noise=noise if isinstance(noise, Noise) else validate({} if noise is None else noise, Noise, "noise"),
-        faults=read_faults(the_robot, events, periods * step, "events" if faults is None else "faults"),
-    )
+    plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     pilot = ComputedTorque(the_robot) if controller is None else controller
-    first, error = whole_number("seed", seed, 0, 2**63 - 1), number("tolerance", tolerance, 0.0, 1e6)
-    execution = _execution(runs, workers, scheduler, checkpoint, resume, progress)
-    prepare()  # not in the time of the flight
+    first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
     if runs is None:
-        return _one(plant, pilot, conditions, first, error)
+        where.check_alone()
+    prepare()  # not in the time of the run
+    if runs is None:
+        return _one(plant, pilot, experiment, first, error)
     seeds = range(first, first + whole_number("runs", runs, 1, MOST_RUNS))
-    return flights(the_robot, conditions, seeds, error, fly_many(plant, pilot, conditions, seeds, error, execution))
+    return flights(the_robot, experiment, seeds, error, fly_many(plant, pilot, experiment, seeds, error, where))
 
 
-def _execution(
-    runs: int | None, workers: int, scheduler: Any, checkpoint: Any, resume: Any, progress: Progress | None
-) -> Execution:
-    check_workers(workers, scheduler)
-    file = checkpoint_path(checkpoint, resume, progress)
-    if runs is None and workers != 1:
-        raise InputError(f"workers must be 1 without runs, got {workers}")
-    if runs is None and (file is not None or scheduler is not None):
-        name, value = ("checkpoint", file) if file is not None else ("scheduler", scheduler)
-        raise InputError(f"{name} must be None without runs, got {shown(str(value))}")
-    return Execution(workers, scheduler, file, resume, progress)
+def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> tuple[Plant, Experiment]:
+    """Return the plant, and the conditions laid out along the reference; `events` is what the caller calls them."""
+    trajectory = read_trajectory(robot, reference, meets.duration)
+    if meets.duration is None and trajectory.duration is None:
+        raise InputError("duration must be the time of the flight [s] where the reference is a pose, got None")
+    period, lasting = meets.period, trajectory.duration if meets.duration is None else meets.duration
+    assert lasting is not None
+    periods = max(1, round(lasting / period))
+    if periods > LONGEST:
+        raise InputError(f"duration must be at most {LONGEST:g} periods of {period:g} s, got {lasting:g} s")
+    plant = Plant(robot, drive=_drive(robot) if meets.drive is None else meets.drive)
+    return plant, Experiment(
+        period=period,
+        substeps=meets.substeps or steps_in(period, plant),
+        references=_references(robot, trajectory, period * np.arange(periods)),
+        wind=read_wind(robot, meets.wind, meets.gusts),
+        disturbance=meets.disturbance,
+        noise=required("noise", meets.noise, Noise),
+        faults=read_faults(robot, meets.events, periods * period, events),
+    )
 
 
 def _drive(robot: Robot) -> str:
@@ -205,16 +221,16 @@ def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndar
     return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions
 
 
-def _one(plant: Plant, controller: Controller, conditions: Conditions, seed: int, tolerance: float) -> Simulation:
-    robot, periods = plant.robot, len(conditions.references)
+def _one(plant: Plant, controller: Controller, experiment: Experiment, seed: int, tolerance: float) -> Simulation:
+    robot, periods = plant.robot, len(experiment.references)
     record = Record(robot, periods)
     start = perf_counter()
-    lasted, seconds = fly(plant, [controller], conditions, [seed], record)
+    lasted, seconds = fly(plant, [controller], experiment, [seed], record)
     wall = perf_counter() - start
-    wind = Orders(plant, conditions, [seed]).wind
+    wind = Orders(plant, experiment, [seed]).wind
     return Simulation(
         robot=robot,
-        conditions=conditions,
+        conditions=experiment,
         seed=seed,
         record=record,
         lasted=int(lasted[0]),

@@ -11,7 +11,7 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..models import air
 from ..models.robot import Robot
-from .conditions import Wind
+from .experiment import Wind
 
 __all__ = ["ConstantWind", "Gusts", "read_wind"]
 

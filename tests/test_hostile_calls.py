@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 import random
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, partial
@@ -299,6 +300,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "rows": lambda: slice(0, 1),
     "simulate.reference": lambda: robot().home,
     "simulate.duration": lambda: 0.01,
+    "Conditions.duration": lambda: 0.01,
     "controller": lambda: None,
     "noise": lambda: None,
     "events": lambda: ["cut 1 at 0.005"],
@@ -310,6 +312,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "tolerance": lambda: 0.1,
     "drive": lambda: None,
     "runs": lambda: None,
+    "conditions": lambda: None,
+    "execution": lambda: None,
     "simulate.progress": lambda: None,
     "bandwidth": lambda: 5.0,
     "damping": lambda: 1.0,
@@ -441,13 +445,16 @@ def of_function(label: str, function: Callable[..., Any]) -> Subject:
     """Read a function's parameters from its signature; `**options` stand for a key that is none."""
     valid, names = {}, []
     for name, parameter in inspect.signature(function).parameters.items():
+        its = [name]
         if parameter.kind is parameter.VAR_KEYWORD:
             names.append("nonsense")
-            continue
-        names.append(name)
-        make = VALID.get(f"{label}.{name}") or VALID.get(name)
-        assert make is not None, f"{label}: no valid value of {name} in the table"
-        valid[name] = make()
+            keys = re.fullmatch(r"Unpack\[(\w+)\]", str(parameter.annotation))
+            its = [*function.__globals__[keys[1]].__annotations__] if keys else []
+        names += its
+        for each in its:
+            make = VALID.get(f"{label}.{each}") or VALID.get(each)
+            assert make is not None, f"{label}: no valid value of {each} in the table"
+            valid[each] = make()
     return Subject(label, function, valid, names)
 
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import nullcontext, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from typing_extensions import Unpack
 
-from ..base.checkpoint import Checkpoint, Kind, checkpoint_path, open_checkpoint
+from ..base.checkpoint import Checkpoint, Kind, open_checkpoint
 from ..base.errors import InputError
-from ..base.execution import Workers, check_workers, start_workers
-from ..base.inputs import one_of, required, shown, whole_number
+from ..base.execution import Execution, ExecutionOptions, Progress, Workers, start_workers
+from ..base.inputs import one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
 from .condition import Condition, condition_from, for_robots
@@ -35,8 +36,6 @@ MOST_POINTS = 10_000_000
 LARGEST_JOB = 8  # chunks
 KIND = Kind("workspace", "chunk")  # a result is which samples are accepted, one bit each
 
-Progress = Callable[[int, int, int], None]
-
 
 def sample(
     robot: Robot,
@@ -47,14 +46,11 @@ def sample(
     seed: int = 0,
     *,
     size: float | None = None,
-    workers: int = 1,
-    scheduler: str | None = None,
-    checkpoint: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    progress: Progress | None = None,
     keep: str = "accepted",
     points_max: int = 1_000_000,
     robust: float | None = None,
+    execution: Execution | None = None,
+    **options: Unpack[ExecutionOptions],
 ) -> xr.Dataset:
     """Sample the places where a condition holds.
 
@@ -77,17 +73,6 @@ def sample(
         Of the random streams, and of the scrambling of sobol.
     size
         Of adaptive: edge below which cells are not halved any more [m]; default: as small as the samples allow.
-    workers
-        Processes of this machine, each using one processor; 1: this process.
-    scheduler
-        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
-    checkpoint
-        File to which results are appended as they come.
-    resume
-        Whether to continue the checkpoint if the file exists. It must be of the same run.
-    progress
-        Function that is called with (samples done, samples in total, samples accepted); the total is an upper bound for
-        adaptive.
     keep
         Which samples the dataset contains: accepted, all or none.
     points_max
@@ -96,6 +81,11 @@ def sample(
         Share of the robots of the robot's `uncertainty`, such as 0.95: with that probability the robot that was built
         fulfils the conditions about tension limits at all accepted places, to first order. It is the same as `robust`
         in each of these conditions; others are not affected.
+    execution
+        Where samples are evaluated and stored, see `Execution`. Its `progress` is called with (samples done, samples in
+        total, samples accepted); the total is an upper bound for adaptive.
+    options
+        Fields of `Execution` by their names, which replace its own.
 
     Returns
     -------
@@ -132,10 +122,10 @@ def sample(
     condition = for_robots(condition, robust)
     region = Region.model_validate({} if region is None else region)
     check_sampling(method, samples, seed)
-    check_workers(workers, scheduler)
+    where = required("execution", Execution() if execution is None else execution, Execution)
+    (where,) = with_fields("sample", dict(options), where)
     whole_number("points_max", points_max, 0, MOST_POINTS)
     one_of("keep", keep, KEEP)
-    file = checkpoint_path(checkpoint, resume, progress)
     if size is not None and method != "adaptive":
         raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
     domain = Domain.of(robot, region)
@@ -153,21 +143,14 @@ def sample(
     total = int(samples) if sampler is None else sampler.samples
     counter = Counter(condition, domain, sampler, keep, total)
     counts = Counts(domain, points_max if keep != "none" else 0)
-    header = _header(robot, {**requested, "samples": total, "size": size})
-    opened = open_checkpoint(file, KIND, header, resume) if file is not None else nullcontext()
-    if workers > 1 and scheduler is None:
+    opened = nullcontext()
+    if where.checkpoint is not None:
+        header = _header(robot, {**requested, "samples": total, "size": size})
+        opened = open_checkpoint(Path(where.checkpoint), KIND, header, where.resume)
+    if where.workers > 1 and where.scheduler is None:
         counter.prepare()
-    with start_workers(workers, scheduler) as started, opened as stored:
-        run = _Run(counter, counts, started, stored, progress)
-        if refinement is None:
-            for _ in run.flags(total):
-                pass
-        else:
-            levels = refinement.levels()
-            points = next(levels)
-            with suppress(StopIteration):
-                while True:
-                    points = levels.send(np.concatenate(list(run.flags(len(points), points))))
+    with start_workers(where.workers, where.scheduler) as started, opened as stored:
+        _Run(counter, counts, started, stored, where.progress).count(refinement)
     result = dataset(counts, domain, keep, method, refinement)
     seconds = time.perf_counter() - start
     result.attrs = {
@@ -178,7 +161,7 @@ def sample(
         "towline": __version__,
         "seconds": seconds,
         "poses_per_s": counts.tried / seconds,
-        "workers": "cluster" if scheduler is not None else str(workers),
+        "workers": "cluster" if where.scheduler is not None else str(where.workers),
     }
     return result
 
@@ -197,6 +180,18 @@ class _Run:
         self._shared, self._total = Shared(counter), counter.samples
         self._counts, self._workers, self._checkpoint, self._progress = counts, workers, checkpoint, progress
         self._chunk = 0
+
+    def count(self, refinement: Refinement | None) -> None:
+        """Count all samples: the sampler's, or those of one level of a refinement after the other."""
+        if refinement is None:
+            for _ in self.flags(self._total):
+                pass
+            return
+        levels = refinement.levels()
+        points = next(levels)
+        with suppress(StopIteration):
+            while True:
+                points = levels.send(np.concatenate(list(self.flags(len(points), points))))
 
     def flags(self, samples: int, points: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Count the next samples; yield which of them are accepted, (n,) of bool, chunk after chunk.

@@ -1,0 +1,81 @@
+"""`Experiment`: the conditions of runs, laid out for one robot and one reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..base.display import record
+from ..control import Reference
+from .faults import Fault
+from .noise import Noise
+
+__all__ = ["Experiment", "Wind"]
+
+
+class Wind(Protocol):
+    """A wind over time."""
+
+    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
+        """Return the velocity of the air at the times, (K, 3) [m/s]."""
+        ...
+
+
+class Experiment(NamedTuple):
+    """The conditions of runs along a reference, see `Conditions`.
+
+    Attributes
+    ----------
+    period
+        Of the controller [s].
+    substeps
+        Runge-Kutta steps in a period.
+    references
+        One for each period.
+    wind
+        Velocity of the air in {G} [m/s], a function of the times (K,) and a seed that returns (K, 3); None without
+        air.
+    disturbance
+        Force [N] and moment about the CoM [N m] on the platform in {G}, (6,).
+    noise
+        Of the sensors.
+    faults
+        In the order of their times.
+    """
+
+    period: float
+    substeps: int
+    references: Sequence[Reference]
+    wind: Wind | None
+    disturbance: np.ndarray
+    noise: Noise
+    faults: tuple[Fault, ...]
+
+    __repr__ = record
+
+    def should_pull(self, t_min: np.ndarray, periods: np.ndarray) -> np.ndarray:
+        """Return where a slack cable is a failure, (n, m): one with a lowest tension (m,) [N] that no fault has cut.
+
+        `periods`, (n,), are their numbers.
+        """
+        return (t_min > 0) & ~self.cut(len(t_min), periods)
+
+    def cut(self, cables: int, periods: np.ndarray) -> np.ndarray:
+        """Return which cables are cut when periods begin, (n, cables); `periods`, (n,), are their numbers."""
+        result = np.zeros((len(periods), cables), dtype=bool)
+        for fault in self.faults:
+            if fault.kind == "cut":
+                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.part] = True
+        return result
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the references do not hold, ready for JSON."""
+        return {
+            "period": self.period,
+            "substeps": self.substeps,
+            "disturbance": self.disturbance.tolist(),
+            "noise": self.noise.model_dump(exclude_defaults=True),
+            "faults": [fault._asdict() for fault in self.faults],
+        }
