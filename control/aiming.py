@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .reaction import solve_positive
+from .carrier_compensation import solve_positive
 
 ALMOST = 1e-4  # of the largest entry of the gram matrix of efforts: wrenches that cost more are not corrected
 

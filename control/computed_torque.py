@@ -20,9 +20,10 @@ from ..plant.packing import bodies_of, cables_of, settings_of
 from ..solvers.in_place import InPlace
 from ..solvers.kernels.codes import OPTIMAL
 from .actuators import actuators
-from .authority import uncontrolled
 from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command
+from .command_delay import Pending
+from .controllability import uncontrolled
 from .controller import Controller
 from .machine import mechanics, move_on, thrusts
 from .mechanics import (
@@ -44,7 +45,6 @@ from .mechanics import (
     THEN,
     WINCHES,
 )
-from .pending import Pending
 from .reference import Reference
 from .state import State
 from .tension_loop import TensionLoop
@@ -93,8 +93,8 @@ class ComputedTorque(Controller):
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     reach
-        How far carriers may go off their reference to help the tensions (see `reaction`): position [m] and attitude
-        [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may go 0.5 m.
+        How far carriers may go off their reference to help the tensions (see `carrier_compensation`): position [m] and
+        attitude [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may go 0.5 m.
     carrier_bandwidth, carrier_acceleration
         Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude

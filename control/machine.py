@@ -13,8 +13,8 @@ __all__ = ["aim", "carriers_of", "directions", "mechanics", "move_on", "stages",
 
 _PLANT, _HERE = Path(machine.__file__).parent, Path(__file__).parent
 _SHARED = tuple(_PLANT / f"{name}.py" for name in ("layout", "bodies", "lines"))
-_MECHANICS = (*_SHARED, _HERE / "reaction.py", _HERE / "mechanics.py")
-_TETHERS = (*_MECHANICS, _HERE / "tethers.py")
+_MECHANICS = (*_SHARED, _HERE / "carrier_compensation.py", _HERE / "mechanics.py")
+_TETHERS = (*_MECHANICS, _HERE / "fixed_length_carriers.py")
 _ROBOT = "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1]))"
 _OF_ROWS = (
     f"void({_ROBOT}, float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, "
@@ -67,7 +67,7 @@ def stages() -> Kernel:
 @cache
 def aim() -> Kernel:
     """Return `aiming.aim` as machine code; compiling takes some seconds once on a machine."""
-    return _compiled((_PLANT / "layout.py", _HERE / "reaction.py", _HERE / "aiming.py"), "aim", _OF_AIM)
+    return _compiled((_PLANT / "layout.py", _HERE / "carrier_compensation.py", _HERE / "aiming.py"), "aim", _OF_AIM)
 
 
 @cache

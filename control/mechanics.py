@@ -31,10 +31,11 @@ from ..plant.layout import (
     U,
 )
 from ..plant.lines import run_cables
-from .reaction import CORRECTS, add_offsets, react
+from .carrier_compensation import CORRECTS, add_offsets, react
 
-# Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has what `reaction` reads,
-# and WINCHES, the bandwidth with which tensions are learned that differ from their commands [rad/s].
+# Rows of `gains`, and places in `settings` behind those of `layout`. The row of the carriers has what
+# `carrier_compensation` reads, and WINCHES, the bandwidth with which tensions are learned that differ from their
+# commands [rad/s].
 KP, KD, KI, OBSERVER, CARRIERS, GAINS = 0, 1, 2, 3, 4, 5
 WINCHES = 3
 COM, TOTAL_MASS = SETTINGS, SETTINGS + 3

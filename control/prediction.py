@@ -15,8 +15,8 @@ import numpy as np
 from ..plant.bodies import place_bodies
 from ..plant.layout import BODY, BODY_WORK, CABLE_BLOCKS, CABLE_WORK, CARRIER, COMMANDS
 from ..plant.lines import run_cables
+from .fixed_length_carriers import coordinates_of, put_tethered
 from .mechanics import move_to_com, put_body, write_wrench, write_wrench_matrix
-from .tethers import coordinates_of, put_tethered
 
 STEP = 1e-6  # [m, rad, rad/s], of a difference quotient
 # Rows of `vectors`: unit acceleration, wrench and momentum, and the wrench without acceleration.

@@ -19,17 +19,17 @@ from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
+from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
 from .computed_torque import ComputedTorque, positive, reach_of
+from .keep_out import Surroundings
 from .machine import aim
 from .machine import stages as write_stages
 from .mechanics import DISTURBANCE, HIGHEST, KNOWN, LAST, LOWEST, OBSERVER, RATE_MAX, SOMETHING
-from .moved import Flown, Freed, Moved, Tethered
 from .preview import Preview, turns
 from .reference import Reference
 from .stability import grows
 from .state import State
-from .surroundings import Surroundings
 from .watch import LATE, UNSTABLE, HandOver, Watch
 from .weights import CORRECTING, PATIENT, STILL, tensions_of, terminal, weights
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.inputs import number, shown
-from .moved import Moved
+from .carrier_references import Moved
 from .reference import Reference
 
 __all__ = ["Preview", "rows_at", "turns"]

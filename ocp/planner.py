@@ -2,7 +2,7 @@
 
 The planner works in stages, and ends with the first that decides:
 
-1. ends and path (`blocked`): what is impossible whatever the planner chooses, proven at once;
+1. ends and path (`infeasible_ends`): what is impossible whatever the planner chooses, proven at once;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
 3. a path past obstacles (`global_path`), where the usual guess exceeds a limit at rest: the next stages start from it;
 4. easier programs to start the next one from: linear distances from obstacles (`linear`) and, for teams, more time
@@ -36,8 +36,8 @@ from .nlp.interrupts import heeding
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
 from .plan import Plan
-from .proofs.blocked import blocked
 from .proofs.durations import Durations, durations
+from .proofs.infeasible_ends import infeasible_ends
 from .search.homotopy import from_easier
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion, near_motion
@@ -306,7 +306,7 @@ def _blocked(search: Search) -> Plan | None:
     span = search.scenario.duration_range
     slowest = search.scenario if span is None else search.scenario.lasting(span.max)
     with search.stage("ends and path") as stage:
-        proof = blocked(slowest)
+        proof = infeasible_ends(slowest)
         stage.message = "" if proof is None else proof.describe()
     if proof is None:
         return None

@@ -20,8 +20,8 @@ from ..models.robot import Robot
 from ..plant import Plant
 from .data import TENSION_TOLERANCE
 from .experiment import Experiment
-from .extremes import Extremes
 from .flying import fly
+from .run_statistics import Extremes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,10 +14,10 @@ from ..control.command import HOLD
 from ..plant import Plant
 from ..plant.periods import Periods
 from .checking import check_command
+from .command_conversion import Orders
 from .experiment import Experiment
 from .machine import sense_rows
 from .noise import Noise
-from .orders import Orders
 from .recorder import Period, Recorder
 
 __all__ = ["fly"]

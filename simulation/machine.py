@@ -1,4 +1,4 @@
-"""Compile the kernels of `sensors` and `winding`, with those of the plant that they use; `prepare`, all of flights."""
+"""Compile the kernels of `sensors` and `winch_lengths`, with those of the plant that they use: `prepare` does all."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def write_lengths() -> Kernel:
         f"void(float64[:, ::1], intp, float64[:, :, ::1], float64[:, ::1], {GIVEN.format(2)}, float64[::1], "
         "float64[::1], float64, float64, float64[:, ::1], intp)"
     )
-    return compile_function(joined([_HERE / "winding.py"], "write_lengths"), "write_lengths", signature)
+    return compile_function(joined([_HERE / "winch_lengths.py"], "write_lengths"), "write_lengths", signature)
 
 
 def prepare() -> None:

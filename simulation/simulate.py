@@ -20,6 +20,7 @@ from ..models.files import as_robot
 from ..models.robot import Robot
 from ..plant import Plant
 from ..solvers import solve_batch
+from .command_conversion import Orders
 from .conditions import Conditions
 from .experiment import Experiment
 from .faults import read_faults
@@ -27,7 +28,6 @@ from .flights import flights
 from .flying import fly
 from .machine import prepare
 from .noise import Noise
-from .orders import Orders
 from .record import Record
 from .runs import fly_many
 from .simulation import Simulation

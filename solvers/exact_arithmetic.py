@@ -1,7 +1,7 @@
 r"""The optimum where rounding decides between yes and no, in exact arithmetic.
 
 With w on the boundary of the available wrench set the feasible tensions have no interior, and an error of 1e-16 in A or
-w makes a method in floating point miss all, or take one corner of them for the best. `judge` comes here if no
+w makes a method in floating point miss all, or take one corner of them for the best. `verify` comes here if no
 certificate explains why its method has no optimum. All numbers of a problem are integers times powers of two, so
 
 $$

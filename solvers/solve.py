@@ -1,4 +1,4 @@
-"""Solve one problem by any method: look it up, bring the problem to standard form, propose, judge."""
+"""Solve one problem by any method: look it up, bring the problem to standard form, propose, verify."""
 
 from functools import partial
 from time import perf_counter
@@ -11,7 +11,6 @@ from ..base.inputs import shown
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
 from .core import CABLES, ROWS, solve_packed
-from .judge import judge
 from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR, UNSURE
 from .methods import METHODS
 from .methods.active_set import ActiveSet
@@ -20,6 +19,7 @@ from .problem import Array, TensionProblem
 from .solution import TensionSolution
 from .standard_form import StandardForm, standard_forms
 from .status import STATUSES
+from .verify import verify
 
 __all__ = ["methods", "solve"]
 
@@ -79,10 +79,10 @@ def solve(
         else:
             proposal = chosen.propose(form, backend, **options)
         tensions = None if proposal.s is None else form.tensions(problem, proposal.s)
-        judgement = judge(problem, form, chosen, proposal, tensions, exact, last=not forms)
-        if judgement is None:
+        verdict = verify(problem, form, chosen, proposal, tensions, exact, last=not forms)
+        if verdict is None:
             continue
-        status, tensions, detail, certificate, left = judgement
+        status, tensions, detail, certificate, left = verdict
         if left is None:
             break
         exact = tensions  # the method chooses from what is left

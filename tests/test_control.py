@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Reference, State, mechanics
+from towline.control.carrier_compensation import write_columns
 from towline.control.computed_torque import reach_of
 from towline.control.machine import move_on
-from towline.control.reaction import write_columns
 from towline.control.tension_loop import TensionLoop
 from towline.models import Dynamics, load
 from towline.plant import Plant, layout

@@ -10,10 +10,10 @@ from scipy.linalg import solve_continuous_are
 from towline import plan
 from towline.base.errors import InputError
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
+from towline.control.carrier_references import Freed
+from towline.control.fixed_length_carriers import AXES, TETHER_COLUMNS
+from towline.control.keep_out import Surroundings, _distance
 from towline.control.machine import carriers_of, directions, stages
-from towline.control.moved import Freed
-from towline.control.surroundings import Surroundings, _distance
-from towline.control.tethers import AXES, TETHER_COLUMNS
 from towline.control.weights import Weights, terminal, weights
 from towline.models import Dynamics, Robot, load
 from towline.models.points import placed

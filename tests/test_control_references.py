@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
-from towline.control.moved import Freed
+from towline.control.carrier_references import Freed
 from towline.models import Dynamics, load
 from towline.simulation import simulate
 from towline.simulation.trajectory import read_trajectory

@@ -8,17 +8,17 @@ from towline.control import (
     Predictive,
     ageing,
     aiming,
+    carrier_references,
     computed_torque,
+    fixed_length_carriers,
     mechanics,
-    moved,
     prediction,
     predictive,
-    tethers,
     thrusts,
 )
 from towline.models import load
 from towline.plant import periods, plant, rows
-from towline.simulation import flying, orders, sensors, simulate, winding
+from towline.simulation import command_conversion, flying, sensors, simulate, winch_lengths
 
 PLAIN = [
     (computed_torque, "mechanics", mechanics.write_rows),
@@ -26,12 +26,12 @@ PLAIN = [
     (computed_torque, "thrusts", thrusts.write_thrusts),
     (predictive, "write_stages", prediction.write_stages),
     (predictive, "aim", aiming.aim),
-    (moved, "directions", tethers.write_directions),
-    (moved, "carriers_of", tethers.write_carriers),
+    (carrier_references, "directions", fixed_length_carriers.write_directions),
+    (carrier_references, "carriers_of", fixed_length_carriers.write_carriers),
     (periods, "run_rows", rows.run_rows),
     (plant, "run_rows", rows.run_rows),
     (flying, "sense_rows", sensors.sense_rows),
-    (orders, "write_lengths", winding.write_lengths),
+    (command_conversion, "write_lengths", winch_lengths.write_lengths),
 ]
 FLIGHTS = [
     ("caroca-pulleys", ComputedTorque, 4),

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import load
 from towline.ocp.planner import Planner
-from towline.ocp.proofs.blocked import blocked
+from towline.ocp.proofs.infeasible_ends import infeasible_ends
 
 TURN = 0.3
 ROBOTS = ("cogiro", "caroca", "wang-flying")
@@ -40,7 +40,7 @@ def case(seed):
     }
     turns = rng.uniform(-TURN, TURN, (20_000, 3))
     best = [clearance(robot, pose, turns, centre, radius).max() / arm for pose in (start, end)]
-    proof = blocked(Planner(robot, task).scenario)
+    proof = infeasible_ends(Planner(robot, task).scenario)
     by_ball = proof is not None and any(excess.limit == "keep_out" for excess in proof.excess)
     return proof if by_ball else None, best
 

@@ -4,7 +4,7 @@ import pytest
 
 from towline.models import Robot, load
 from towline.ocp import MotionStatus, plan
-from towline.ocp.proofs.blocked import blocked
+from towline.ocp.proofs.infeasible_ends import infeasible_ends
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 
@@ -24,7 +24,7 @@ def lift(mass, *before, **fields):
 
 def proven(task):
     """The limits that are proven too small together, and the largest load [kg] that they carry."""
-    proof = blocked(lay_out(TEAM, read_task(task)))
+    proof = infeasible_ends(lay_out(TEAM, read_task(task)))
     return {} if proof is None else {excess.limit: excess.bound for excess in proof.excess}
 
 

@@ -11,7 +11,7 @@ from towline import load, simulate
 from towline.figures.cut_cables import drawn_ends
 from towline.simulation.scene import scene
 from towline.viewer import read
-from towline.viewer.words import readout
+from towline.viewer.labels import readout
 
 LINE = {"kind": "line", "start": [0, 0, -1], "end": [0.3, 0, -1.1]}
 

@@ -23,8 +23,8 @@ from towline.solvers import solve
 from towline.statics.distribution import pose_problem
 from towline.viewer import read, save_page, serve
 from towline.viewer.geometry import Geometry
-from towline.viewer.instant import at_rest
 from towline.viewer.posing import opening_pose
+from towline.viewer.snapshot import at_rest
 from towline.workspace import StaticEquilibrium, sample, save
 
 from .chromium import PATIENCE, chromium, playwright

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures.tension_colours import place, shades
-from . import words
-from .instant import Instant
+from . import labels
+from .snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ..models import Robot
@@ -60,11 +60,11 @@ def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
     return f"<script>{{ const {constants};{CAMERA}}}</script>"
 
 
-def aside(subject: Subject, frames: list[Instant], cell: float) -> str:
+def aside(subject: Subject, frames: list[Snapshot], cell: float) -> str:
     """Return the HTML beside a scene that shows these instants one after the other; a title that folds the rest."""
     start = frames[0]
     # What follows the clock is replaced by the script; of the rest only the first instant is known.
-    table = words.table(start, subject.robot)
+    table = labels.table(start, subject.robot)
     status = f'<b class="towline-status">{escape(start.status)}</b>'
     clock = "" if start.time is None else f'<div class="towline-time">t = {start.time:.2f} s</div>'
     data = json.dumps(_data(subject.robot, frames)).replace("<", "\\u003c")
@@ -72,12 +72,12 @@ def aside(subject: Subject, frames: list[Instant], cell: float) -> str:
         '<aside style="position:fixed;left:8px;bottom:52px;max-width:280px;max-height:80%;overflow:auto;z-index:1;'
         'pointer-events:none;color:#222;background:#ffffffcc;font-family:system-ui,sans-serif"><details open>'
         '<summary style="padding:4px 12px;font-weight:600;pointer-events:auto;cursor:pointer">'
-        f'{escape(subject.title)}</summary><div style="{words.BODY}">{status}{clock}{table}</div>'
-        f"{words.legend(subject, cell)}</details></aside><script>const FRAMES = {data};{SCRIPT}</script>"
+        f'{escape(subject.title)}</summary><div style="{labels.BODY}">{status}{clock}{table}</div>'
+        f"{labels.legend(subject, cell)}</details></aside><script>const FRAMES = {data};{SCRIPT}</script>"
     )
 
 
-def _data(robot: Robot, frames: list[Instant]) -> dict[str, Any]:
+def _data(robot: Robot, frames: list[Snapshot]) -> dict[str, Any]:
     """Return what the table of each frame has."""
     tensions = np.array([frame.tensions for frame in frames])
     places = place(tensions, robot.t_min, robot.t_max)

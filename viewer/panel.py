@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import InputError, TowlineError
 from ..workspace.surface import Surface
 from ..workspace.surface import surface as surface_of
-from . import words
+from . import labels
 from .film import film
 from .frames import Frames
 from .geometry import FARTHEST
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import viser
 
     from .geometry import Geometry
-    from .instant import Instant
     from .replay import Replay
+    from .snapshot import Snapshot
     from .stage import Stage
     from .subject import Subject
 
@@ -43,7 +43,7 @@ class Panel:
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
         frames = Frames(server)
-        self._gui.add_html(words.NARROW)
+        self._gui.add_html(labels.NARROW)
         if subject.replay is None:
             self._posing = Posing(server, frames, subject.robot, geometry, self._show, self._refuse)
         else:
@@ -58,7 +58,7 @@ class Panel:
             if subject.replay is not None:
                 self._add_film(subject.replay)
         with self._gui.add_folder("Legend"):
-            self._gui.add_html(words.legend(subject, stage.cell))
+            self._gui.add_html(labels.legend(subject, stage.cell))
 
     def _add_cuts(self, positions: np.ndarray) -> None:
         """Add a switch for the points (n, 3) of a workspace, and a slider for each axis to cut away those beyond it."""
@@ -90,13 +90,13 @@ class Panel:
             try:
                 there = surface_of(self._subject.cloud.dataset, self._subject.robot, FARTHEST)
             except InputError as error:
-                scale.content = words.note(str(error))
+                scale.content = labels.note(str(error))
                 return
             if there is None:
-                scale.content = words.note("The samples are too few, or too flat, for a surface.")
+                scale.content = labels.note("The samples are too few, or too flat, for a surface.")
                 return
             found.append(there)
-            scale.content = words.margin_scale(there.largest)
+            scale.content = labels.margin_scale(there.largest)
             surface.disabled, surface.value, points.value = False, True, False
             cut(None)
 
@@ -134,13 +134,13 @@ class Panel:
 
     def _refuse(self, reason: str) -> None:
         """Show why there is no instant to draw."""
-        self._readout.content = words.refusal(reason)
+        self._readout.content = labels.refusal(reason)
 
-    def _show(self, instant: Instant) -> None:
+    def _show(self, instant: Snapshot) -> None:
         """Draw an instant in scene and panel."""
         other = self._subject.other_at(instant)
         self._stage.show(instant, other)
-        self._readout.content = words.readout(instant, self._subject.robot, other)
+        self._readout.content = labels.readout(instant, self._subject.robot, other)
 
 
 def _send_picture(client: viser.ClientHandle | None, name: str) -> None:

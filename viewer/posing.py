@@ -15,10 +15,10 @@ from ..models import Dynamics, points
 from ..statics.equilibria import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
+from .feasible_ranges import Strips
 from .geometry import Geometry
-from .instant import Instant, at_rest
 from .sliders import Slider, sliders
-from .strips import Strips
+from .snapshot import Snapshot, at_rest
 
 if TYPE_CHECKING:
     import viser
@@ -51,7 +51,7 @@ class Posing:
         frames: Frames,
         robot: Robot,
         geometry: Geometry,
-        show: Callable[[Instant], None],
+        show: Callable[[Snapshot], None],
         refuse: Callable[[str], None],
     ):
         self._server, self._frames, self._robot, self._geometry = server, frames, robot, geometry

@@ -22,7 +22,7 @@ from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
 from ..solvers import Certificate
 from .geometry import FARTHEST, Extent, Geometry
-from .instant import Instant, least_distance
+from .snapshot import Snapshot, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
@@ -129,14 +129,14 @@ class Replay:
         instants = np.linspace(self.times[0], self.times[-1], count)
         return np.unique([self.index_at(time) for time in instants])
 
-    def at(self, index: int, prove: bool = True) -> Instant:
+    def at(self, index: int, prove: bool = True) -> Snapshot:
         """Return the `index`-th instant with its audited tensions; if there are none, with a certificate if `prove`."""
         tensions = self.tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
         certificate = None if there or self._task is None or not prove else self._certificate(index)
         status = "feasible" if there else "no tensions" if certificate is None else "infeasible"
-        return Instant(
+        return Snapshot(
             pose=self._pose[index],
             carriers=self._carriers[index],
             points=type(self._points)(*(part[index] for part in self._points)),

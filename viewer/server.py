@@ -20,10 +20,10 @@ from ..models import Dynamics
 from .access import guarded
 from .frames import Frames, with_script
 from .geometry import Geometry
-from .instant import at_rest
 from .page import aside, camera
 from .panel import Panel
 from .posing import opening_pose
+from .snapshot import at_rest
 from .stage import ALONG, Stage
 from .subject import Subject
 

@@ -15,10 +15,10 @@ from ..figures.cut_cables import drawn_ends
 from ..figures.hull import faces
 from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
-from . import words
+from . import labels
 from .geometry import Extent, Geometry
-from .instant import Instant, arrow
 from .shapes import posts, rotors, sheaves
+from .snapshot import Snapshot, arrow
 
 if TYPE_CHECKING:
     import viser
@@ -82,7 +82,7 @@ class Stage:
         power = 10.0 ** np.floor(np.log10(wanted))
         return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
-    def show(self, instant: Instant, other: Instant | None = None) -> None:
+    def show(self, instant: Snapshot, other: Snapshot | None = None) -> None:
         """Draw an instant, and one of another plan or flight as a shadow."""
         if other is not None:
             self._shadow(other)
@@ -117,7 +117,7 @@ class Stage:
             _write(label, f"{index + 1}: cut" if instant.cut is not None and instant.cut[index] else text)
         self._point(instant)
         if self._caption is not None:
-            _write(self._caption, words.caption(instant))
+            _write(self._caption, labels.caption(instant))
 
     def show_cloud(self, shown: bool, most: np.ndarray) -> None:
         """Show or hide the points of a workspace whose coordinates are at most `most` (3,) in {G} [m]."""
@@ -155,20 +155,20 @@ class Stage:
         for label in self._numbers:
             label.visible = shown
 
-    def _shadow(self, other: Instant) -> None:
+    def _shadow(self, other: Snapshot) -> None:
         """Draw platform and cables of another plan or flight."""
         _place(self._other_platform, other.pose)
         exits = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
         self._other_cables.points = np.stack([exits, other.points.attachments], axis=1).astype(np.float32)
 
-    def _point(self, instant: Instant) -> None:
+    def _point(self, instant: Snapshot) -> None:
         """Draw the arrow of the certificate."""
         ends = arrow(instant, self._size, self._robot.force_scale)
         self._arrow.visible = self._short.visible = ends is not None
         if ends is not None:
             self._arrow.points = _strokes(*ends).astype(np.float32)
             self._short.position = ends[1]
-            _write(self._short, words.shortfall(instant))
+            _write(self._short, labels.shortfall(instant))
 
     def frame(self, camera: Any, width: float, height: float) -> None:
         """Point a camera at the whole robot from the front, a little from the side and above.
@@ -182,7 +182,7 @@ class Stage:
         width, height
             Of its picture [pixels].
         """
-        free = 1.0 - words.SHEET_SHARE if width < height else 1.0
+        free = 1.0 - labels.SHEET_SHARE if width < height else 1.0
         away = self.nearest / min(width / height, free, 1.0)
         side = np.cross([0.0, 0.0, 1.0], ALONG)
         upwards = np.cross(ALONG, side / np.linalg.norm(side))
@@ -245,7 +245,7 @@ class Stage:
         if subject.replay is not None:
             self._lines("/path", [subject.replay.path], rgb(style.colour(0)), 2 * THIN)
             if subject.replay.reference is not None:
-                self._lines("/reference", [subject.replay.reference], rgb(words.GHOST), THIN)
+                self._lines("/reference", [subject.replay.reference], rgb(labels.GHOST), THIN)
             self._lines("/carrier_paths", subject.replay.carrier_paths, GREY)
             for index, lines in enumerate(subject.replay.obstacles):
                 self._lines(f"/keep_out/{index + 1}/edges", lines, rgb(style.colour(5)))
@@ -328,7 +328,7 @@ class Stage:
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
     def _make_shadow(self, path: np.ndarray) -> None:
-        colour = rgb(words.OTHER)
+        colour = rgb(labels.OTHER)
         self._other_platform = self._scene.add_frame("/other/platform", show_axes=False)
         self._body("/other/platform/body", self._robot.attachments, colour, opacity=0.35)
         self._other_cables = self._scene.add_line_segments(

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from .cloud import Cloud
-    from .instant import Instant
     from .replay import Replay
+    from .snapshot import Snapshot
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how NetCDF files begin
 ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towline workspace` wrote"
@@ -65,7 +65,7 @@ class Subject(Displayed):
             return "flight"
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
-    def other_at(self, instant: Instant) -> Instant | None:
+    def other_at(self, instant: Snapshot) -> Snapshot | None:
         """Return the instant of the other plan or flight at the same time, or its last one; None without another."""
         if self.other is None or instant.time is None:
             return None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .charts import Charts
 from .curves import curves
-from .instant import Instant
+from .snapshot import Snapshot
 
 if TYPE_CHECKING:
     import viser
@@ -45,7 +45,7 @@ class TimeLine:
         server: viser.ViserServer,
         frames: Frames,
         replay: Replay,
-        show: Callable[[Instant], None],
+        show: Callable[[Snapshot], None],
         other: Replay | None = None,
     ):
         self._frames, self._replay, self._show = frames, replay, show

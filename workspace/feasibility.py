@@ -17,7 +17,7 @@ from ..models.dynamics import dynamics_of
 from ..solvers import compiled as solver_kernels
 from ..solvers import solve_batch
 from .places import Places, check_places
-from .tightened import Tightened
+from .robust_limits import Tightened
 
 __all__ = [
     "feasible",

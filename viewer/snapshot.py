@@ -18,7 +18,7 @@ FORCELESS = 0.05  # shorter force parts are no arrow: the certificate is about m
 
 
 @dataclass(frozen=True)
-class Instant(Displayed):
+class Snapshot(Displayed):
     """A robot at one instant.
 
     Attributes
@@ -60,7 +60,7 @@ class Instant(Displayed):
     events: tuple[str, ...] = ()
 
 
-def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Instant:
+def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Snapshot:
     """Return the robot at rest at `pose` (6,) with its carriers at (c, 6), and the tensions of least norm that hold it.
 
     Raises
@@ -73,7 +73,7 @@ def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: 
     answer = solve(problem)
     tensions = np.full(robot.m, np.nan) if answer.tensions is None else answer.tensions
     margin, nearest = least_distance(tensions, robot.t_min, robot.t_max)
-    return Instant(
+    return Snapshot(
         pose=pose,
         carriers=carriers,
         points=geometry(pose, carriers),
@@ -94,7 +94,7 @@ def least_distance(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -
     return float(inside.min()), int(inside.argmin())
 
 
-def arrow(instant: Instant, size: float, typical: float) -> np.ndarray | None:
+def arrow(instant: Snapshot, size: float, typical: float) -> np.ndarray | None:
     """Return the force part of the certificate's direction as an arrow from the CoM, start and tip (2, 3) in {G} [m].
 
     Its length grows with the shortfall, and stays below `ARROW` of `size` [m] times the share of force in the

@@ -1,4 +1,4 @@
-"""Prove a task infeasible from values that the planner cannot change, before any program is solved: `blocked`.
+"""Prove a task infeasible from values that the planner cannot change, before any program is solved: `infeasible_ends`.
 
 Where the platform starts and ends, and along a path that it must follow, some coordinates have no freedom. Whether a
 limit that depends on these alone is kept does not depend on the planner. Nor does whether tensions exist, where the
@@ -27,13 +27,13 @@ from .no_attitude import CERTAIN, no_attitude
 from .too_fast import too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
 
-__all__ = ["Blocked", "blocked"]
+__all__ = ["InfeasibleEnds", "infeasible_ends"]
 
 PLACES = 41  # along the path
 GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
 
 
-class Blocked(NamedTuple):
+class InfeasibleEnds(NamedTuple):
     """The proof that no motion keeps a task's limits.
 
     Attributes
@@ -69,7 +69,7 @@ class Blocked(NamedTuple):
         return replace(audit, excess=self.excess, certificate=self.certificate)
 
 
-def blocked(scenario: Scenario) -> Blocked | None:
+def infeasible_ends(scenario: Scenario) -> InfeasibleEnds | None:
     """Return the proof that a task is impossible, if its ends or a path that it must follow show it; else None."""
     times = np.concatenate([[0.0, scenario.duration], np.linspace(0.0, scenario.duration, PLACES)[1:-1]])
     freedom = [_freedom(scenario, 0), _freedom(scenario, -1), _freedom(scenario, None)]
@@ -83,7 +83,7 @@ def blocked(scenario: Scenario) -> Blocked | None:
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
     if not proven and certificate is None:
         proven += _at_no_attitude(scenario, times, freedom, platform, carriers)
-    return Blocked(proven, certificate) if proven or certificate is not None else None
+    return InfeasibleEnds(proven, certificate) if proven or certificate is not None else None
 
 
 def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:

@@ -14,7 +14,7 @@ from ..figures import style
 from ..figures.tension_colours import NO_TENSION, place, shades
 from ..models import Robot
 from ..models.part import COORDINATES
-from .instant import Instant, arrow
+from .snapshot import Snapshot, arrow
 from .subject import Subject
 
 MUTED = "#595959"
@@ -35,7 +35,7 @@ SHEET_SHARE = 0.45  # of the height, see NARROW
 BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums"
 
 
-def readout(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
+def readout(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str:
     """Return status, margins, the certificate if there are no tensions, and a row for each cable.
 
     `other` is the instant of a plan or a flight to compare with: its distance and its tensions are added.
@@ -61,7 +61,7 @@ def readout(instant: Instant, robot: Robot, other: Instant | None = None) -> str
     return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{table(instant, robot, other)}</div>'
 
 
-def _margins(instant: Instant) -> list[str]:
+def _margins(instant: Snapshot) -> list[str]:
     """Return the tension margin and the capacity margin."""
     lines = []
     if np.isfinite(instant.margin):
@@ -71,7 +71,7 @@ def _margins(instant: Instant) -> list[str]:
     return lines
 
 
-def table(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
+def table(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str:
     """Return a table of the cables: colour, tension, and its place between the limits."""
     places = place(instant.tensions, robot.t_min, robot.t_max)
     rows = []
@@ -104,7 +104,7 @@ def table(instant: Instant, robot: Robot, other: Instant | None = None) -> str:
     return f'<table style="border-collapse:collapse;margin-top:6px"><tr>{heads}</tr>{"".join(rows)}</table>'
 
 
-def caption(instant: Instant) -> str:
+def caption(instant: Snapshot) -> str:
     """Return time, status, margin or shortfall in two or three lines of plain text, for the scene."""
     lines = [instant.status if instant.time is None else f"t = {instant.time:.2f} s, {instant.status}"]
     if np.isfinite(instant.margin):
@@ -114,7 +114,7 @@ def caption(instant: Instant) -> str:
     return "\n".join(lines)
 
 
-def shortfall(instant: Instant) -> str:
+def shortfall(instant: Snapshot) -> str:
     """Return the label of the certificate's arrow; empty if there is no certificate."""
     return "" if instant.certificate is None else f"short by {quantity(instant.certificate.shortfall, 'N')}"
 

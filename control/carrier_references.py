@@ -10,9 +10,8 @@ from typing_extensions import override
 from ..base.errors import InputError
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
-from .machine import carriers_of, directions
-from .pending import Pending
-from .tethers import (
+from .command_delay import Pending
+from .fixed_length_carriers import (
     AT_HOME,
     AXES,
     CABLES,
@@ -23,6 +22,7 @@ from .tethers import (
     WHICH,
     coordinates_of,
 )
+from .machine import carriers_of, directions
 
 __all__ = ["Flown", "Freed", "Moved", "Tethered"]
 

@@ -22,7 +22,7 @@ class Orders:
 
     Tensions are commanded as they are if the plant's drive has them, or winches that pull with a force. Elastic cables
     without winches in their file are assumed to have some that measure their tension and reach it within the period,
-    see `winding`. Carriers are commanded for one instant; until the next they move as the reference does.
+    see `winch_lengths`. Carriers are commanded for one instant; until the next they move as the reference does.
 
     Parameters
     ----------

@@ -20,11 +20,11 @@ _UNPROVEN = "gives the wrench, but multipliers do not prove it optimal"
 _NEAREST = "gives the wrench as near to t_ref as can be, which is not what the method looks for"
 
 
-class Judgement(NamedTuple):
+class Verdict(NamedTuple):
     """Hold what is known of a problem after a proposal, in the fields of a `TensionSolution`.
 
     `left` is the problem of what is left to choose on the boundary of the available wrench set, for another proposal;
-    `tensions` are then the least squares there. None if the judgement is final.
+    `tensions` are then the least squares there. None if the verdict is final.
     """
 
     status: Status
@@ -34,7 +34,7 @@ class Judgement(NamedTuple):
     left: TensionProblem | None = None
 
 
-def judge(
+def verify(
     problem: TensionProblem,
     form: StandardForm,
     method: Method,
@@ -42,7 +42,7 @@ def judge(
     tensions: Array | None,
     exact: Array | None,
     last: bool,
-) -> Judgement | None:
+) -> Verdict | None:
     """Judge a proposal of a method.
 
     The status is "optimal" if the tensions give w and, for a method of least squares, if multipliers prove them
@@ -63,28 +63,28 @@ def judge(
     """
     useful = tensions is not None and _gives_wrench(problem, tensions)
     if tensions is not None and useful and (not method.least_squares or form.is_optimal(tensions)):
-        return Judgement(Status.OPTIMAL, tensions, "" if exact is None else _ON_FACE)
+        return Verdict(Status.OPTIMAL, tensions, "" if exact is None else _ON_FACE)
     if not last:
         return None
     if exact is not None:
         if proposal.final:
-            return Judgement(Status.FAILED, None, proposal.detail)
-        return Judgement(Status.INACCURATE, exact, f"{_NEAREST}: {proposal.detail}".removesuffix(": "))
+            return Verdict(Status.FAILED, None, proposal.detail)
+        return Verdict(Status.INACCURATE, exact, f"{_NEAREST}: {proposal.detail}".removesuffix(": "))
     projection = project(problem)
     certificate = None if useful else sharpest(problem, projection)
     if certificate is None and method.exact and not proposal.final:
         optimum = exact_optimum(problem, projection.closest)
         if _gives_wrench(problem, optimum.tensions):
             left = None if method.least_squares else _face(problem, form, optimum.tensions)
-            return Judgement(Status.OPTIMAL, optimum.tensions, _EXACT, left=left)
+            return Verdict(Status.OPTIMAL, optimum.tensions, _EXACT, left=left)
         certificate = None if useful else sharpest(problem, Projection(*optimum))
     if certificate is not None:
         if method.always_answers and tensions is not None:
-            return Judgement(Status.INACCURATE, tensions, proposal.detail, certificate)
-        return Judgement(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
+            return Verdict(Status.INACCURATE, tensions, proposal.detail, certificate)
+        return Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     if useful:
-        return Judgement(Status.INACCURATE, tensions, _UNPROVEN)
-    return Judgement(Status.FAILED if tensions is None else Status.INACCURATE, tensions, proposal.detail)
+        return Verdict(Status.INACCURATE, tensions, _UNPROVEN)
+    return Verdict(Status.FAILED if tensions is None else Status.INACCURATE, tensions, proposal.detail)
 
 
 def _face(problem: TensionProblem, form: StandardForm, exact: Array) -> TensionProblem | None:
