@@ -50,7 +50,7 @@ from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
 from .tasks.initial import Initial
 from .tasks.lay_out import lay_out
-from .tasks.measured import Measured, initial_of
+from .tasks.measured import Measured
 from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
@@ -110,14 +110,8 @@ def plan(
     InputError
         If the task or the start is not valid or does not fit the robot; one line naming the field and the value.
     """
-    read = read_task(task)
-    if robust is not None:
-        read = read.model_copy(update={"robust": number("robust", robust, LEAST_SHARE, 1 - LEAST_SHARE)})
-    if initial is not None:
-        scenario = lay_out(as_robot(robot), read.model_copy(update={"initial": None}))
-        read = read.model_copy(update={"initial": initial_of(scenario, initial)})
     with heeding():
-        return Planner(robot, read).plan(progress, start)
+        return Planner(robot, task, initial, robust).plan(progress, start)
 
 
 class Planner(Displayed):
@@ -127,7 +121,7 @@ class Planner(Displayed):
     ----------
     robot
         As for `plan`.
-    task
+    task, initial, robust
         As for `plan`.
 
     Raises
@@ -136,12 +130,20 @@ class Planner(Displayed):
         As `plan` does.
     """
 
-    def __init__(self, robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str]):
+    def __init__(
+        self,
+        robot: Robot | str | os.PathLike[str],
+        task: Task | dict[str, Any] | str | os.PathLike[str],
+        initial: Initial | Measured | dict[str, Any] | None = None,
+        robust: float | None = None,
+    ):
         read = read_task(task)
-        self.scenario = lay_out(as_robot(robot), read)
-        self._share = read.robust
-        if read.robust is not None:  # the first plan counts the robot as exact
-            self.scenario = lay_out(self.scenario.robot, read.model_copy(update={"robust": None}))
+        if robust is not None:
+            read = read.model_copy(update={"robust": number("robust", robust, LEAST_SHARE, 1 - LEAST_SHARE)})
+        scenario = lay_out(as_robot(robot), read, initial)
+        self._share = scenario.task.robust
+        # The first plan counts the robot as exact.
+        self.scenario = replace(scenario, task=scenario.task.model_copy(update={"robust": None}))
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan

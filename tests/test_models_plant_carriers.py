@@ -92,8 +92,12 @@ def test_fixed_lengths_pull_as_stiff_elastic_cables_do(rig, kind):
         _, fixed, ours = fly(robot, moving, dt, 0.0, substeps)
         assert (fixed == 0).mean() <= (elastic == 0).mean()
         assert fixed.mean() == pytest.approx(elastic.mean(), rel=1e-3)
-        again = [[fly(robot, moving, dt, EA, substeps)[2] for EA in (0.0, stiff)] for _ in range(3)]
-        assert min(ours, *(pair[0] for pair in again)) < 5 * min(theirs, *(pair[1] for pair in again))
+        for _ in range(20):  # by turns, as often as a loaded machine needs until both had a quiet moment
+            if ours < 5 * theirs:
+                break
+            ours = min(ours, fly(robot, moving, dt, 0.0, substeps)[2])
+            theirs = min(theirs, fly(robot, moving, dt, stiff, substeps)[2])
+        assert ours < 5 * theirs
 
 
 @pytest.mark.parametrize(

@@ -96,3 +96,10 @@ def test_the_gallery_has_every_picture():
     page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
     drawn = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.png")}
     assert {path for path in targets(page) if path.endswith(".png")} == drawn
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("adding-a-*.md")), ids=lambda page: page.stem)
+def test_an_extension_is_an_example_of_at_most_30_lines(page):
+    """Tests of their own run the examples: a method, a carrier, a condition, a limit, a cost, a controller."""
+    for code in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+        assert len([line for line in code.splitlines() if line.strip()]) <= 30

@@ -10,11 +10,11 @@ import numpy as np
 
 from ...models import Robot
 from .deviation import Deviation
-from .paths import AnyPath, RestPath
+from .paths import AnyPath, LinePath, RestPath
 from .scenario import POSITION, Scenario
 from .task import FreeBase, GivenBase, Task
 
-__all__ = ["FixedValue", "at_rest_without_acceleration", "carrier_ends", "fixed_values", "platform_ends"]
+__all__ = ["FixedValue", "at_rest_without_acceleration", "carrier_ends", "fixed_values", "platform_ends", "with_timing"]
 
 AT_REST = 1e-9  # [m/s, rad/s] and per second: rounding at the end of a path
 
@@ -121,3 +121,15 @@ def _goes_to_rest(path: AnyPath, seconds: float) -> bool:
         return False
     _, velocity, acceleration = path.at(np.array([0.0, seconds]), seconds)
     return bool(max(np.abs(velocity).max(), np.abs(acceleration).max()) <= AT_REST)
+
+
+def with_timing(robot: Robot, task: Task) -> Task:
+    """Return a task with a timing of its line: smoother where balance determines a team's motion, and none is given."""
+    path = task.path
+    if not isinstance(path, LinePath) or path.timing is not None:
+        return task
+    exact = task.tube.radius == task.tube.turn == 0 and isinstance(task.base, FreeBase)
+    team = robot.m < len(robot.platform.dof) and any(carrier.efforts for carrier in robot.carriers)
+    if not (exact and team and carrier_ends(task) == "rest"):
+        return task
+    return task.model_copy(update={"path": path.model_copy(update={"timing": "smoother"})})

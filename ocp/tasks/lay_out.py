@@ -1,259 +1,59 @@
-"""`lay_out`: check that a task fits a robot, and lay it out for planning."""
+"""`lay_out`: lay a task out for one robot, checked."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import remainder
-
-import casadi as ca
-import numpy as np
+from typing import Any
 
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
-from ...models.part import COORDINATES
-from ...models.ranges import PositiveRange
-from ..limits.clearance import point_outside
-from ..limits.limits import Limits
 from .carrier_paths import carrier_paths
-from .ends import carrier_ends
-from .initial import Final, Initial, check_ends
+from .ends import with_timing
+from .initial import Initial
 from .lay_out_phases import lay_out_phases
 from .limit_list import limit_list
-from .paths import LinePath, WaypointPath
-from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
+from .measured import Measured, initial_of
+from .scenario import ATTITUDE, POSITION, Scenario
 from .task import FreeBase, GivenBase, HoldBase, Task
-from .task_limits import OF_CARRIERS
-from .wind_set import WindBox
+from .task_checks import check_scenario, check_task
 
-__all__ = ["check_margin", "lay_out"]
-
-
-ENDING = ("waypoints", "samples", "sequence", "return")  # kinds of paths that end at a time of their own
-TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on their path
+__all__ = ["lay_out"]
 
 
-def lay_out(robot: Robot, task: Task) -> Scenario:
+def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, Any] | None = None) -> Scenario:
     """Check that `task` fits `robot` and lay it out.
+
+    Parameters
+    ----------
+    initial
+        The state from which the motion starts, instead of the task's (`initial_of`).
 
     Raises
     ------
     InputError
         Naming the field of the task that does not fit, its value and what would.
     """
-    where = f"task {task.name!r}"
-    task = _timed(robot, task)
-    relative = _frame(robot, task, where)
-    check_margin(robot, task)
-    if task.wind is not None and robot.platform.aero is None:
-        raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
-    if isinstance(task.wind, WindBox):
-        _feels_no_tensions(robot, where)
-    if task.robust is not None:
-        _check_robust(robot, task, where)
-    check_ends(robot, task.initial, task.final, task.path.frame, where)
-    limits = limit_list(robot, task)
-    _fit_limits(robot, task, limits, where)
+    check_task(robot, task)
+    task = with_timing(robot, task)
     opened = [*POSITION] * (task.tube.radius > 0) + [*ATTITUDE] * (task.tube.turn > 0)
-    platform_free = [coordinate for coordinate in opened if robot.dof_mask[coordinate]]
     scenario = Scenario(
         robot=robot,
         task=task,
         path=task.path,
         dynamics=dynamics_of(robot),
-        relative=relative,
-        platform_free=platform_free,
-        carrier_free=_free_carriers(robot, task.base, where),
-        limits=limits,
+        relative=task.path.frame != "world",
+        platform_free=[coordinate for coordinate in opened if robot.dof_mask[coordinate]],
+        carrier_free=_free_carriers(robot, task.base, f"task {task.name!r}"),
+        limits=limit_list(robot, task),
         carrier_paths=carrier_paths(robot, task),
         duration=task.seconds,
     )
-    _check_start_and_end(scenario, where)
-    _check_times(task, where)
-    _check_waypoints(task, where)
-    _check_periodic_end(task, where)
+    if initial is not None:
+        state = initial_of(scenario, initial)
+        scenario = replace(scenario, task=task.model_copy(update={"initial": state}))
+    check_scenario(scenario)
     return replace(scenario, phases=lay_out_phases(scenario))
-
-
-def _timed(robot: Robot, task: Task) -> Task:
-    """Choose the timing of a line that leaves it free: smoother where balance then determines the motion of a team."""
-    path = task.path
-    if not isinstance(path, LinePath) or path.timing is not None:
-        return task
-    exact = task.tube.radius == task.tube.turn == 0 and isinstance(task.base, FreeBase)
-    team = robot.m < len(robot.platform.dof) and any(carrier.efforts for carrier in robot.carriers)
-    if not (exact and team and carrier_ends(task) == "rest"):
-        return task
-    return task.model_copy(update={"path": path.model_copy(update={"timing": "smoother"})})
-
-
-def _feels_no_tensions(robot: Robot, where: str) -> None:
-    """Refuse a box of winds where other tensions are another motion."""
-    for carrier in robot.carriers:
-        if carrier.efforts:
-            raise InputError(
-                f"{where}: wind must be one wind, (x, y, z) [m/s], got a box: carrier {carrier.name!r} of kind "
-                f"{carrier.kind} moves with the pull of its cables, so that no motion is the same in every wind"
-            )
-
-
-def _check_robust(robot: Robot, task: Task, where: str) -> None:
-    """Refuse what the differences between robots are not known for."""
-    missing = "must be left out for a robot without an uncertainty in its file"
-    if robot.uncertainty is None:
-        raise InputError(f"{where}: robust {missing}, as {robot.name!r} is, got {task.robust:g}")
-    if robot.m < len(robot.platform.dof):
-        raise InputError(
-            f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, since each such "
-            f"robot moves otherwise, got {task.robust:g} for {robot.name!r}"
-        )
-    if isinstance(task.wind, WindBox):
-        raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with robust, got a box")
-    for phase in task.phases or ():
-        if phase.ground is not None:
-            raise InputError(f"{where}: robust must be left out with phases on the ground, got phase {phase.name!r}")
-
-
-def check_margin(robot: Robot, task: Task) -> None:
-    """Refuse a margin that leaves a cable no tension.
-
-    Raises
-    ------
-    InputError
-        Naming the largest margin and the cable.
-    """
-    for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
-        if low + task.margin > high - task.margin:
-            raise InputError(
-                f"task {task.name!r}: margin must be at most {(high - low) / 2:g} N, half the range of cable "
-                f"{index + 1} ({low:g} N to {high:g} N), got {task.margin:g} N"
-            )
-
-
-def _fit_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
-    """Refuse soft limits of carriers that the robot does not have, and a body nearer to cables than they may be."""
-    names = {limit.name for limit in limits}
-    still = not any(carrier.moves for carrier in robot.carriers)
-    for name in task.limits.soft:
-        for its, owner, missing in (
-            (("thrust", "torque"), "quadrotors", name not in names),
-            (("carrier_reach",), "mobile carriers", name not in names),
-            (OF_CARRIERS, "moving carriers", still),
-        ):
-            if name in its and missing:
-                raise InputError(
-                    f"{where}: limits.soft must not name {name!r}, a limit of {owner}: {robot.name!r} has none"
-                )
-    for place in task.limits.keep_out:
-        if place.frame == "platform" and place.cables is not None:
-            for index, attachment in enumerate(robot.attachments):
-                outside = float(point_outside(place, ca.DM(attachment)))
-                if outside < place.cables:
-                    raise InputError(
-                        f"{where}: limits.keep_out {place.name!r} must leave all attachments outside by as much as "
-                        f"cables, {place.cables:g} m, got {outside:.3g} m for cable {index + 1}"
-                    )
-
-
-def _frame(robot: Robot, task: Task, where: str) -> bool:
-    frame = task.path.frame
-    only = robot.carriers[0].name if len(robot.carriers) == 1 else None
-    if frame != "world" and frame != only:
-        accepted = "world" if only is None else f"world, {only}"
-        key = "path.frame" if task.phases is None else "phases[0].path.frame"
-        raise InputError(f"{where}: {key} must be one of {accepted}, got {frame!r}")
-    return frame != "world"
-
-
-def _check_periodic_end(task: Task, where: str) -> None:
-    """Refuse a final pose of the carriers that their periodic motion contradicts."""
-    if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
-        raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
-
-
-def _check_start_and_end(scenario: Scenario, where: str) -> None:
-    """Refuse initial and final states that differ from what the task fixes where the planner has no freedom."""
-    task = scenario.task
-    for end, key, state in ((0, "initial", task.initial), (-1, "final", task.final)):
-        if state is not None:
-            _check_state(scenario, where, end, key, state)
-
-
-def _check_state(scenario: Scenario, where: str, end: int, key: str, state: Initial | Final) -> None:
-    platform, carriers = scenario.references(np.array([0.0, scenario.duration]))
-    bodies = [(None, "platform", platform), *((i, c.name, carriers[i]) for i, c in enumerate(scenario.robot.carriers))]
-    for owner, name, reference in bodies:
-        for order, value in state.of(owner):
-            for i, coordinate in enumerate(COORDINATES):
-                off = value[i] - float(reference[order][end, i])
-                if order == 0 and i in ATTITUDE:
-                    off = remainder(off, 2 * np.pi)
-                if (owner, i) not in scenario.owners() and abs(off) > TOLERANCE:
-                    what = ("", "speed of ", "acceleration of ")[order]
-                    hint = "a tube or a free base may leave it"
-                    if owner is None and not scenario.robot.dof_mask[i]:
-                        hint = f"{coordinate} is not one of the platform's degrees of freedom"
-                    raise InputError(
-                        f"{where}: {key} must have the {what}{coordinate} of the {name} that the task fixes at its "
-                        f"{'end' if end else 'start'}, {value[i] - off:g}, got {value[i]:g}; {hint}"
-                    )
-
-
-def _check_times(task: Task, where: str) -> None:
-    """Refuse a task longer or shorter than its waypoints: beyond their times a spline is arbitrary."""
-    longest = task.duration.max if isinstance(task.duration, PositiveRange) else task.seconds
-    if longest * AUDIT_RATE > MOST_SAMPLES:
-        raise InputError(
-            f"{where}: duration must be at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the audit evaluates "
-            f"{AUDIT_RATE:g} instants per second, got {longest:g} s"
-        )
-    if longest * task.output_rate > MOST_SAMPLES:
-        raise InputError(
-            f"{where}: output_rate must be at most {MOST_SAMPLES / longest:g} 1/s, {MOST_SAMPLES} samples in "
-            f"{longest:g} s, got {task.output_rate:g} 1/s"
-        )
-    paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
-    for name, path in paths.items():
-        if task.seconds <= path.resting:
-            raise InputError(
-                f"{where}: duration must be more than the {path.resting:g} s for which {name} dwells, got "
-                f"{task.seconds:g} s"
-            )
-    if isinstance(task.duration, PositiveRange):
-        for name, path in paths.items():
-            if not path.stretches:
-                raise InputError(
-                    f"{where}: duration must be a number [s], got a range, while {name} of kind {path.kind} has "
-                    "times of its own; paths of kind rest, line, and waypoints without times and dwell take a range"
-                )
-    for name, path in paths.items():
-        end = path.natural_duration if path.kind in ENDING else None
-        if end is not None and task.seconds > end * (1 + 1e-9):
-            raise InputError(
-                f"{where}: duration must be at most {end:g} s, where the times of {name} end, got {task.seconds:g} s"
-            )
-    end = task.path.natural_duration if task.path.kind in ENDING else None
-    if end is not None and task.seconds < end * (1 - 1e-9):
-        raise InputError(
-            f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"
-        )
-
-
-def _check_waypoints(task: Task, where: str) -> None:
-    """Refuse exact waypoints that are farther from the path than the tube reaches."""
-    path, tube = task.path, task.tube
-    if tube.waypoints != "exact" or not isinstance(path, WaypointPath):
-        return
-    missed = np.abs(path.missed(task.seconds))
-    for index, (off, turned) in enumerate(
-        zip(np.linalg.norm(missed[:, :3], axis=1), missed[:, 3:].max(axis=1), strict=True)
-    ):
-        for name, value, most, unit in (("position", off, tube.radius, "m"), ("attitude", turned, tube.turn, "rad")):
-            if value > most + TOLERANCE:
-                raise InputError(
-                    f"{where}: tube.{name} must be at least {value:.3g} {unit}, by which legs pass points[{index}], "
-                    f"since tube.waypoints is exact, got {most:g} {unit}; legs with path.blend 0 rest at their points"
-                )
 
 
 def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:

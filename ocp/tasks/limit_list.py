@@ -51,12 +51,12 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
         yield CableSpeed(robot, given.cable_speed)
     if given.cable_length is not None:
         yield CableLength(robot, given.cable_length.min, given.cable_length.max)
+    if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:
+        yield clearance
     if "margin" in given.soft:
         yield Margin(robot, task.margin)
     if given.tension_rate is not None:
         yield TensionRate(robot, given.tension_rate)
-    if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:
-        yield clearance
 
 
 def _of_platform(given: TaskLimits) -> Iterator[Limit]:

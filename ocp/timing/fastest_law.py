@@ -23,12 +23,12 @@ from ...solvers import certify, solve_batch
 from ...statics.distribution import wrench_problem
 from ..limits.limits import Limits
 from ..tasks.carrier_paths import carrier_paths
-from ..tasks.lay_out import check_margin
 from ..tasks.limit_list import limit_list
 from ..tasks.paths import CirclePath
 from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES
 from ..tasks.status import MotionStatus
 from ..tasks.task import FreeBase, Task, read_task
+from ..tasks.task_checks import check_margin
 from ..tasks.wind_set import WindBox
 from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits, relative
