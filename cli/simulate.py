@@ -230,6 +230,6 @@ def _often(
     if as_json:
         print_json({**summary(flights), "file": file, "figures": pictures})
     else:
-        typer.echo(report(flights))
+        typer.echo(report(flights).text())
         print_written((file, *pictures))
     return bool(flights["passed"].all())

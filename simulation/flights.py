@@ -15,6 +15,7 @@ from ..base.inputs import check_ending, file_path
 from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import quantity
 from ..control import ANSWERS, Controller
+from ..figures.report import Report, Section
 from ..models.parsing import parse_yaml, to_yaml
 from ..models.robot import Robot
 from ..plant import Plant
@@ -120,11 +121,10 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def report(dataset: xr.Dataset) -> str:
-    """Return the report of many flights as text: how many passed in the first line, then the facts behind it."""
+def report(dataset: xr.Dataset) -> Report:
+    """Return the report of many flights: how many passed, then the facts behind it."""
     short = summary(dataset)
     name = parse_yaml(dataset.attrs["robot"], Robot, "robot").name
-    word = "PASSED" if short["passed"] == short["runs"] else "FAILED"
     longest = quantity(float(dataset["duration"].values.max()), "s")
     counts = dataset["answered"].values.sum(axis=0)
     largest, slack = short["error_max"], dataset["slack_s"].values
@@ -142,8 +142,12 @@ def report(dataset: xr.Dataset) -> str:
             f"{quantity(int(count))} {answer}" for answer, count in zip(ANSWERS, counts, strict=True) if count
         ),
     }
-    lines = [f"{name}, {short['runs']} flights of {longest}: {word}, {short['passed']} passed"]
-    return "\n".join([*lines, *(f"    {name:<24}{text}" for name, text in rows.items())])
+    return Report(
+        about=f"{name}, {short['runs']} flights of {longest}",
+        status="passed" if short["passed"] == short["runs"] else "failed",
+        summary=f"{short['passed']} passed",
+        parts=[Section("", list(rows.items()))],
+    )
 
 
 def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:

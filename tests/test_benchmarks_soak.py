@@ -28,6 +28,7 @@ def run(monkeypatch, *arguments):
         ("control", 250, "cogiro", "| cogiro | "),
         ("predictive", 200, "flycrane,cogiro", "| cogiro | "),
         ("silence", 1, "cogiro", "0 of 1 runs were handed over"),
+        ("signals", 1, "export", "export: "),
         ("tasks", 2, "ordinary,lift", "all       2 feasible"),
     ],
 )

@@ -110,7 +110,7 @@ def test_many_flights_have_one_table(folder):
         assert answer["error_max"]["worst"] == pytest.approx(worst.max())
         assert answer["error_max"]["median"] == pytest.approx(np.median(worst))
         assert answer["worst_seed"] == table.seed.values[worst.argmax()]
-        assert report(table).splitlines()[0] == "wang-flying, 4 flights of 0.2 s: PASSED, 4 passed"
+        assert report(table).text().splitlines()[0] == "wang-flying, 4 flights of 0.2 s: PASSED, 4 passed"
 
 
 @pytest.mark.parametrize(
