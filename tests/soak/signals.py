@@ -93,7 +93,7 @@ def prepare(folder: Path) -> None:
     robot, rng = load("cogiro"), np.random.default_rng(0)
     poses = robot.home + np.c_[rng.uniform(-1, 1, (400, 3)), rng.uniform(-0.1, 0.1, (400, 3))]
     lengths = Dynamics(robot).cable_lengths(poses) + 1e-3 * rng.normal(size=(400, robot.m))
-    head = ",".join(f"l{k}" for k in range(robot.m))
+    head = ",".join(f"l{k} [m]" for k in range(robot.m))
     np.savetxt(folder / "log.csv", lengths, delimiter=",", header=head, comments="")
 
 
