@@ -10,20 +10,8 @@ whatever its folder is called: type checkers and editors then find it as Python 
 import os
 import re
 
-CORE = "solvers/core/"
-SOURCES = (
-    "certificate",
-    "dual_active_set",
-    "extension",
-    "proof",
-    "reduction",
-    "slabs",
-    "standard_form",
-    "towline_core",
-)
+CORE = "core"
 EDITABLE = ".editable"
-HEADERS = ("internal.h", "tolerances.h", "towline_core.h", "towline_types.h")
-
 
 # Where a link or a picture of Markdown or HTML leads: a path, neither an address nor a place on the same page.
 PATH = re.compile(r'(?P<before>\]\(|<img src=")(?P<path>(?!#|[a-z]+:)[^)"\s]+)')
@@ -75,10 +63,10 @@ def main() -> None:
     project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
     readme = Path("README.md").read_text(encoding="utf-8")
     core = Extension(
-        "towline.solvers.core._core",
-        [f"{CORE}{name}.c" for name in SOURCES],
-        depends=[CORE + name for name in HEADERS],
-        include_dirs=[CORE],
+        "towline.core._core",
+        sorted(str(path) for path in Path(CORE).glob("*/*.c")),
+        depends=sorted(str(path) for path in Path(CORE).glob("*/*.h")),
+        include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
         # The same bits on every processor: no multiplication and addition in one.
         extra_compile_args=[] if sys.platform == "win32" else ["-O3", "-ffp-contract=off", "-g0"],

@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 import towline
 from towline import Dynamics, TensionProblem, load, solve, solve_batch
-from towline.solvers import core
+from towline import core
 
 robot = load("cogiro")
 A = Dynamics(robot).wrench_matrix(np.tile(robot.home, (10, 1)))

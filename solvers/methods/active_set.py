@@ -6,7 +6,7 @@ from .daqp import Daqp
 class ActiveSet(Daqp):
     """Weighted least squares to t_ref inside the limits, by a dual active-set method in the null space.
 
-    `solve` runs the C core, `towline.solvers.core`, if towline was installed where there is a C compiler. Without it,
+    `solve` runs the C core, `towline.core`, if towline was installed where there is a C compiler. Without it,
     and where it is not sure, the daqp package proposes and `solve` judges, as with the other methods: some 0.2 ms a
     call.
     """

@@ -6,17 +6,16 @@ without the extension.
 
 from typing import Any
 
-from ..kernels.codes import UNSURE
-
 __all__ = ["CABLES", "ROWS", "solve_packed", "solve_rows"]
 
 try:
     from ._core import CABLES, ROWS, solve_packed, solve_rows
 except ImportError:
     ROWS = CABLES = 0
+    UNSURE = 6  # of `codes`: the core has found neither tensions nor a proof
 
     def solve_packed(packed: Any, tensions: Any, direction: Any = None) -> int:
-        """Solve a problem given as one array, `TensionProblem.packed`; return its status, a code of `kernels.codes`.
+        """Solve a problem given as one array, `TensionProblem.packed`; return its status, a status of `towline_status`.
 
         Parameters
         ----------
