@@ -11,6 +11,9 @@ import os
 import re
 
 CORE = "core"
+# The same bits on every processor: no multiplication and addition in one. A root is one instruction if it need not set
+# errno nor trap.
+FLAGS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi", "-g0"]
 EDITABLE = ".editable"
 
 # Where a link or a picture of Markdown or HTML leads: a path, neither an address nor a place on the same page.
@@ -68,8 +71,7 @@ def main() -> None:
         depends=sorted(str(path) for path in Path(CORE).glob("*/*.h")),
         include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
-        # The same bits on every processor: no multiplication and addition in one.
-        extra_compile_args=[] if sys.platform == "win32" else ["-O3", "-ffp-contract=off", "-g0"],
+        extra_compile_args=[] if sys.platform == "win32" else FLAGS,
         py_limited_api=True,
         optional=True,
     )

@@ -6,10 +6,10 @@ without the extension.
 
 from typing import Any
 
-__all__ = ["CABLES", "ROWS", "solve_packed", "solve_rows"]
+__all__ = ["CABLES", "MOST_CABLES", "MOST_CARRIERS", "ROWS", "lines", "required_wrench", "solve_packed", "solve_rows"]
 
 try:
-    from ._core import CABLES, ROWS, solve_packed, solve_rows
+    from ._core import CABLES, MOST_CABLES, MOST_CARRIERS, ROWS, lines, required_wrench, solve_packed, solve_rows
 except ImportError:
     ROWS = CABLES = 0
     UNSURE = 6  # of `codes`: the core has found neither tensions nor a proof
