@@ -1,0 +1,115 @@
+/*
+ * The step of a controller: the problem of tension distribution that it solves, the commands of flying carriers, and
+ * the stages of predictive control. No allocation, no globals; any numbers, also none, are taken.
+ */
+#ifndef TOWLINE_CONTROL_H
+#define TOWLINE_CONTROL_H
+
+#include <stddef.h>
+
+#include "control/controller.h"
+
+/*
+ * Motions are poses and velocities (12), the platform's first and then one for each carrier; orders to carriers are
+ * (c, 3, 6): pose, velocity and acceleration.
+ */
+typedef struct {
+    const double *measured;  /* (1 + c, 12), now */
+    const double *late;      /* the same when it was measured, which observers compare; NULL: now */
+    const double *reference; /* (18), pose, velocity and acceleration of the platform */
+    const double *t_ref;     /* (m), tensions to stay near [N] */
+    double *carriers;        /* (c, 3, 6), the reference, and what is ordered afterwards; NULL: they follow it */
+    towline_cable_memory *cables;
+    towline_platform_memory *platform;
+    towline_carrier_memory *carrier_memory; /* NULL if they follow their reference */
+    double *A;                              /* (6, m): the problem's wrench matrix, */
+    double *w;                              /* (6): wrench, */
+    double *low, *high;                     /* (m): and bounds of tensions */
+} towline_row;
+
+/*
+ * Update the memory of a row, and write the problem of this step, `dt` after the last one and `since` after the last
+ * state was measured [s]; both 0 in the first step, which starts the memory and has no bounds by rates.
+ *
+ * A row with a number that is not finite or beyond any sensor, or with a cable that has no line (no length, or an end
+ * inside its sheave), keeps its memory and gets a wrench of nan.
+ */
+void towline_write_problem(const towline_robot *robot, const towline_controller *controller, double dt, double since,
+                           towline_row row);
+
+/* What flying carriers are ordered, and what they are known to do. */
+typedef struct {
+    const double *measured; /* (1 + c, 12) */
+    const double *carriers; /* (c, 3, 6), how they should move */
+    const double *tensions; /* (m), commanded [N] */
+    const towline_cable_memory *cables;
+    const towline_platform_memory *platform;
+    towline_carrier_memory *memory;
+    double *actuation; /* (c, a), commands of the last step and then of this one; a: as many as any carrier has */
+} towline_flight;
+
+/* Write the commands of all actuators inside their limits; of a state that is none, those of before. */
+void towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
+                           towline_flight flight);
+
+/* Return how many actuators the carrier with the most has. */
+int towline_most_actuators(const towline_robot *robot);
+
+/*
+ * Move a measured motion (1 + c, 12) on by `dt` [s], `parts` times: the platform by its equations, with a disturbance
+ * (6) and tensions (m) that are `per` numbers apart from part to part; carriers by constant accelerations (c, 6).
+ */
+void towline_move_on(const towline_robot *robot, double dt, int parts, const double *disturbance,
+                     const double *tensions, ptrdiff_t per, const double *accelerations, double *motion);
+
+/* Coordinates of carriers that a predictive controller moves: some of their poses, or those that tethers leave. */
+typedef struct {
+    int freed;                  /* coordinates of poses, */
+    const int64_t *coordinates; /* (freed, 2): carrier and coordinate of each */
+    int tethered;               /* carriers */
+    const towline_tether *tethers;
+} towline_moved;
+
+/* How many coordinates those are. */
+int towline_moved_count(towline_moved moved);
+
+/* The rows of a matrix for each stage, with steps of so many numbers from stage to stage and from row to row. */
+typedef struct {
+    double *at;
+    ptrdiff_t stage, row;
+} towline_matrices;
+
+/* The dynamics of N stages, x' = A x + B u + c with n states and u controls. */
+typedef struct {
+    int count;           /* N */
+    const double *steps; /* (N), how long each stage lasts [s] */
+    towline_matrices A;  /* (n, n) */
+    towline_matrices B;  /* (n, u) */
+    towline_matrices c;  /* (n), its row is 1 */
+} towline_stages;
+
+/*
+ * Write the dynamics to first order about states (N + 1, n) and controls (N, u), with a disturbance (6) on the platform
+ * and carriers that move as (N + 1, c, 12) where they do not leave their reference; see stages.c.
+ */
+void towline_write_stages(const towline_robot *robot, towline_moved moved, const double *disturbance,
+                          const double *carriers, const double *states, const double *controls, towline_stages stages);
+
+/*
+ * Change tensions and moved places of a reference, states (N + 1, n) and controls (N + 1, u), so that the platform's
+ * rate obeys the dynamics of all stages; `efforts` (u) is what squares of changes cost, `length` [m] the robot's.
+ */
+void towline_aim(const towline_robot *robot, towline_stages stages, int moved, double length, const double *efforts,
+                 double *wanted, double *planned);
+
+/* Write the coordinates that tethers leave carriers as these move, (1 + c, 3, 6), and two derivatives: (3, f). */
+void towline_tethered_coordinates(const towline_robot *robot, towline_moved moved, const double *motions,
+                                  double *coordinates);
+
+/*
+ * Write how carriers move, (c, 3, 6), if the platform and the coordinates do as (3, 6 + f) says; attitudes are read, and
+ * stay.
+ */
+void towline_tethered_carriers(const towline_robot *robot, towline_moved moved, const double *motion, double *carriers);
+
+#endif

@@ -1,0 +1,19 @@
+/* What the files of core/control share; none of it is for users. */
+#ifndef TOWLINE_CONTROL_INTERNAL_H
+#define TOWLINE_CONTROL_INTERNAL_H
+
+#include "control/configuration.h"
+#include "control/control.h"
+
+/* heard.c: update what is known of all cables, and write the bounds of their tensions. */
+void towline_write_bounds(const towline_robot *robot, const towline_controller *controller, double dt,
+                          towline_cable_memory *cables, double *low, double *high);
+
+/* compensation.c: update how far carriers are off their reference to give a `missing` wrench (6), and order it. */
+void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,
+                        const configuration *at, const double *A, const double *missing, towline_row *row);
+
+/* Add the offsets of all carriers, and their rates, to the poses and velocities that are ordered. */
+void towline_add_offsets(const towline_robot *robot, towline_row *row);
+
+#endif

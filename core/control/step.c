@@ -1,0 +1,133 @@
+/*
+ * The problem of tension distribution that one step of a controller solves.
+ *
+ *     a* = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral           in the coordinates of the pose
+ *     w  = (m (a_c - g), R (J alpha + Omega x J Omega)) - d                 about the CoM
+ *     d  = K (p - p_0 - integral of (A t + m g + d))                        the estimated disturbance, p the momentum
+ *
+ * Carriers take part by their positions alone: what they do moves the anchors, not the platform.
+ */
+#include "control/internal.h"
+#include "control/observer.h"
+#include "control/usable.h"
+
+/* Update the estimated disturbance, by the momentum that A t + m g + d does not explain. */
+static void observe_platform(const towline_robot *robot, const towline_controller *controller, double since,
+                             const configuration *at, const double *velocity, const towline_row *row) {
+    double tensions[TOWLINE_MOST_CABLES], momentum[6], pull[6];
+    for (int i = 0; i < robot->cables; i++) {
+        tensions[i] = row->cables[i].known;
+    }
+    wrench_of(robot, row->A, tensions, pull);
+    momentum_of(robot, &at->platform, at->com, velocity, momentum);
+    for (int k = 0; k < 6; k++) {
+        const double weight = k < 3 ? robot->mass * robot->gravity[k] : 0;
+        double *estimate = &row->platform->disturbance[k];
+        observe(controller->observer, since, momentum[k], weight + pull[k], estimate, &row->platform->explained[k]);
+        *estimate *= robot->freedom[k];
+    }
+}
+
+/* Write the acceleration of the pose that is wanted. */
+static void wanted_acceleration(const towline_controller *controller, double dt, const towline_row *row, double *wanted) {
+    const double *reference = row->reference, *measured = row->measured;
+    towline_platform_memory *memory = row->platform;
+    for (int k = 0; k < 6; k++) {
+        const double error =
+            k < 3 ? reference[k] - measured[k] : turn_between(measured[k], reference[k]);
+        if (memory->integrates) {
+            memory->integral[k] += dt * error;
+        }
+        wanted[k] = reference[12 + k] + controller->kp[k] * error + controller->ki[k] * memory->integral[k] +
+                    controller->kd[k] * (reference[6 + k] - measured[6 + k]);
+    }
+}
+
+/*
+ * Write the wrench that the planned motion needs less the one of its tensions, or zeros where none are planned.
+ *
+ * It is what the plan knows of wind, and what the tensions of a plan that has none in their limits miss.
+ */
+static void planned_disturbance(const towline_robot *robot, const towline_row *row, double *missing) {
+    double motions[MOTION * (1 + TOWLINE_MOST_CARRIERS)], A[6 * TOWLINE_MOST_CABLES], given[6];
+    int planned = 0;
+    configuration at;
+    for (int i = 0; i < robot->cables; i++) {
+        planned |= row->t_ref[i] != 0;
+    }
+    memset(missing, 0, 6 * sizeof *missing);
+    if (!planned) {
+        return;
+    }
+    memcpy(motions, row->reference, MOTION * sizeof *motions);
+    for (int c = 0; c < robot->carriers; c++) {
+        memcpy(motions + MOTION * (1 + c), row->carriers + 18 * c, MOTION * sizeof *motions);
+    }
+    configuration_at(robot, motions, &at);
+    wrench_matrix(robot, &at, A);
+    wrench_of(robot, A, row->t_ref, given);
+    required_wrench(robot, row->reference, row->reference + 6, row->reference + 12, NULL, missing);
+    for (int k = 0; k < 6; k++) {
+        missing[k] -= given[k];
+    }
+}
+
+/* Order carriers to help the tensions. */
+static void move_carriers(const towline_robot *robot, const towline_controller *controller, double dt,
+                          const configuration *at, towline_row *row) {
+    double missing[6];
+    if (controller->corrects) {
+        double given[6];
+        wrench_of(robot, row->A, row->t_ref, given);
+        for (int k = 0; k < 6; k++) {
+            missing[k] = row->w[k] - given[k];
+        }
+    } else {
+        planned_disturbance(robot, row, missing);
+        for (int k = 0; k < 6; k++) {
+            missing[k] = robot->freedom[k] * (missing[k] - row->platform->disturbance[k]);
+        }
+    }
+    towline_compensate(robot, controller, dt, at, row->A, missing, row);
+}
+
+/* Write the wrench matrix of motions (1 + c, 12), and return whether it is one. */
+static int put(const towline_robot *robot, const double *motions, configuration *at, double *A) {
+    configuration_at(robot, motions, at);
+    wrench_matrix(robot, at, A);
+    return is_finite(A, robot->cables);
+}
+
+void towline_write_problem(const towline_robot *robot, const towline_controller *controller, double dt, double since,
+                           towline_row row) {
+    configuration at;
+    double wanted[6];
+    towline_write_bounds(robot, controller, dt, row.cables, row.low, row.high);
+    int usable = is_usable(robot, &row);
+    if (usable && row.late && (since > 0 || dt == 0)) {
+        usable = put(robot, row.late, &at, row.A);
+        if (usable) {
+            observe_platform(robot, controller, since, &at, row.late + 6, &row);
+        }
+    }
+    if (!usable || !put(robot, row.measured, &at, row.A)) {
+        for (int k = 0; k < 6; k++) {
+            row.w[k] = NAN;
+        }
+        if (controller->reacts) {
+            towline_add_offsets(robot, &row);
+        }
+        return;
+    }
+    wanted_acceleration(controller, dt, &row, wanted);
+    required_wrench(robot, row.measured, row.measured + 6, wanted, NULL, row.w);
+    if (!row.late) {
+        observe_platform(robot, controller, since, &at, row.measured + 6, &row);
+    }
+    for (int k = 0; k < 6; k++) {
+        row.w[k] = robot->freedom[k] * (row.w[k] - row.platform->disturbance[k]);
+    }
+    if (controller->reacts) {
+        move_carriers(robot, controller, dt, &at, &row);
+    }
+}

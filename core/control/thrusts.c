@@ -1,0 +1,178 @@
+/*
+ * What the actuators of flying carriers do, so that these go where they are ordered with their cables' pull.
+ *
+ *     F   = m (a + 2 k (v - v_q) + k^2 (p - p_q) - g) + sum of t u - d
+ *     tau = J (alpha + 2 h (Omega - Omega_q) + h^2 e) + Omega_q x J Omega_q - M
+ *
+ *     d   = K (m v_q - m v_0 - integral of (T + m g - sum of t u + d))
+ *
+ * F is the wanted thrust in {G}, T the one given, d the estimate of all other forces (air, a mass that is not as in the
+ * robot file), e the rotation from the thrust's axis to F and to the ordered yaw, M the moment of the cables about the
+ * CoM, k and h the bandwidths of position and attitude; q marks what is measured. Only the part of F along the thrust's
+ * axis is there at once; the rest comes when the carrier has turned. Source: T. Lee, M. Leok and N. H. McClamroch,
+ * "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
+ */
+#include "control/internal.h"
+#include "control/observer.h"
+#include "control/usable.h"
+
+static const double NO_FORCE = 1e-9; /* [N], and of a rotation [rad] */
+
+/* One carrier of a flight. */
+typedef struct {
+    const towline_robot *robot;
+    const towline_controller *controller;
+    const towline_body *body;
+    const configuration *at;
+    const double *motion, *order; /* (12) as measured, and (3, 6) as ordered */
+    double attitude;              /* bandwidth h */
+    int index;
+    towline_carrier_memory *memory;
+} flier;
+
+/* Add what the cables of a carrier, with tensions that are `per` numbers apart, do to it: force and moment in {G}. */
+static void add_pull(const flier *it, const double *tensions, ptrdiff_t per, double *force, double *moment) {
+    for (int i = 0; i < it->robot->cables; i++) {
+        if (it->robot->cable[i].carrier == it->index) {
+            const cable_run *run = &it->at->cable[i];
+            double turning[3];
+            cross(run->carrier_arm, run->pull, turning);
+            for (int k = 0; k < 3; k++) {
+                force[k] -= tensions[per * i] * run->pull[k];
+                moment[k] -= tensions[per * i] * turning[k];
+            }
+        }
+    }
+}
+
+/* Update the estimate of the force that thrust, weight and cables do not explain. */
+static void observe_carrier(const flier *it, double dt, const towline_cable_memory *cables, const double *given) {
+    const double mass = it->body->mass[0];
+    double thrust[3] = {0, 0, 0}, known[3], moment[3] = {0, 0, 0};
+    for (int a = 0; a < it->body->actuators; a++) {
+        for (int k = 0; k < 3; k++) {
+            thrust[k] += given[a] * it->body->actuator[a].wrench[k];
+        }
+    }
+    turn(it->at->carrier[it->index].R, thrust, known);
+    const ptrdiff_t per = sizeof(towline_cable_memory) / sizeof(double);
+    add_pull(it, &cables[0].known, per, known, moment);
+    for (int k = 0; k < 3; k++) {
+        known[k] += mass * it->robot->gravity[k];
+        observe(it->controller->observer, dt, mass * it->motion[6 + k], known[k], &it->memory->force[k],
+                &it->memory->explained[k]);
+    }
+}
+
+/* Write the thrust F that a carrier needs, in {G}, and the moment of its cables. */
+static void needed_force(const flier *it, const double *tensions, double *force, double *moment) {
+    const double mass = it->body->mass[0], place = it->controller->place;
+    const double *order = it->order, *motion = it->motion;
+    for (int k = 0; k < 3; k++) {
+        const double away = order[k] - motion[k], slower = order[6 + k] - motion[6 + k];
+        force[k] = mass * (order[12 + k] + place * (2 * slower + place * away)) - mass * it->robot->gravity[k] -
+                   it->memory->force[k];
+        moment[k] = 0;
+    }
+    double pull[3] = {0, 0, 0};
+    add_pull(it, tensions, 1, pull, moment);
+    for (int k = 0; k < 3; k++) {
+        force[k] -= pull[k];
+    }
+}
+
+/* Write e, in the carrier's axes: from the thrust's axis to F, beyond a right angle as far as at one, and to the yaw. */
+static void rotation_to(const flier *it, const double *force, double *e) {
+    const double *R = it->at->carrier[it->index].R;
+    const double axis[3] = {R[2], R[5], R[8]};
+    double from_axis[3];
+    cross(axis, force, from_axis);
+    const double size = fmax(sqrt(dot(force, force)), NO_FORCE);
+    double sine = 1;
+    if (dot(axis, force) < 0) {
+        sine = fmax(sqrt(dot(from_axis, from_axis)) / size, NO_FORCE);
+    }
+    for (int k = 0; k < 3; k++) {
+        from_axis[k] /= size * sine;
+    }
+    turn_back(R, from_axis, e);
+    e[2] += axis[2] * turn_between(it->motion[5], it->order[5]);
+}
+
+/* Write the force and the moment, in its own axes, that a carrier needs of its actuators. */
+static void wrench_of_carrier(const flier *it, const double *tensions, double *wrench) {
+    const attitude *at = &it->at->carrier[it->index];
+    const double axis[3] = {at->R[2], at->R[5], at->R[8]}, h = it->attitude, *inertia = it->body->inertia;
+    double force[3], pulled[3], e[3], wanted[3], bent[3], moment[3], spin[3], gyroscopic[3], turned[3];
+    double *ordered = it->memory->ordered, *rate = it->memory->turning;
+    needed_force(it, tensions, force, pulled);
+    rotation_to(it, force, e);
+    body_rate(at, it->order + 9, wanted);
+    body_rate(at, it->order + 15, bent);
+    body_rate(at, it->motion + 9, rate);
+    for (int k = 0; k < 3; k++) {
+        ordered[k] = h * (h * e[k] + 2 * (wanted[k] - rate[k])) + bent[k];
+    }
+    constant_times(inertia, ordered, moment);
+    constant_times(inertia, rate, spin);
+    cross(rate, spin, gyroscopic);
+    turn_back(at->R, pulled, turned);
+    for (int k = 0; k < 3; k++) {
+        wrench[k] = 0;
+        wrench[3 + k] = moment[k] + gyroscopic[k] - turned[k];
+    }
+    wrench[2] = dot(force, axis);
+}
+
+/* Write commands inside their limits, where they are numbers, and forget an order that is not followed. */
+static void command(const flier *it, const double *wrench, double *actuation) {
+    int followed = 1;
+    for (int a = 0; a < it->body->actuators; a++) {
+        const towline_actuator *limits = &it->body->actuator[a];
+        double wanted = 0;
+        for (int k = 0; k < 6; k++) {
+            wanted += it->controller->by_wrench[it->index][a][k] * wrench[k];
+        }
+        const double inside = wanted < limits->low ? limits->low : wanted > limits->high ? limits->high : wanted;
+        if (isfinite(inside)) {
+            actuation[a] = inside;
+        }
+        followed &= wanted == actuation[a];
+    }
+    for (int k = 0; k < 3 && !followed; k++) {
+        it->memory->ordered[k] = NAN;
+    }
+}
+
+void towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
+                           towline_flight flight) {
+    const int most = towline_most_actuators(robot);
+    const int measured = is_measured(robot, flight.measured, flight.cables);
+    configuration at;
+    configuration_at(robot, flight.measured, &at);
+    for (int c = 0; c < robot->carriers; c++) {
+        const towline_body *body = &robot->body[1 + c];
+        const double *motion = flight.measured + MOTION * (1 + c);
+        const flier it = {
+            robot, controller, body, &at, motion, flight.carriers + 18 * c, flight.platform->attitude, c,
+            &flight.memory[c],
+        };
+        double wrench[6], *actuation = flight.actuation + most * c;
+        if (body->actuators > 0) {
+            if (measured) {
+                observe_carrier(&it, dt, flight.cables, actuation);
+            }
+            wrench_of_carrier(&it, flight.tensions, wrench);
+            command(&it, wrench, actuation);
+        }
+    }
+}
+
+int towline_most_actuators(const towline_robot *robot) {
+    int most = 0;
+    for (int c = 0; c < robot->carriers; c++) {
+        const int own = robot->body[1 + c].actuators;
+        most = own > most ? own : most;
+    }
+    return most;
+}
