@@ -1,4 +1,4 @@
-/* The mechanics of many rows, eight at a time; included by rows_plain.c and its like. */
+/* The mechanics of many rows, some at a time; included by rows_plain.c and its like. */
 #include "numbers/lanes.h"
 /* These need `num`. */
 #include "mechanics/lines.h"

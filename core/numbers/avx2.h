@@ -7,3 +7,5 @@
 #pragma GCC target("avx2")
 #define FORM(name) name##_avx2
 #endif
+
+#define VECTOR_BYTES 32

@@ -7,3 +7,5 @@
 #pragma GCC target("avx512f,avx512dq,prefer-vector-width=512")
 #define FORM(name) name##_avx512
 #endif
+
+#define VECTOR_BYTES 64

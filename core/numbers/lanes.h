@@ -1,5 +1,5 @@
 /*
- * Numbers for eight problems at once: `num` is a vector of GCC and Clang with one lane for each of them, `mask` one
+ * Numbers for some problems at once: `num` is a vector of GCC and Clang with one lane for each of them, `mask` one
  * whose lanes have all bits set (yes) or none (no). Comparisons of two `num` give a mask.
  *
  * A file that uses lanes is compiled once for each kind of processor, by files such as rows_avx2.c: vectors are made
@@ -15,11 +15,16 @@
 
 #define INLINE static inline __attribute__((always_inline, unused))
 
+/* GCC keeps vectors that are larger than the processor's in memory; Clang makes registers of them, four in turn. */
+#ifdef __clang__
 enum { LANES = 8 };
+#else
+enum { LANES = VECTOR_BYTES / 8 };
+#endif
 
-typedef double num __attribute__((vector_size(64)));
-typedef int64_t mask __attribute__((vector_size(64)));
-typedef uint64_t bits __attribute__((vector_size(64)));
+typedef double num __attribute__((vector_size(8 * LANES)));
+typedef int64_t mask __attribute__((vector_size(8 * LANES)));
+typedef uint64_t bits __attribute__((vector_size(8 * LANES)));
 
 INLINE num number(double x) { return x - (num){0}; }
 

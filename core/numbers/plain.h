@@ -2,3 +2,5 @@
 #include "numbers/processor.h"
 
 #define FORM(name) name##_plain
+
+#define VECTOR_BYTES 16
