@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ..core import CABLES, ROWS, solve_rows
 from .batch import solve_batch
-from .kernels.codes import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 from .problem import TensionProblem
 from .solve import solve
+from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
 __all__ = ["InPlace"]
 
@@ -62,8 +62,8 @@ class InPlace:
         _, n, m = self.A.shape
         per = np.array([n * m, n, m, m, m, 0, 0], dtype=float)  # one length and equal weights for all rows
         given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), self._lengths, per)
-        self._exact = (n, m, 0.0, *given, self.tensions, self.direction, self._info, self._residual, self.code)
-        self._soft = (n, m, RHO, *given, self.tensions, *self._spare, self._residual, self.code)
+        self._exact = (n, m, 0.0, False, *given, self.tensions, self.direction, self._info, self._residual, self.code)
+        self._soft = (n, m, RHO, False, *given, self.tensions, *self._spare, self._residual, self.code)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and pickles hold: without the arguments of the core, parts of arrays no longer."""

@@ -11,14 +11,13 @@ from ..base.inputs import shown
 from ..core import CABLES, ROWS, solve_packed
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
-from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR, UNSURE
 from .methods import METHODS
 from .methods.active_set import ActiveSet
 from .methods.method import Method, Proposal
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
 from .standard_form import StandardForm, standard_forms
-from .status import STATUSES
+from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES, UNSURE
 from .verify import verify
 
 __all__ = ["methods", "solve"]
