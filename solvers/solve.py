@@ -67,7 +67,7 @@ def solve(
             return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
     chosen, backend = _look_up(method, backend, options)
     chosen = chosen.for_options(problem, options)
-    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core is not there, or was not sure
+    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core does not take this size, or was not sure
 
     left, exact, forms = problem, None, list[StandardForm]()
     while True:
