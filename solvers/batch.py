@@ -138,10 +138,10 @@ def solve_batch(
     Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. A row whose numbers are no problem
     (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved.
 
-    The C core solves some rows at a time, in the lanes of the processor's vectors, and those of which lanes are not sure
-    one by one. `solve` takes the rows of which the core is not sure either: they lie near the boundary of the available
-    wrench set or of the rank cut. Statuses are those of `solve`, and so are tensions but for rounding. Neither the other
-    rows, nor their number, nor that of threads changes a bit of a row's result.
+    The C core solves some rows at a time, in the lanes of the processor's vectors, and those of which lanes are not
+    sure one by one. `solve` takes the rows of which the core is not sure either: they lie near the boundary of the
+    available wrench set or of the rank cut. Statuses are those of `solve`, and so are tensions but for rounding.
+    Neither the other rows, nor their number, nor that of threads changes a bit of a row's result.
 
     The core takes up to 6 wrench rows and 32 cables. `solve` takes all rows of larger problems, some 0.2 ms each.
 
@@ -203,7 +203,7 @@ def solve_batch(
     rows, backend = _Rows.unsolved(int(np.prod(lead, dtype=np.int64)), n, m), _backend(backend, n, m)
     if backend != BEYOND_THE_CORE:
         columns = [
-            _column(value, core[name], rows.status.size, lead) if weights is not None or name != "weights" else (NONE, 0)
+            (NONE, 0) if name == "weights" and weights is None else _column(value, core[name], rows.status.size, lead)
             for name, value in given.items()
         ]
         _solve_by_core(rows, columns, backend == LANES, rho or 0.0, threads)
@@ -234,8 +234,8 @@ class _Rows(NamedTuple):
 
     @classmethod
     def unsolved(cls, rows: int, n: int, m: int) -> Self:
-        sizes = ((rows, m), (rows, n), (rows, 2), rows)
-        return cls(*(np.empty(size) for size in sizes), np.full(rows, float(UNSURE)))
+        status = np.full(rows, float(UNSURE))
+        return cls(np.empty((rows, m)), np.empty((rows, n)), np.empty((rows, 2)), np.empty(rows), status)
 
 
 def _column(value: Array, core: int, rows: int, lead: tuple[int, ...]) -> tuple[Array, int]:

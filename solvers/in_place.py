@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 RHO = 1e8  # weight of the squared wrench error in a soft answer, beside the squared tensions
 
 # With up to so many more cables than equations lanes are as quick for one row and several times as quick for many. With
-# more, one row takes 1.5 times as long. A row has the same bits alone and among others, so that the shape decides alone.
+# more, one row takes 1.5 times as long. A row has the same bits alone and among others: the shape alone decides.
 IN_LANES = 2
 
 

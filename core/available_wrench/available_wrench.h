@@ -17,15 +17,16 @@ typedef struct {
 ptrdiff_t towline_facets_of(int n, int m);
 
 /*
- * Compute these normals, count x facets x n, of length one, each orthogonal to a subset of n - 1 columns in lexicographic
- * order, and the least and the most that tensions inside low and high (m) give along them, count x facets.
+ * Compute these normals, count x facets x n, of length one, each orthogonal to a subset of n - 1 columns in
+ * lexicographic order, and the least and the most that tensions inside low and high (m) give along them,
+ * count x facets.
  */
 void towline_facets(const towline_matrices *matrices, const double *low, const double *high, double *normals,
                     double *least, double *most);
 
 /*
- * Find whether each matrix has n independent columns, by QR with column pivoting, 1 or 0: a column counts as dependent if
- * less than `tolerance` of the longest one is left of it.
+ * Find whether each matrix has n independent columns, by QR with column pivoting, 1 or 0: a column counts as dependent
+ * if less than `tolerance` of the longest one is left of it.
  */
 void towline_full_rank(const towline_matrices *matrices, double tolerance, double *full);
 

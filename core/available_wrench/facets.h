@@ -5,7 +5,7 @@
 #include "available_wrench/available_wrench.h"
 #include "numbers/processor.h"
 
-#define FACETS_OF_ROWS(form)                                                                                \
+#define FACETS_OF_ROWS(form)                                                                            \
     void facets_of_rows_##form(const towline_matrices *matrices, const double *low, const double *high, \
                                double *normals, double *least, double *most)
 

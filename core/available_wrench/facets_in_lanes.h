@@ -2,8 +2,8 @@
  * Normals of facets and what tensions give along them; included by facets_plain.c and its like after `num`.
  *
  * Each normal is orthogonal to n - 1 columns. The subsets come in lexicographic order, so that one shares its first
- * columns with the one before: an orthonormal basis of what is orthogonal to them is kept for every number of columns, and
- * a Householder reflection takes the next column out of it.
+ * columns with the one before: an orthonormal basis of what is orthogonal to them is kept for every number of columns,
+ * and a Householder reflection takes the next column out of it.
  */
 #include "available_wrench/facets.h"
 
@@ -12,7 +12,7 @@ enum { ROWS = TOWLINE_ROWS, CABLES = TOWLINE_CABLES };
 typedef struct {
     int n, m;
     num A[ROWS * CABLES];
-    num per_length[CABLES];        /* of columns: a short one decides as much as a long one where its facet is */
+    num per_length[CABLES];       /* of columns: a short one decides as much as a long one where its facet is */
     num basis[ROWS][ROWS * ROWS]; /* by number of columns taken out: vectors, row by row */
 } wrench_sets;
 
@@ -87,7 +87,7 @@ INLINE void put(double *to, const num *from, int lanes, ptrdiff_t per, int size)
     }
 }
 
-/* Find the next subset of `size` columns; return the first of its places that has another one, or -1 after the last. */
+/* Find the next subset of `size` columns; return the first place that has another one, or -1 after the last. */
 INLINE int next_subset(int *columns, int size, int m) {
     int place = size - 1;
     while (place >= 0 && columns[place] == m - size + place) {

@@ -1,10 +1,11 @@
 /*
- * Tension distribution of many problems of one shape: eight at a time in lanes, and one after another where lanes are
- * in doubt. Statuses are those of `towline_solve`.
+ * Tension distribution of many problems of one shape: some at a time in lanes (numbers/lanes.h), and one after another
+ * where lanes are in doubt. Statuses are those of `towline_solve`.
  *
- * A lane takes methods that need no branches: one slab after another for m - n of 0, 1 or 2 (slabs.h), Newton's method
- * on the dual for other numbers of cables and for soft answers (newton.h). Where rounding might decide, or a matrix needs
- * pivoting or lacks a rank, the row stays unsure, and the solver of one problem takes it.
+ * Lanes take methods that need no branches: one slab after another for m - n of 0, 1 or 2 (slabs.h), Newton's method
+ * on the dual for other numbers of cables and for soft answers (newton.h). Where rounding might decide, or a matrix
+ * needs pivoting or lacks a rank, the row stays unsure, and the solver of one problem takes it. Neither the rows beside
+ * it nor the number of lanes changes a bit of a row's result.
  */
 #ifndef TOWLINE_BATCH_H
 #define TOWLINE_BATCH_H

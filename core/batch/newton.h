@@ -5,28 +5,31 @@
  *
  *     r(y) = b - B s(y) - y / rho = 0,
  *
- * the gradient of a concave, piecewise quadratic function (1 / rho is 0 where the wrench must be met). Newton's steps with
- * H = B_F B_F^T + 1 / rho, F the cables between their limits, end after as many as it takes to find F: three, most often.
- * A step that goes too far is shortened to the best place on its way, by Newton again, in one dimension. Where the wrench
- * is out of reach the dual has no maximum, and y, the step or r are soon directions that prove it. Whatever is not decided
- * in a few steps, or rests on a pivot that is nearly zero, is left to the solver of one problem.
+ * the gradient of a concave, piecewise quadratic function (1 / rho is 0 where the wrench must be met). Newton's steps
+ * with H = B_F B_F^T + 1 / rho, F the cables between their limits, end after as many as it takes to find F: three, most
+ * often. A step that goes too far is shortened to the best place on its way, by Newton again, in one dimension. Where
+ * the wrench is out of reach the dual has no maximum, and y, the step or r are soon directions that prove it. Whatever
+ * is not decided in a few steps, or rests on a pivot that is nearly zero, is left to the solver of one problem.
+ *
+ * Soft answers to wrenches that are out of reach are most of what is left: y is as large as what is missing times rho,
+ * and B^T y has no digits left for the cables between their limits.
  */
 #ifndef TOWLINE_BATCH_NEWTON_H
 #define TOWLINE_BATCH_NEWTON_H
 
 #include "batch/proof.h"
 
-#define STEPS 4      /* two or three find the free cables of nearly all that have tensions */
-#define ON_THE_WAY 4       /* steps of the search along a step */
-#define MET 3e-14          /* wrench error that is rounding, relative to the terms that it is the sum of */
-#define DAMPING 1e-12      /* relative to the mean of H's diagonal */
-#define SMALL_IN_H 1e-8    /* of a pivot or an eigenvalue, relative to the same */
-#define PROMISING 1e-9     /* gap of the dual, relative to the demand, from which a direction is worth a proof */
-#define CLIMBS 1e-12       /* slope along a step that is rounding, relative to that at its start */
+#define STEPS 4         /* two or three find the free cables of nearly all that have tensions */
+#define ON_THE_WAY 4    /* steps of the search along a step */
+#define MET 3e-14       /* wrench error that is rounding, relative to the terms that it is the sum of */
+#define DAMPING 1e-12   /* relative to the mean of H's diagonal */
+#define SMALL_IN_H 1e-8 /* of a pivot or an eigenvalue, relative to the same */
+#define PROMISING 1e-9  /* gap of the dual, relative to the demand, from which a direction is worth a proof */
+#define CLIMBS 1e-12    /* slope along a step that is rounding, relative to that at its start */
 
 typedef struct {
-    double soft;                     /* 1 / rho */
-    num size, damping;               /* mean of H's diagonal, and what is added to it */
+    double soft;       /* 1 / rho */
+    num size, damping; /* mean of H's diagonal, and what is added to it */
     num y[ROWS], step[ROWS], r[ROWS];
     num pull[CABLES], change[CABLES]; /* B^T y, and B^T step */
     num free[CABLES];                 /* one where a cable is between its limits */
@@ -201,7 +204,7 @@ INLINE num length_of_step(const newton *f, const demands *p, const matrices *M) 
     return length;
 }
 
-/* Begin at the multipliers of the least norm without limits. Where H lacks a rank "infeasible" may be wrong: stop there. */
+/* Begin at the multipliers of the least norm without limits. Where H lacks a rank "infeasible" may be wrong: stop. */
 INLINE num begin(newton *f, const demands *p, const matrices *M) {
     for (int c = 0; c < M->m; c++) {
         f->free[c] = number(1);
@@ -245,7 +248,7 @@ INLINE void prove_out_of_reach(newton *f, demands *p, const matrices *M, int ste
     }
 }
 
-/* Take steps at s; whatever these do not decide is in doubt. */
+/* Find s in a few steps; where they do not decide, the lane is in doubt. */
 INLINE void solve_by_newton(demands *p, const matrices *M, double soft) {
     newton f = {.soft = soft, .going = p->good};
     for (int i = 0; i < M->n * M->m; i++) {

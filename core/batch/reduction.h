@@ -1,6 +1,6 @@
 /*
- * B = [L 0] Q in lanes, as in reduction.c but without pivoting: a matrix that would need it, or lacks a rank, is left to
- * the solver of one problem.
+ * B = [L 0] Q in lanes, as in reduction.c but without pivoting: a matrix that would need it, or lacks a rank, is left
+ * to the solver of one problem.
  */
 #ifndef TOWLINE_BATCH_REDUCTION_H
 #define TOWLINE_BATCH_REDUCTION_H

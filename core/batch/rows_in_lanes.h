@@ -1,4 +1,4 @@
-/* The rows of a batch, eight at a time; included by rows_plain.c and its like. */
+/* The rows of a batch, some at a time in lanes; included by rows_plain.c and its like. */
 #include "batch/newton.h"
 #include "batch/rows.h"
 #include "batch/slabs.h"

@@ -26,8 +26,8 @@ typedef struct {
 /* The edge of a slab: z = base + x along. */
 typedef struct {
     mask moves, below;
-    num a[2];   /* the normal of the slab, and its square */
-    num square; /* one where nothing moves the slab's s */
+    num a[2];   /* the normal of the slab, */
+    num square; /* and its square; one where nothing moves the slab's s */
     num base[2], along[2];
 } edge;
 
@@ -39,7 +39,9 @@ typedef struct {
     num dot;   /* of both normals */
 } cut;
 
-INLINE num times_normal(const matrices *M, int i, const num *z) { return M->normal[0][i] * z[0] + M->normal[1][i] * z[1]; }
+INLINE num times_normal(const matrices *M, int i, const num *z) {
+    return M->normal[0][i] * z[0] + M->normal[1][i] * z[1];
+}
 
 INLINE void take_cut(cut *end, mask chosen, cut other) {
     end->x = where(chosen, other.x, end->x);
@@ -76,7 +78,8 @@ INLINE void cut_point(optimum *o, const demands *p, const matrices *M, const edg
 }
 
 /* Set the multipliers of slab i and the two that leave nothing of its edge such that their pulls cancel. */
-INLINE void exclude(optimum *o, const matrices *M, const edge *e, int i, mask empty, const cut *start, const cut *stop) {
+INLINE void exclude(optimum *o, const matrices *M, const edge *e, int i, mask empty, const cut *start,
+                    const cut *stop) {
     const num f = where(start->slope > 0.0, -magnitude(stop->slope), magnitude(stop->slope));
     const num g = where(stop->slope > 0.0, magnitude(start->slope), -magnitude(start->slope));
     num toward = number(0);

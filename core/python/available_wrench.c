@@ -35,8 +35,8 @@ PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssi
     int fits = matrices_of(&given, A, n, m, &matrices);
     if (fits) {
         const Py_ssize_t facets = matrices.count * towline_facets_of((int)n, (int)m);
-        fits = given.size[HIGH] == m && given.size[NORMALS] == facets * n && rows == facets &&
-               given.size[MOST_] == facets;
+        fits =
+            given.size[HIGH] == m && given.size[NORMALS] == facets * n && rows == facets && given.size[MOST_] == facets;
     }
     if (fits) {
         Py_BEGIN_ALLOW_THREADS;
