@@ -4,6 +4,28 @@ Its functions work on the memory of arrays; what they take is in `_core.pyi` and
 call them with arrays that they have checked.
 """
 
-from ._core import CABLES, MOST_CABLES, MOST_CARRIERS, ROWS, lines, required_wrench, solve_packed, solve_rows
+from ._core import (
+    CABLES,
+    MOST_CABLES,
+    MOST_CARRIERS,
+    ROWS,
+    facets,
+    full_rank,
+    lines,
+    required_wrench,
+    solve_packed,
+    solve_rows,
+)
 
-__all__ = ["CABLES", "MOST_CABLES", "MOST_CARRIERS", "ROWS", "lines", "required_wrench", "solve_packed", "solve_rows"]
+__all__ = [
+    "CABLES",
+    "MOST_CABLES",
+    "MOST_CARRIERS",
+    "ROWS",
+    "facets",
+    "full_rank",
+    "lines",
+    "required_wrench",
+    "solve_packed",
+    "solve_rows",
+]

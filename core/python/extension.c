@@ -12,8 +12,14 @@ static PyMethodDef functions[] = {
      "solve_packed(packed, tensions, direction=None)\n--\n\n"
      "Solve a packed problem; return its status and fill tensions (m,) if optimal, direction (n,) if out of reach."},
     {"solve_rows", (PyCFunction)(void (*)(void))towline_py_solve_rows, METH_FASTCALL,
-     "solve_rows(n, m, rho, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, residual, "
-     "status)\n--\n\nSolve the rows of a batch whose status is UNSURE; return how many of all are optimal."},
+     "solve_rows(n, m, rho, in_lanes, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, "
+     "residual, status)\n--\n\nSolve the rows of a batch whose status is UNSURE; return how many of all are optimal."},
+    {"facets", (PyCFunction)(void (*)(void))towline_py_facets, METH_FASTCALL,
+     "facets(A, low, high, normals, least, most)\n--\n\n"
+     "Compute normals orthogonal to n - 1 columns, and the least and the most that tensions give along them."},
+    {"full_rank", (PyCFunction)(void (*)(void))towline_py_full_rank, METH_FASTCALL,
+     "full_rank(n, tolerance, A, full)\n--\n\n"
+     "Find whether matrices of n rows have n independent columns, 1 or 0."},
     {"lines", (PyCFunction)(void (*)(void))towline_py_lines, METH_FASTCALL,
      "lines(robot, poses, carriers, lengths, A, J, anchors, sensitivity)\n--\n\n"
      "Compute the lines of the cables at each pose, of those results that are not None; carriers has as many rows or one."},

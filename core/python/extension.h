@@ -8,6 +8,10 @@
 PyObject *towline_py_solve_packed(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* available_wrench.c */
+PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 /* mechanics.c */
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
