@@ -12,4 +12,9 @@ PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* horizon.c */
+PyObject *towline_py_horizon_size(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 #endif
