@@ -81,6 +81,7 @@ static double central_step(const towline_horizon *h, double length, double pairs
 }
 
 static void move(const towline_horizon *h, double length) {
+    horizon_write_costates(h);
     double *restrict at = h->at.z;
     const double *step = h->step.z;
     for (int i = 0; i < h->size; i++) {

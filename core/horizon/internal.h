@@ -87,8 +87,11 @@ void horizon_expand(const towline_horizon *h);
 /* Write matrices of the cost to go and factors of all stages; slacks and multipliers are weights of controls. */
 void horizon_factorise(const towline_horizon *h);
 
-/* Write the step of controls, states and multipliers of the dynamics for `reduced` and `gap`. */
+/* Write the step of controls and states for `reduced` and `gap`, which is that of the last call if `same_gap`. */
 void horizon_substitute(const towline_horizon *h, int same_gap);
+
+/* Write the step of the multipliers of the dynamics that belongs to that of the states. */
+void horizon_write_costates(const towline_horizon *h);
 
 /* Write -inv(U_uu) v for a stage; the vector is overwritten. */
 void horizon_solve_upper(const towline_horizon *h, int k, double *v, double *out);

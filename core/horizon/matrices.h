@@ -41,6 +41,8 @@ typedef struct {
      * U = [U_uu U_ux] it is U' U + [[0, 0], [0, rest]]. Inverses of the diagonal of U_uu are written beside.
      */
     void (*factorise)(matrix U, double *inverse, matrix symmetric);
+    /* zeta = inv(U_uu') v_u, and what is left of the rest of v is v_x - U_ux' zeta; v_u is overwritten. */
+    void (*solve_lower)(double *v, double *zeta, matrix U, const double *inverse);
 } towline_algebra;
 
 /* A pivot below this part of what it was before elimination has no digits left: it becomes TOWLINE_HUGE. */

@@ -72,27 +72,37 @@ static void FORM(multiply)(const product *of) {
     }
 }
 
-/* Four sums of a row times a vector, of which the first is that of columns 0, 4, 8, ... */
-INLINE double dot_by_fours(const double *row, const double *v, int count) {
-    columns sum[PARTS];
+/* Add a few rows times a vector, each in four sums, of which the first is that of columns 0, 4, 8, ... */
+INLINE void add_dots(double *out, matrix x, const double *v, const int rows) {
+    columns sum[ROWS][PARTS];
     double four[FOUR];
-    for (int part = 0; part < PARTS; part++) {
-        sum[part] = all(0);
-    }
-    for (int i = 0; i < count; i += FOUR) {
+    for (int r = 0; r < rows; r++) {
         for (int part = 0; part < PARTS; part++) {
-            sum[part] += load(row + i + WIDTH * part) * load(v + i + WIDTH * part);
+            sum[r][part] = all(0);
         }
     }
-    for (int part = 0; part < PARTS; part++) {
-        store(four + WIDTH * part, sum[part]);
+    for (int i = 0; i < x.columns; i += FOUR) {
+        for (int part = 0; part < PARTS; part++) {
+            const int at = i + WIDTH * part;
+            for (int r = 0; r < rows; r++) {
+                sum[r][part] += load(entry(x, r, at)) * load(v + at);
+            }
+        }
     }
-    return (four[0] + four[2]) + (four[1] + four[3]);
+    for (int r = 0; r < rows; r++) {
+        for (int part = 0; part < PARTS; part++) {
+            store(four + WIDTH * part, sum[r][part]);
+        }
+        out[r] += (four[0] + four[2]) + (four[1] + four[3]);
+    }
 }
 
 static void FORM(add_product)(double *out, matrix x, const double *v) {
-    for (int i = 0; i < x.rows; i++) {
-        out[i] += dot_by_fours(row_of(x, i), v, x.columns);
+    for (; x.rows >= ROWS; x.rows -= ROWS, x.at += ROWS * x.step, out += ROWS) {
+        add_dots(out, x, v, ROWS);
+    }
+    for (; x.rows > 0; x.rows--, x.at += x.step, out++) {
+        add_dots(out, x, v, 1);
     }
 }
 
@@ -161,9 +171,15 @@ static void FORM(factorise)(matrix U, double *inverse, matrix symmetric) {
     }
 }
 
+static void FORM(solve_lower)(double *v, double *zeta, matrix U, const double *inverse) {
+    for (int i = 0; i < U.rows; i++) {
+        zeta[i] = v[i] * inverse[i];
+        for (int j = i - i % FOUR; j < U.columns; j += WIDTH) {
+            store(v + j, load(v + j) - zeta[i] * load(entry(U, i, j)));
+        }
+    }
+}
+
 const towline_algebra FORM(towline_algebra) = {
-    FORM(multiply),
-    FORM(add_product),
-    FORM(add_transposed_product),
-    FORM(factorise),
+    FORM(multiply), FORM(add_product), FORM(add_transposed_product), FORM(factorise), FORM(solve_lower),
 };

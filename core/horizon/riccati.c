@@ -102,12 +102,7 @@ static void backward(const towline_horizon *h, int same_gap) {
             v[i] = P_gap[i] + h->P_vector[(k + 1) * h->np + i];
         }
         h->algebra->add_transposed_product(gradient, dynamics_of(h, k, width), v);
-        for (int i = 0; i < m; i++) {
-            const double zeta = h->zeta[k * h->mp + i] = gradient[i] * h->inverse[k * h->mp + i];
-            for (int j = i + 1; j < width; j++) {
-                gradient[j] -= zeta * *entry(U, i, j);
-            }
-        }
+        h->algebra->solve_lower(gradient, h->zeta + k * h->mp, U, h->inverse + k * h->mp);
         copy(h->P_vector + k * h->np, gradient + m, n);
     }
 }
@@ -118,7 +113,7 @@ static void forward(const towline_horizon *h) {
     double *v = h->work;
     set(h->step.z, h->w, 0);
     for (int k = 0; k < h->N; k++) {
-        double *z = h->step.z + k * h->wp, *x = z + h->wp + m, *y = h->step.y + (k + 1) * h->wp + m;
+        double *z = h->step.z + k * h->wp, *x = z + h->wp + m;
         copy(v, h->zeta + k * h->mp, m);
         set(z, m, 0);
         if (k > 0) {
@@ -127,14 +122,21 @@ static void forward(const towline_horizon *h) {
         horizon_solve_upper(h, k, v, z);
         copy(x, h->gap + (k + 1) * h->np, n);
         h->algebra->add_product(x, dynamics_of(h, k, h->w), z);
-        copy(v, x, n);
-        set(v + n, h->np - n, 0);
-        copy(y, h->P_vector + (k + 1) * h->np, n);
-        h->algebra->add_product(y, cost_to_go(h, k + 1), v);
     }
 }
 
 void horizon_substitute(const towline_horizon *h, int same_gap) {
     backward(h, same_gap);
     forward(h);
+}
+
+void horizon_write_costates(const towline_horizon *h) {
+    double *v = h->work;
+    set(v + h->n, h->np - h->n, 0);
+    for (int k = 1; k <= h->N; k++) {
+        double *y = h->step.y + k * h->wp + h->m;
+        copy(v, h->step.z + k * h->wp + h->m, h->n);
+        copy(y, h->P_vector + k * h->np, h->n);
+        h->algebra->add_product(y, cost_to_go(h, k), v);
+    }
 }

@@ -205,6 +205,7 @@ void horizon_begin_cold(const towline_horizon *h) {
     horizon_factorise(h);
     horizon_reduce(h);
     horizon_substitute(h, 0);
+    horizon_write_costates(h);
     for (int i = 0; i < 2 * (h->N + 1) * h->wp; i++) {
         h->at.z[i] += h->step.z[i];
     }
