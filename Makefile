@@ -6,7 +6,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
 # What the extension is built from.
-CORE := setup.py $(wildcard core/*/*.[ch])
+CORE := setup.py $(wildcard core/*.h core/*/*.[ch] core/packaging/*.py)
 
 .PHONY: demo test setup lint types kernels unit docs lowest newest errata pictures clean
 

@@ -79,7 +79,7 @@ def main() -> None:
     core = Extension(
         "towline.core._core",
         sorted(str(path) for path in Path(CORE).glob("*/*.c")),
-        depends=sorted(str(path) for path in Path(CORE).glob("*/*.h")),
+        depends=sorted(str(path) for path in Path(CORE).rglob("*.h")),
         include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
         extra_compile_args=[] if sys.platform == "win32" else FLAGS,
