@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..base.display import Displayed, record
 from ..base.errors import InputError
 from ..base.inputs import shown, whole_number
-from ..core import PROCESSOR, horizon_places, horizon_size, horizon_solve
+from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
 
 __all__ = ["Horizon", "Multipliers", "Residuals"]
 
@@ -80,8 +80,8 @@ class Horizon(Displayed):
     $C_k x_k + D_k u_k \le d_k + s_k$, $s_k \ge 0$. It is feasible for any data.
 
     A predictive controller solves such a problem at each step. All arrays are parts of the memory on which the core
-    works (`core/horizon`): nothing is copied, allocated or checked. Where a number is not finite or the cost is not convex, the
-    controls are still finite and inside their bounds, and the solution is not converged.
+    works (`core/horizon`): nothing is copied, allocated or checked. Where a number is not finite or the cost is not
+    convex, the controls are still finite and inside their bounds, and the solution is not converged.
 
     Parameters
     ----------
@@ -153,6 +153,29 @@ class Horizon(Displayed):
         """Copy and pickle the memory, whose parts the arrays are."""
         solved = self._residuals.copy(), self._count, self._converged
         return _restored, (self._sizes, self._memory.copy(), *solved, self.tolerance, self.iterations_max)
+
+    def relative_to(self, states: Array, controls: Array) -> None:
+        """Write the same problem in differences from a reference.
+
+        Start, dynamics, bounds and soft rows change, and the states and controls that a solve may begin with; costs are
+        those of differences already. Small differences are no longer lost in the rounding of large numbers.
+
+        Parameters
+        ----------
+        states, controls :
+            Of the reference, shapes (N + 1, n) and (N, m).
+
+        Raises
+        ------
+        InputError
+            If an array has another shape.
+        """
+        N, n, m, _ = self._sizes
+        for name, value, shape in (("states", states, (N + 1, n)), ("controls", controls, (N, m))):
+            if np.shape(value) != shape:
+                raise InputError(f"{name} must have shape {shape}, got {shown(value)}")
+        given = np.ascontiguousarray(states, dtype=float), np.ascontiguousarray(controls, dtype=float)
+        horizon_relative_to(*self._sizes, PROCESSOR, self._memory, *given)
 
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
         """Solve the problem in the arrays, and return whether the solution converged.

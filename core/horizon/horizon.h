@@ -46,37 +46,37 @@ typedef struct {
     int size;           /* of an iterate */
     const towline_algebra *algebra;
     /* The problem. */
-    double *H;                     /* (N + 1, w, wp): [[R, S], [S', Q]], at the end Q alone; S' is written by a solve */
-    double *h;                     /* (N + 1, wp): (r, q) */
-    double *G;                     /* (N, n, wp): [B, A] */
-    double *c;                     /* (N, np) */
-    double *start;                 /* (np): the state of stage 0 */
-    double *u_min, *u_max;         /* (N, mp) */
-    double *E;                     /* (N, p, wp): [D, C] */
-    double *d, *penalty, *square;  /* (N, pp) */
-    towline_iterate at;            /* the iterate, and in the end the solution */
-    towline_iterate step, best;    /* its change, and the best one so far */
+    double *H;                    /* (N + 1, w, wp): [[R, S], [S', Q]], at the end Q alone; S' is written by a solve */
+    double *h;                    /* (N + 1, wp): (r, q) */
+    double *G;                    /* (N, n, wp): [B, A] */
+    double *c;                    /* (N, np) */
+    double *start;                /* (np): the state of stage 0 */
+    double *u_min, *u_max;        /* (N, mp) */
+    double *E;                    /* (N, p, wp): [D, C] */
+    double *d, *penalty, *square; /* (N, pp) */
+    towline_iterate at;           /* the iterate, and in the end the solution */
+    towline_iterate step, best;   /* its change, and the best one so far */
     /* What does not change during a solve. */
-    towline_limits exists;         /* 1 where there is such a limit, else 0 */
-    double *low, *high;            /* (N, mp): u_min and u_max but for fixed controls, which have no limits */
-    double *moves;                 /* (N, mp): 0 for fixed controls, else 1 */
-    double *range, *curvature;     /* (mp): largest of u_max - u_min, and of the cost by a control and by what it moves */
+    towline_limits exists;     /* 1 where there is such a limit, else 0 */
+    double *low, *high;        /* (N, mp): u_min and u_max but for fixed controls, which have no limits */
+    double *moves;             /* (N, mp): 0 for fixed controls, else 1 */
+    double *range, *curvature; /* (mp): largest of u_max - u_min, and of the cost by a control and by what it moves */
     /* Conditions of optimality at the iterate. */
-    double *gradient;              /* (N + 1, wp): of the Lagrangian, for the variables that can change */
-    double *holding;               /* (N, mp): the same for controls, fixed ones too */
-    double *gap;                   /* (N + 1, np): of the dynamics that end in x */
-    double *value;                 /* (N, pp): E z - d */
+    double *gradient; /* (N + 1, wp): of the Lagrangian, for the variables that can change */
+    double *holding;  /* (N, mp): the same for controls, fixed ones too */
+    double *gap;      /* (N + 1, np): of the dynamics that end in x */
+    double *value;    /* (N, pp): E z - d */
     towline_extremes worst, scale;
     /* The linear system. */
-    double *off;                   /* (N, pp): value - excess + slack */
-    towline_limits product;        /* what slack times multiplier is to change by */
-    double *reduced;               /* (N + 1, wp): the gradient after slacks and multipliers are eliminated */
-    double *steep, *shift;         /* (N, pp): weights of soft rows after that, and what is added to weight times row */
-    double *U, *inverse;           /* (N, m, wp) and (N, mp): the first rows of the Cholesky factor, see matrices.h */
-    double *P, *P_gap, *P_vector;  /* cost to go: (N + 1, n, np), times the gap (N + 1, np), and linear (N + 1, np) */
-    double *zeta;                  /* (N, mp): what is left for the controls to do */
-    double *T, *M, *EW;            /* (n, wp), (w, wp), (p, wp) */
-    double *work;                  /* (4 wp + pp) */
+    double *off;                  /* (N, pp): value - excess + slack */
+    towline_limits product;       /* what slack times multiplier is to change by */
+    double *reduced;              /* (N + 1, wp): the gradient after slacks and multipliers are eliminated */
+    double *steep, *shift;        /* (N, pp): weights of soft rows after that, and what is added to weight times row */
+    double *U, *inverse;          /* (N, m, wp) and (N, mp): the first rows of the Cholesky factor, see matrices.h */
+    double *P, *P_gap, *P_vector; /* cost to go: (N + 1, n, np), times the gap (N + 1, np), and linear (N + 1, np) */
+    double *zeta;                 /* (N, mp): what is left for the controls to do */
+    double *T, *M, *EW;           /* (n, wp), (w, wp), (p, wp) */
+    double *work;                 /* (4 wp + pp) */
 } towline_horizon;
 
 enum { TOWLINE_HORIZON_MOST = 1000 }; /* stages, states, controls, rows */
@@ -86,6 +86,12 @@ ptrdiff_t towline_horizon_size(int N, int n, int m, int p);
 
 /* A horizon in that memory, which is zero at first; `processor` is that of towline_processor. */
 towline_horizon towline_horizon_in(int N, int n, int m, int p, int processor, double *memory);
+
+/*
+ * Write the same problem in differences from a reference, states (N + 1, n) and controls (N, m) without padding: start,
+ * dynamics, bounds, soft rows and iterate change; costs are those of differences already.
+ */
+void towline_horizon_relative_to(const towline_horizon *h, const double *states, const double *controls);
 
 /* What a solve begins with: nothing, the iterate in memory, or that iterate moved by one stage. */
 typedef enum { TOWLINE_COLD, TOWLINE_WARM, TOWLINE_SHIFTED } towline_beginning;

@@ -9,8 +9,8 @@ static const double SHORT = 0.2;  /* a step that is shorter is replaced */
  * without it, to products of this part of their mean. */
 enum { CYCLE = 7, LATE = 32 };
 static const double CENTRAL = 0.3;
-enum { PATIENCE = 20 };         /* iterations after which a warm start is given up */
-enum { STUCK = 4 };             /* iterations without progress, and residual in tolerances, at which rounding permits no */
+enum { PATIENCE = 20 }; /* iterations after which a warm start is given up */
+enum { STUCK = 4 };     /* iterations without progress, and residual in tolerances, at which rounding permits no */
 static const double NEAR = 1e3; /* more */
 
 /* Slack times multiplier of a limit, a part of the step ahead. */

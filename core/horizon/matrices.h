@@ -34,7 +34,7 @@ typedef struct {
 /* The functions on matrices, in a form for a kind of processor. */
 typedef struct {
     void (*multiply)(const product *of);
-    void (*add_product)(double *out, matrix x, const double *v);            /* out += X v; v is 0 up to a multiple of four */
+    void (*add_product)(double *out, matrix x, const double *v); /* out += X v; v is 0 up to a multiple of four */
     void (*add_transposed_product)(double *out, matrix x, const double *v); /* out += X' v */
     /*
      * Cholesky's method on a symmetric matrix, of which the upper half is read, stopped after the rows of U: with

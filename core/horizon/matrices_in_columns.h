@@ -65,10 +65,17 @@ static void FORM(multiply)(const product *of) {
         multiply_rows(of, row, ROWS);
     }
     switch (of->out.rows - row) {
-        case 3: multiply_rows(of, row, 3); break;
-        case 2: multiply_rows(of, row, 2); break;
-        case 1: multiply_rows(of, row, 1); break;
-        default: break;
+        case 3:
+            multiply_rows(of, row, 3);
+            break;
+        case 2:
+            multiply_rows(of, row, 2);
+            break;
+        case 1:
+            multiply_rows(of, row, 1);
+            break;
+        default:
+            break;
     }
 }
 

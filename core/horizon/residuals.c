@@ -14,7 +14,8 @@ static double larger3(double x, double y, double z) { return larger(larger(x, y)
 static void measure_gradient(const towline_horizon *h, int k) {
     const int wp = h->wp, is_last = k == h->N, width = k > 0 ? h->w : h->m;
     const double *z = h->at.z + k * wp, *y = h->at.y + k * wp, *linear = h->h + k * wp;
-    double *left = h->gradient + k * wp, *cost = h->work, *dual = cost + wp, *penalty = dual + wp, *terms = penalty + wp;
+    double *left = h->gradient + k * wp, *cost = h->work, *dual = cost + wp, *penalty = dual + wp,
+           *terms = penalty + wp;
     const matrix H = hessian_of(h, k, h->w);
     set(cost, 3 * wp, 0);
     if (is_last) {

@@ -1,9 +1,9 @@
 /* The iterate that a solve begins with, and what of the problem does not change during it. */
 #include "horizon/internal.h"
 
-static const double FIXED = 1e-13;            /* relative width of bounds below which a control is fixed */
-static const double DAMPING = 1.0;            /* of the first step, as a part of each control's curvature */
-static const double FIRST_CENTRE = 10.0;      /* of the first products of slack and multiplier, times what they are off */
+static const double FIXED = 1e-13;       /* relative width of bounds below which a control is fixed */
+static const double DAMPING = 1.0;       /* of the first step, as a part of each control's curvature */
+static const double FIRST_CENTRE = 10.0; /* of the first products of slack and multiplier, times what they are off */
 static const double NEARLY_NOTHING = 1e-200;
 
 /* Write which bounds a control has; return how many, nan if they cross or are no numbers. */

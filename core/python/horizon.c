@@ -29,7 +29,8 @@ static Py_ssize_t sizes_of(PyObject *const *arguments, Py_ssize_t count, Py_ssiz
     }
     const ptrdiff_t size = towline_horizon_size(sizes[STAGES], sizes[STATES], sizes[CONTROLS], sizes[SOFT]);
     if (size == 0) {
-        PyErr_SetString(PyExc_ValueError, "stages, states, controls and rows must be whole numbers from 1, or 0, to 1000");
+        PyErr_SetString(PyExc_ValueError,
+                        "stages, states, controls and rows must be whole numbers from 1, or 0, to 1000");
         return -1;
     }
     return size;
@@ -72,11 +73,21 @@ PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments
         const char *name;
         const double *at;
     } arrays_of_problem[] = {
-        {"H", h.H},          {"h", h.h},         {"G", h.G},
-        {"c", h.c},          {"start", h.start}, {"u_min", h.u_min},
-        {"u_max", h.u_max},  {"E", h.E},         {"d", h.d},
-        {"penalty", h.penalty}, {"square", h.square}, {"z", h.at.z},
-        {"y", h.at.y},       {"lower", h.at.multiplier.lower}, {"upper", h.at.multiplier.upper},
+        {"H", h.H},
+        {"h", h.h},
+        {"G", h.G},
+        {"c", h.c},
+        {"start", h.start},
+        {"u_min", h.u_min},
+        {"u_max", h.u_max},
+        {"E", h.E},
+        {"d", h.d},
+        {"penalty", h.penalty},
+        {"square", h.square},
+        {"z", h.at.z},
+        {"y", h.at.y},
+        {"lower", h.at.multiplier.lower},
+        {"upper", h.at.multiplier.upper},
         {"force", h.at.multiplier.row},
     };
     PyObject *places = PyDict_New();
@@ -89,6 +100,32 @@ PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments
     }
     PyBuffer_Release(&view);
     return places;
+}
+
+PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { MEMORY, REFERENCE_STATES, REFERENCE_CONTROLS, ARRAYS };
+    int whole[SIZES + 1];
+    arrays given;
+    const Py_ssize_t size = sizes_of(arguments, count, SIZES + 1 + ARRAYS, whole);
+    if (size < 0 || !whole_numbers(arguments, SIZES + 1, whole) ||
+        !take(&given, arguments + SIZES + 1, ARRAYS, ARRAYS, MEMORY)) {
+        return NULL;
+    }
+    const int N = whole[STAGES];
+    const int fits = given.size[MEMORY] == size &&
+                     given.size[REFERENCE_STATES] == (Py_ssize_t)(N + 1) * whole[STATES] &&
+                     given.size[REFERENCE_CONTROLS] == (Py_ssize_t)N * whole[CONTROLS];
+    if (fits) {
+        const towline_horizon h = horizon_in(whole, whole[SIZES], given.of[MEMORY]);
+        towline_horizon_relative_to(&h, given.of[REFERENCE_STATES], given.of[REFERENCE_CONTROLS]);
+    }
+    release(&given);
+    if (!fits) {
+        PyErr_SetString(PyExc_ValueError, "states must be (N + 1, n) and controls (N, m), in the order of rows");
+        return NULL;
+    }
+    Py_RETURN_NONE;
 }
 
 PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
