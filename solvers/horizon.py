@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.display import Displayed, record
 from ..base.errors import InputError
-from ..base.inputs import shown, whole_number
+from ..base.inputs import real_array, shown, whole_number
 from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
 
 __all__ = ["Horizon", "Multipliers", "Residuals"]
@@ -171,10 +171,12 @@ class Horizon(Displayed):
             If an array has another shape.
         """
         N, n, m, _ = self._sizes
+        given = []
         for name, value, shape in (("states", states, (N + 1, n)), ("controls", controls, (N, m))):
-            if np.shape(value) != shape:
-                raise InputError(f"{name} must have shape {shape}, got {shown(value)}")
-        given = np.ascontiguousarray(states, dtype=float), np.ascontiguousarray(controls, dtype=float)
+            array = np.ascontiguousarray(real_array(name, value), dtype=np.float64)
+            if array.shape != shape:
+                raise InputError(f"{name} must have shape {shape}, got {array.shape}")
+            given.append(array)
         horizon_relative_to(*self._sizes, PROCESSOR, self._memory, *given)
 
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
