@@ -17,14 +17,15 @@ SOURCES = [*sorted((CORE / "horizon").glob("*.c")), Path(__file__).parent / "cor
 FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wno-psabi", "-O1", "-g"]
 
 
+@pytest.mark.parametrize("vectors", [[], ["-DTOWLINE_NO_LANES"]])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_sanitizers_and_compilers_are_silent(compiler, tmp_path):
+def test_sanitizers_and_compilers_are_silent(compiler, vectors, tmp_path):
     """Random horizons, and nonsense in each of their arrays, in memory that is exactly as large as it must be."""
     if shutil.which(compiler) is None:
         pytest.skip(f"there is no {compiler}")
     program = tmp_path / "program"
     options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-DPROCESSOR={PROCESSOR}", f"-I{CORE}"]
-    command = [compiler, *FLAGS, *options, *map(str, SOURCES), "-lm", "-o", str(program)]
+    command = [compiler, *FLAGS, *vectors, *options, *map(str, SOURCES), "-lm", "-o", str(program)]
     subprocess.run(command, check=True)
     finished = subprocess.run([program], capture_output=True, text=True)
     assert finished.returncode == 0, finished.stdout + finished.stderr

@@ -5,12 +5,16 @@
 
 #ifdef __GNUC__
 #define INLINE static inline __attribute__((always_inline, unused))
-typedef double columns __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
-enum { WIDTH = VECTOR_BYTES / 8 };
 #else
 #define INLINE static inline
+#endif
+
+#ifdef TOWLINE_NO_LANES
 typedef double columns;
 enum { WIDTH = 1 };
+#else
+typedef double columns __attribute__((vector_size(VECTOR_BYTES), aligned(8), may_alias));
+enum { WIDTH = VECTOR_BYTES / 8 };
 #endif
 
 enum { FOUR = 4, ROWS = 4, VECTORS = 2, PARTS = FOUR / WIDTH };
@@ -156,6 +160,19 @@ INLINE void eliminate(matrix U, matrix symmetric, int i, int column, const int v
     }
 }
 
+/* Columns from `first` on; functions of a FORM call nothing with vectors as arguments, which Clang refuses. */
+INLINE void scale(double *row, int first, int end, double by) {
+    for (int j = first; j < end; j += WIDTH) {
+        store(row + j, by * load(row + j));
+    }
+}
+
+INLINE void subtract(double *v, const double *row, int first, int end, double times) {
+    for (int j = first; j < end; j += WIDTH) {
+        store(v + j, load(v + j) - times * load(row + j));
+    }
+}
+
 static void FORM(factorise)(matrix U, double *inverse, matrix symmetric) {
     const int wide = (U.columns + FOUR - 1) / FOUR * FOUR;
     for (int i = 0; i < U.rows; i++) {
@@ -169,9 +186,7 @@ static void FORM(factorise)(matrix U, double *inverse, matrix symmetric) {
         }
         const double pivot = *entry(U, i, i);
         inverse[i] = 1.0 / sqrt(pivot > TOWLINE_FLAT * before ? pivot : TOWLINE_HUGE);
-        for (int j = i - i % FOUR; j < wide; j += WIDTH) {
-            store(entry(U, i, j), inverse[i] * load(entry(U, i, j)));
-        }
+        scale(row_of(U, i), i - i % FOUR, wide, inverse[i]);
         for (int j = i - i % FOUR; j < i; j++) {
             *entry(U, i, j) = 0;
         }
@@ -181,12 +196,10 @@ static void FORM(factorise)(matrix U, double *inverse, matrix symmetric) {
 static void FORM(solve_lower)(double *v, double *zeta, matrix U, const double *inverse) {
     for (int i = 0; i < U.rows; i++) {
         zeta[i] = v[i] * inverse[i];
-        for (int j = i - i % FOUR; j < U.columns; j += WIDTH) {
-            store(v + j, load(v + j) - zeta[i] * load(entry(U, i, j)));
-        }
+        subtract(v, row_of(U, i), i - i % FOUR, U.columns, zeta[i]);
     }
 }
 
-const towline_algebra FORM(towline_algebra) = {
-    FORM(multiply), FORM(add_product), FORM(add_transposed_product), FORM(factorise), FORM(solve_lower),
+const towline_algebra NAMED(towline_algebra) = {
+    NAMED(multiply), NAMED(add_product), NAMED(add_transposed_product), NAMED(factorise), NAMED(solve_lower),
 };
