@@ -29,7 +29,6 @@ types: .venv/dev.stamp
 
 # The machine code of plant and controllers, once; otherwise each of the tests' processes compiles it or computes without.
 kernels: .venv/dev.stamp
-	$(BIN)/python -c "from towline.solvers.stages import machine; machine.solve_stages()"
 	$(BIN)/python -c "from towline.plant import machine; machine.run_rows()"
 	$(BIN)/python -c "from towline.estimation.pose import machine; machine.load()"
 	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"

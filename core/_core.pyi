@@ -5,6 +5,7 @@ ROWS: int
 MOST_CABLES: int  # of a robot's record
 MOST_CARRIERS: int
 ROBOT_BYTES: int
+PROCESSOR: int  # kind of this one: 0 any, 1 with AVX2, 2 with AVX-512
 
 def solve_packed(packed: Any, tensions: Any, direction: Any = None) -> int: ...
 def solve_rows(n: int, m: int, rho: float, in_lanes: bool, *arrays: Any) -> int: ...
@@ -14,3 +15,20 @@ def lines(
     robot: Any, poses: Any, carriers: Any, lengths: Any, A: Any, J: Any, anchors: Any, sensitivity: Any
 ) -> None: ...
 def required_wrench(robot: Any, poses: Any, velocities: Any, accelerations: Any, wind: Any, w: Any) -> None: ...
+def horizon_size(N: int, n: int, m: int, p: int) -> int: ...
+def horizon_places(N: int, n: int, m: int, p: int, memory: Any) -> dict[str, int]: ...
+def horizon_relative_to(
+    N: int, n: int, m: int, p: int, processor: int, memory: Any, states: Any, controls: Any
+) -> None: ...
+def horizon_solve(
+    N: int,
+    n: int,
+    m: int,
+    p: int,
+    processor: int,
+    beginning: int,
+    iterations_max: int,
+    tolerance: float,
+    memory: Any,
+    residuals: Any,
+) -> tuple[int, bool]: ...
