@@ -201,7 +201,7 @@ def solve_batch(
         name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
     }
     rows, backend = _Rows.unsolved(int(np.prod(lead, dtype=np.int64)), n, m), _backend(backend, n, m)
-    if backend != BEYOND_THE_CORE:
+    if backend != BEYOND_THE_CORE and rows.status.size:
         columns = [
             (NONE, 0) if name == "weights" and weights is None else _column(value, core[name], rows.status.size, lead)
             for name, value in given.items()
@@ -224,7 +224,7 @@ def solve_batch(
 
 
 class _Rows(NamedTuple):
-    """What the core writes of each row, as in `core/batch/batch.h`."""
+    """Results of the core for each row, as in `core/batch/batch.h`."""
 
     tensions: Array  # (rows, m)
     direction: Array  # (rows, n)
