@@ -55,9 +55,9 @@ static void least_squares(const lack *of, int count, const double *efforts, doub
     }
 }
 
-void towline_aim(const towline_robot *robot, towline_stages stages, int moved, double length, const double *efforts,
-                 double *wanted, double *planned) {
-    const int m = robot->cables, n = MOTION + 2 * moved, count = m + moved;
+void towline_aim(towline_stages stages, int cables, int moved, double length, const double *efforts, double *wanted,
+                 double *planned) {
+    const int m = cables, n = MOTION + 2 * moved, count = m + moved;
     lack of;
     double forces[6];
     for (int k = 0; k < stages.count; k++) {

@@ -17,7 +17,6 @@
 
 static const double SHARE = 0.05;  /* of the weight: the change of a tension that costs as much as all of a reach */
 static const double DAMPED = 1e-4; /* of the largest entry of the gram matrix */
-static const double SHORTEST = 1e-9; /* [m] */
 
 enum { CARRIERS = TOWLINE_MOST_CARRIERS };
 
@@ -34,7 +33,7 @@ static void anchor_by_coordinate(const double *from, int coordinate, double *mov
 
 /* Add the change of the wrench (6), moments times `scale`, that `far` along a coordinate makes by one cable. */
 static void add_column(const cable_run *run, double tension, int coordinate, double far, double scale, double *column) {
-    const double length = fmax(run->length, SHORTEST);
+    const double length = run->length;
     double from[3], moves[3], force[3], moment[3];
     for (int j = 0; j < 3; j++) {
         from[j] = run->carrier_arm[j] + length * run->pull[j];
@@ -51,14 +50,14 @@ static void add_column(const cable_run *run, double tension, int coordinate, dou
     }
 }
 
-void towline_carrier_columns(const towline_robot *robot, const towline_controller *controller,
-                             const configuration *at, const double *t_ref, double scale, double columns[][6]) {
+void towline_carrier_columns(const towline_robot *robot, const towline_controller *controller, const configuration *at,
+                             const double *t_ref, double scale, double columns[][6]) {
     memset(columns, 0, (size_t)(6 * robot->carriers) * sizeof columns[0]);
     for (int i = 0; i < robot->cables; i++) {
         const int c = robot->cable[i].carrier;
         for (int k = 0; k < 6; k++) {
             const double far = controller->reach[c][k];
-            if (far != 0 && t_ref[i] > 0) {
+            if (far != 0 && t_ref[i] > 0 && at->cable[i].length > 0) {
                 add_column(&at->cable[i], t_ref[i], k, far, scale, columns[6 * c + k]);
             }
         }

@@ -16,7 +16,7 @@ typedef struct {
     double pull[3];        /* the unit vector in which it pulls the platform */
     double arm[3];         /* from the platform's CoM to the attachment */
     double carrier_arm[3]; /* from the carrier's frame to the attachment */
-    double length;
+    double length; /* 0 without a line: both ends are one point, or one is inside the sheave; it does not pull */
 } cable_run;
 
 typedef struct {
@@ -67,8 +67,11 @@ INLINE void run_cables(const towline_robot *robot, const double *positions, ptrd
             turn_constant(carrier->R, cable->axis, axis);
             found = line_over_sheave(cable->radius, d, axis);
         }
-        memcpy(run->pull, found.pull, sizeof run->pull);
-        run->length = found.length;
+        const int runs = dot(found.pull, found.pull) > 0.5; /* not of nan */
+        run->length = runs ? found.length : 0;
+        for (int j = 0; j < 3; j++) {
+            run->pull[j] = runs ? found.pull[j] : 0;
+        }
     }
 }
 

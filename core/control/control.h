@@ -31,8 +31,7 @@ typedef struct {
  * Update the memory of a row, and write the problem of this step, `dt` after the last one and `since` after the last
  * state was measured [s]; both 0 in the first step, which starts the memory and has no bounds by rates.
  *
- * A row with a number that is not finite or beyond any sensor, or with a cable that has no line (no length, or an end
- * inside its sheave), keeps its memory and gets a wrench of nan.
+ * A row with a number that is not finite or beyond any sensor keeps its memory and gets a wrench of nan.
  */
 void towline_write_problem(const towline_robot *robot, const towline_controller *controller, double dt, double since,
                            towline_row row);
@@ -99,17 +98,18 @@ void towline_write_stages(const towline_robot *robot, towline_moved moved, const
  * Change tensions and moved places of a reference, states (N + 1, n) and controls (N + 1, u), so that the platform's
  * rate obeys the dynamics of all stages; `efforts` (u) is what squares of changes cost, `length` [m] the robot's.
  */
-void towline_aim(const towline_robot *robot, towline_stages stages, int moved, double length, const double *efforts,
-                 double *wanted, double *planned);
+void towline_aim(towline_stages stages, int cables, int moved, double length, const double *efforts, double *wanted,
+                 double *planned);
 
 /* Write the coordinates that tethers leave carriers as these move, (1 + c, 3, 6), and two derivatives: (3, f). */
-void towline_tethered_coordinates(const towline_robot *robot, towline_moved moved, const double *motions,
-                                  double *coordinates);
+void towline_tethered_coordinates(const towline_robot *robot, int count, const towline_tether *tethers,
+                                  const double *motions, double *coordinates);
 
 /*
  * Write how carriers move, (c, 3, 6), if the platform and the coordinates do as (3, 6 + f) says; attitudes are read, and
  * stay.
  */
-void towline_tethered_carriers(const towline_robot *robot, towline_moved moved, const double *motion, double *carriers);
+void towline_tethered_carriers(const towline_robot *robot, int count, const towline_tether *tethers,
+                               const double *motion, double *carriers);
 
 #endif

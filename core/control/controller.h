@@ -21,8 +21,8 @@ typedef struct {
     double kp[6], kd[6], ki[6]; /* of errors, their rates and integrals, in the coordinates of the pose */
     double observer;            /* bandwidth of the estimated disturbance, and of forces on flying carriers [rad/s] */
     double learning;            /* bandwidth with which tensions are learned that differ from their commands [rad/s] */
-    double patience; /* how long a cable may report no tension where one is commanded until it is taken for cut [s] */
-    int32_t reacts;  /* 1: carriers leave their reference to help the tensions, */
+    double patience;  /* how long a cable may report no tension where one is commanded until it is taken for cut [s] */
+    int32_t reacts;   /* 1: carriers leave their reference to help the tensions, */
     int32_t corrects; /* 1: also to correct errors */
     double carrier_bandwidth, carrier_acceleration; /* of that motion [rad/s], and at most [m/s^2, rad/s^2] */
     double reach[TOWLINE_MOST_CARRIERS][6];         /* how far each coordinate may go [m, rad] */
@@ -58,8 +58,8 @@ typedef struct {
     double offset[6], offset_rate[6]; /* off its reference, to help the tensions; small rotations in level axes */
     double force[3];                  /* estimated: what acts beside thrust, cables and weight, in {G} [N] */
     double explained[3];              /* momentum less what the estimate explains */
-    double ordered[3]; /* angular acceleration, in its own axes; nan where an actuator is at its limit */
-    double turning[3]; /* rate that is measured, in its own axes */
+    double ordered[3];                /* angular acceleration, in its own axes; nan where an actuator is at its limit */
+    double turning[3];                /* rate that is measured, in its own axes */
 } towline_carrier_memory;
 
 enum { TOWLINE_MOST_TETHERS = 3 };
@@ -69,9 +69,9 @@ typedef struct {
     int32_t carrier, cables;
     int32_t cable[TOWLINE_MOST_TETHERS]; /* which ones */
     double length[TOWLINE_MOST_TETHERS];
-    double at_home[3];  /* its coordinates at home */
-    double farthest;    /* how far those that are free may be from zero */
-    double axes[3][3];  /* e1, e2, e3, a row each */
+    double at_home[3]; /* its coordinates at home */
+    double farthest;   /* how far those that are free may be from zero */
+    double axes[3][3]; /* e1, e2, e3, a row each */
 } towline_tether;
 
 #endif

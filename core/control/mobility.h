@@ -32,7 +32,7 @@ INLINE mobility mobility_at(const towline_robot *robot, const configuration *at)
         }
         by.lightness[k] = freedom[k] / robot->mass;
     }
-    const double inverse = 1 / adjugate((const double(*)[3])inertia, by.turning);
+    const double inverse = 1 / adjugate((const double (*)[3])inertia, by.turning);
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
             by.turning[i][k] *= inverse * freedom[3 + i] * freedom[3 + k];

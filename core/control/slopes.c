@@ -119,7 +119,9 @@ tensioned towline_tensioned(const towline_robot *robot, const configuration *at,
     const towline_cable *given = &robot->cable[cable];
     const cable_run *run = &at->cable[cable];
     tensioned result;
-    if (given->radius == 0) {
+    if (run->length == 0) {
+        memset(result.stiffness, 0, sizeof result.stiffness);
+    } else if (given->radius == 0) {
         straight_curvature(run, result.stiffness);
     } else {
         double d[3], axis[3];

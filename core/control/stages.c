@@ -33,7 +33,8 @@ typedef struct {
 } stage;
 
 /* Put the robot where a state (n) has it; carriers are where they should be, (c, 12), but for their coordinates. */
-static void put_stage(const towline_robot *robot, towline_moved moved, const double *carriers, const double *x, stage *it) {
+static void put_stage(const towline_robot *robot, towline_moved moved, const double *carriers, const double *x,
+                      stage *it) {
     memcpy(it->motions, x, MOTION * sizeof *x);
     memcpy(it->motions + MOTION, carriers, (size_t)(MOTION * robot->carriers) * sizeof *x);
     for (int f = 0; f < moved.freed; f++) {
@@ -83,8 +84,8 @@ static void add_platform_slopes(const stage *it, int carrier, int along, const t
 }
 
 /* Add what a cable gives the platform with a coordinate of its carrier's pose. */
-static void add_carrier_slope(const stage *it, int carrier, int coordinate, const tensioned *cable, const cable_run *run,
-                              double *slope) {
+static void add_carrier_slope(const stage *it, int carrier, int coordinate, const tensioned *cable,
+                              const cable_run *run, double *slope) {
     double displacement[3] = {0, 0, 0};
     if (coordinate < 3) {
         displacement[coordinate] = -1;
@@ -133,7 +134,7 @@ static void write_slopes(const towline_robot *robot, towline_moved moved, const 
         const int carrier = robot->cable[i].carrier;
         const cable_run *run = &it->at.cable[i];
         const tensioned cable = towline_tensioned(robot, &it->at, i, tensions[i]);
-        add_platform_slopes(it, carrier, moved.tethered > 0, &cable, run, (const double(*)[3])axes, it->slope);
+        add_platform_slopes(it, carrier, moved.tethered > 0, &cable, run, (const double (*)[3])axes, it->slope);
         add_moved_slopes(&moved, it, carrier, &cable, run, it->slope + MOTION);
     }
     towline_wrench_slopes(robot, &it->at.platform, it->motions + 6, it->acceleration, needed);

@@ -29,12 +29,12 @@ static void observe_platform(const towline_robot *robot, const towline_controlle
 }
 
 /* Write the acceleration of the pose that is wanted. */
-static void wanted_acceleration(const towline_controller *controller, double dt, const towline_row *row, double *wanted) {
+static void wanted_acceleration(const towline_controller *controller, double dt, const towline_row *row,
+                                double *wanted) {
     const double *reference = row->reference, *measured = row->measured;
     towline_platform_memory *memory = row->platform;
     for (int k = 0; k < 6; k++) {
-        const double error =
-            k < 3 ? reference[k] - measured[k] : turn_between(measured[k], reference[k]);
+        const double error = k < 3 ? reference[k] - measured[k] : turn_between(measured[k], reference[k]);
         if (memory->integrates) {
             memory->integral[k] += dt * error;
         }
@@ -91,26 +91,12 @@ static void move_carriers(const towline_robot *robot, const towline_controller *
     towline_compensate(robot, controller, dt, at, row->A, missing, row);
 }
 
-/* Write the wrench matrix of motions (1 + c, 12), and return whether it is one. */
-static int put(const towline_robot *robot, const double *motions, configuration *at, double *A) {
-    configuration_at(robot, motions, at);
-    wrench_matrix(robot, at, A);
-    return is_finite(A, robot->cables);
-}
-
 void towline_write_problem(const towline_robot *robot, const towline_controller *controller, double dt, double since,
                            towline_row row) {
     configuration at;
     double wanted[6];
     towline_write_bounds(robot, controller, dt, row.cables, row.low, row.high);
-    int usable = is_usable(robot, &row);
-    if (usable && row.late && (since > 0 || dt == 0)) {
-        usable = put(robot, row.late, &at, row.A);
-        if (usable) {
-            observe_platform(robot, controller, since, &at, row.late + 6, &row);
-        }
-    }
-    if (!usable || !put(robot, row.measured, &at, row.A)) {
+    if (!is_usable(robot, &row)) {
         for (int k = 0; k < 6; k++) {
             row.w[k] = NAN;
         }
@@ -119,6 +105,13 @@ void towline_write_problem(const towline_robot *robot, const towline_controller 
         }
         return;
     }
+    if (row.late && (since > 0 || dt == 0)) {
+        configuration_at(robot, row.late, &at);
+        wrench_matrix(robot, &at, row.A);
+        observe_platform(robot, controller, since, &at, row.late + 6, &row);
+    }
+    configuration_at(robot, row.measured, &at);
+    wrench_matrix(robot, &at, row.A);
     wanted_acceleration(controller, dt, &row, wanted);
     required_wrench(robot, row.measured, row.measured + 6, wanted, NULL, row.w);
     if (!row.late) {

@@ -40,7 +40,8 @@ static void to_axes(const towline_tether *tether, const tethered *carrier, const
 }
 
 /* The mean of the arms of a carrier's cables. */
-static void middle_of(const towline_robot *robot, const towline_tether *tether, const configuration *at, double *middle) {
+static void middle_of(const towline_robot *robot, const towline_tether *tether, const configuration *at,
+                      double *middle) {
     double arm[3];
     memset(middle, 0, 3 * sizeof *middle);
     for (int j = 0; j < tether->cables; j++) {
@@ -81,7 +82,7 @@ static equations equations_at(const towline_robot *robot, const towline_tether *
         to_axes(tether, carrier, to_anchor, rows[free + j]);
         missing[free + j] = 0.5 * (tether->length[j] * tether->length[j] - dot(to_anchor, to_anchor));
     }
-    const double determinant = adjugate((const double(*)[3])rows, of.inverse);
+    const double determinant = adjugate((const double (*)[3])rows, of.inverse);
     const double inverse = fabs(determinant) < 1e-300 ? 0 : 1 / determinant;
     for (int i = 0; i < 9; i++) {
         of.inverse[i / 3][i % 3] *= inverse;
@@ -190,13 +191,15 @@ void towline_tethered_slopes(const towline_robot *robot, const towline_tether *t
     }
 }
 
-int towline_moved_count(towline_moved moved) {
-    int count = moved.freed;
-    for (int k = 0; k < moved.tethered; k++) {
-        count += coordinates_of(&moved.tethers[k]);
+static int count_of(int tethered, const towline_tether *tethers) {
+    int count = 0;
+    for (int k = 0; k < tethered; k++) {
+        count += coordinates_of(&tethers[k]);
     }
     return count;
 }
+
+int towline_moved_count(towline_moved moved) { return moved.freed + count_of(moved.tethered, moved.tethers); }
 
 /* x + s v + s^2 a / 2 of one that has (3, per), from coordinate `i` on. */
 static double after(double s, const double *motion, int per, int i) {
@@ -226,16 +229,16 @@ static void derivatives(const double *before, const double *now, const double *l
     }
 }
 
-void towline_tethered_coordinates(const towline_robot *robot, towline_moved moved, const double *motions,
-                                  double *coordinates) {
+void towline_tethered_coordinates(const towline_robot *robot, int count, const towline_tether *tethers,
+                                  const double *motions, double *coordinates) {
     double found[3][MOST_MOVED], put[MOTION * (1 + CARRIERS)];
-    const int count = towline_moved_count(moved);
+    const int free = count_of(count, tethers);
     configuration at;
     for (int s = 0; s < 3; s++) {
         double *next = found[s];
         put_after(robot, (s - 1) * STEP_OF_TIME, motions, 6, motions + 18, put, &at);
-        for (int k = 0; k < moved.tethered; k++) {
-            const towline_tether *tether = &moved.tethers[k];
+        for (int k = 0; k < count; k++) {
+            const towline_tether *tether = &tethers[k];
             const double *position = put + MOTION * (1 + tether->carrier);
             double off[3], y[3];
             tethered carrier;
@@ -249,26 +252,27 @@ void towline_tethered_coordinates(const towline_robot *robot, towline_moved move
             next += coordinates_of(tether);
         }
     }
-    derivatives(found[0], found[1], found[2], count, coordinates, count);
+    derivatives(found[0], found[1], found[2], free, coordinates, free);
 }
 
-void towline_tethered_carriers(const towline_robot *robot, towline_moved moved, const double *motion, double *carriers) {
+void towline_tethered_carriers(const towline_robot *robot, int count, const towline_tether *tethers,
+                               const double *motion, double *carriers) {
     double found[3][CARRIERS][3], put[MOTION * (1 + CARRIERS)], coordinates[MOST_MOVED];
-    const int count = towline_moved_count(moved);
+    const int free = count_of(count, tethers);
     configuration at;
     for (int s = 0; s < 3; s++) {
         const double *next = coordinates;
-        put_after(robot, (s - 1) * STEP_OF_TIME, motion, 6 + count, carriers, put, &at);
-        for (int i = 0; i < count; i++) {
-            coordinates[i] = after((s - 1) * STEP_OF_TIME, motion, 6 + count, 6 + i);
+        put_after(robot, (s - 1) * STEP_OF_TIME, motion, 6 + free, carriers, put, &at);
+        for (int i = 0; i < free; i++) {
+            coordinates[i] = after((s - 1) * STEP_OF_TIME, motion, 6 + free, 6 + i);
         }
-        for (int k = 0; k < moved.tethered; k++) {
-            const tethered carrier = towline_tethered_at(robot, &moved.tethers[k], &at, next);
+        for (int k = 0; k < count; k++) {
+            const tethered carrier = towline_tethered_at(robot, &tethers[k], &at, next);
             memcpy(found[s][k], carrier.position, sizeof carrier.position);
-            next += coordinates_of(&moved.tethers[k]);
+            next += coordinates_of(&tethers[k]);
         }
     }
-    for (int k = 0; k < moved.tethered; k++) {
-        derivatives(found[0][k], found[1][k], found[2][k], 3, carriers + 18 * moved.tethers[k].carrier, 6);
+    for (int k = 0; k < count; k++) {
+        derivatives(found[0][k], found[1][k], found[2][k], 3, carriers + 18 * tethers[k].carrier, 6);
     }
 }

@@ -154,8 +154,8 @@ void towline_write_thrusts(const towline_robot *robot, const towline_controller 
         const towline_body *body = &robot->body[1 + c];
         const double *motion = flight.measured + MOTION * (1 + c);
         const flier it = {
-            robot, controller, body, &at, motion, flight.carriers + 18 * c, flight.platform->attitude, c,
-            &flight.memory[c],
+            robot, controller,        body, &at, motion, flight.carriers + 18 * c, flight.platform->attitude,
+            c,     &flight.memory[c],
         };
         double wrench[6], *actuation = flight.actuation + most * c;
         if (body->actuators > 0) {

@@ -30,13 +30,4 @@ INLINE int is_usable(const towline_robot *robot, const towline_row *row) {
            (!row->carriers || are_numbers(row->carriers, 18 * robot->carriers));
 }
 
-/* Whether all numbers of a matrix (6, m) are finite. */
-INLINE int is_finite(const double *A, int m) {
-    double zero = 0;
-    for (int i = 0; i < 6 * m; i++) {
-        zero += 0 * A[i];
-    }
-    return zero == 0;
-}
-
 #endif

@@ -47,56 +47,89 @@ static int put(PyObject *array, Py_ssize_t rows, place at) {
     return fits;
 }
 
-/* Whether an array is missing, or has so many numbers. */
-static int has(const arrays *given, int index, Py_ssize_t size) { return !given->of[index] || given->size[index] == size; }
+/* Whether the arrays of a call, as far as they are there, have so many rows of their sizes. */
+static int have_rows(const arrays *given, int first, int last, Py_ssize_t rows, const Py_ssize_t *sizes) {
+    int fits = 1;
+    for (int i = first; i < last; i++) {
+        fits = fits && (!given->of[i] || given->size[i] == rows * sizes[i]);
+    }
+    return fits;
+}
 
 static const Py_ssize_t PER_CABLE = sizeof(towline_cable_memory) / sizeof(double);
 static const Py_ssize_t PER_PLATFORM = sizeof(towline_platform_memory) / sizeof(double);
 static const Py_ssize_t PER_CARRIER = sizeof(towline_carrier_memory) / sizeof(double);
 
-enum { MOTION = 12, ORDER = 18 }; /* numbers of pose and velocity, and of these and the acceleration */
+enum {
+    MOTION = 12,
+    ORDER = 18,
+    MOST_PARTS = 1000000
+}; /* numbers of pose and velocity, and of these and the acceleration */
+
+/* Put the pose and the velocity of all bodies in a state, and its tensions; return 0 with an exception if they do not fit. */
+static int put_state(PyObject *state, const towline_robot *robot, Py_ssize_t rows, double *measured, double *cables) {
+    enum { POSE, CARRIER_POSE = 2, TENSIONS = 4 };
+    const Py_ssize_t c = robot->carriers, m = robot->cables, motions = MOTION * (1 + c);
+    for (int order = 0; order < 2; order++) {
+        double *motion = measured + 6 * order;
+        if (!put(PyTuple_GetItem(state, POSE + order), rows, (place){motion, motions, 0, 1, 0, 6}) ||
+            !put(PyTuple_GetItem(state, CARRIER_POSE + order), rows,
+                 (place){motion + MOTION, motions, MOTION, 1, c, 6})) {
+            return 0;
+        }
+    }
+    PyObject *tensions = PyTuple_GetItem(state, TENSIONS);
+    return tensions == Py_None || put(tensions, rows, (place){cables, m * PER_CABLE, 0, PER_CABLE, 0, m});
+}
+
+/* The same of a reference; where it has no tensions they are zero, and where carriers have no orders these are NULL. */
+static int put_reference(PyObject *reference, const towline_robot *robot, Py_ssize_t rows, double *wanted,
+                         double *carriers, double *t_ref) {
+    enum { POSE, CARRIER_POSE = 3, TENSIONS = 6 };
+    const Py_ssize_t c = robot->carriers, m = robot->cables;
+    for (int order = 0; order < 3; order++) {
+        double *motion = carriers ? carriers + 6 * order : NULL;
+        if (!put(PyTuple_GetItem(reference, POSE + order), rows, (place){wanted + 6 * order, ORDER, 0, 1, 0, 6}) ||
+            !put(PyTuple_GetItem(reference, CARRIER_POSE + order), rows, (place){motion, c * ORDER, ORDER, 1, c, 6})) {
+            return 0;
+        }
+    }
+    memset(t_ref, 0, (size_t)(rows * m) * sizeof *t_ref);
+    PyObject *tensions = PyTuple_GetItem(reference, TENSIONS);
+    return tensions == Py_None || put(tensions, rows, (place){t_ref, m, 0, 1, 0, m});
+}
 
 PyObject *towline_py_control_take(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
-    enum { MEASURED, REFERENCE, CARRIERS, T_REF, CABLES, ALL };
-    enum { POSE, VELOCITY, CARRIER_POSE, CARRIER_VELOCITY, TENSIONS };
-    PyObject *state = count == ALL + 2 ? arguments[0] : NULL, *reference = count == ALL + 2 ? arguments[1] : NULL;
+    enum { ROBOT, MEASURED, CABLES, REFERENCE, CARRIERS, T_REF, ALL };
     arrays given;
+    PyObject *state = count > 1 ? arguments[0] : NULL, *reference = count > 1 ? arguments[1] : NULL;
     if (!state || !PyTuple_Check(state) || PyTuple_Size(state) < 5 || !PyTuple_Check(reference) ||
         PyTuple_Size(reference) < 7) {
-        PyErr_SetString(PyExc_TypeError, "control_take takes a state, a reference and five arrays");
+        PyErr_SetString(PyExc_TypeError, "the function takes a state, a reference and arrays");
         return NULL;
     }
     if (!take(&given, arguments + 2, count - 2, ALL, MEASURED)) {
         return NULL;
     }
-    const Py_ssize_t rows = given.size[REFERENCE] / ORDER, m = rows ? given.size[T_REF] / rows : 0;
-    const Py_ssize_t c = rows ? given.size[MEASURED] / rows / MOTION - 1 : 0;
-    double *const *to = given.of;
-    if (m < 1 || c < 1 || !to[MEASURED] || !to[CABLES] || given.size[MEASURED] != rows * MOTION * (1 + c) ||
-        given.size[REFERENCE] != rows * ORDER || !has(&given, CARRIERS, rows * c * ORDER) ||
-        given.size[T_REF] != rows * m || given.size[CABLES] != rows * m * PER_CABLE) {
+    const towline_robot *robot = robot_of(&given);
+    const Py_ssize_t rows = given.size[REFERENCE] / ORDER;
+    int fits = robot && given.of[MEASURED] && given.of[CABLES] && given.of[REFERENCE] && given.of[T_REF];
+    if (fits) {
+        const Py_ssize_t c = robot->carriers, m = robot->cables;
+        const Py_ssize_t sizes[ALL] = {0, MOTION * (1 + c), m * PER_CABLE, ORDER, ORDER * c, m};
+        fits = have_rows(&given, MEASURED, ALL, rows, sizes);
+    }
+    if (!fits) {
         return done(&given, 0);
     }
-    const Py_ssize_t motions = MOTION * (1 + c);
-    PyObject *measured = PyTuple_GetItem(state, TENSIONS), *planned = PyTuple_GetItem(reference, 6);
-    int fits = 1;
-    for (int order = 0; fits && order < 2; order++) {
-        double *motion = to[MEASURED] + 6 * order;
-        fits = put(PyTuple_GetItem(state, POSE + order), rows, (place){motion, motions, 0, 1, 0, 6}) &&
-               put(PyTuple_GetItem(state, CARRIER_POSE + order), rows,
-                   (place){motion + MOTION, motions, MOTION, 1, c, 6});
-    }
-    for (int order = 0; fits && order < 3; order++) {
-        double *carriers = to[CARRIERS] ? to[CARRIERS] + 6 * order : NULL;
-        fits = put(PyTuple_GetItem(reference, order), rows, (place){to[REFERENCE] + 6 * order, ORDER, 0, 1, 0, 6}) &&
-               put(PyTuple_GetItem(reference, 3 + order), rows, (place){carriers, c * ORDER, ORDER, 1, c, 6});
-    }
-    memset(to[T_REF], 0, (size_t)(rows * m) * sizeof(double));
-    fits = fits && (planned == Py_None || put(planned, rows, (place){to[T_REF], m, 0, 1, 0, m}));
-    fits = fits && (measured == Py_None || put(measured, rows, (place){to[CABLES], m * PER_CABLE, 0, PER_CABLE, 0, m}));
+    fits = put_state(state, robot, rows, given.of[MEASURED], given.of[CABLES]) &&
+           put_reference(reference, robot, rows, given.of[REFERENCE], given.of[CARRIERS], given.of[T_REF]);
     release(&given);
-    return fits ? PyBool_FromLong(measured != Py_None) : NULL;
+    if (!fits) {
+        return NULL;
+    }
+    Py_RETURN_NONE;
 }
 
 /* Return the controller if the second array is the record of one, else NULL. */
@@ -105,14 +138,11 @@ static const towline_controller *controller_of(const arrays *given) {
     return is_one ? (const void *)given->of[1] : NULL;
 }
 
-/* Take two numbers before the arrays of a call; return 0 with an exception if they are none. */
-static int take_numbers(PyObject *const *arguments, Py_ssize_t count, double *first, double *second) {
-    if (count < 2) {
-        PyErr_SetString(PyExc_TypeError, "the function takes two numbers and arrays");
-        return 0;
+/* Take numbers before the arrays of a call; return 0 with an exception if one is none. */
+static int take_numbers(PyObject *const *arguments, Py_ssize_t count, int wanted, double *numbers) {
+    for (int i = 0; i < wanted && i < count; i++) {
+        numbers[i] = PyFloat_AsDouble(arguments[i]);
     }
-    *first = PyFloat_AsDouble(arguments[0]);
-    *second = PyFloat_AsDouble(arguments[1]);
     return !PyErr_Occurred();
 }
 
@@ -120,8 +150,8 @@ PyObject *towline_py_control_problem(PyObject *module, PyObject *const *argument
     (void)module;
     enum { ROBOT, CONTROLLER, MEASURED, LATE, REFERENCE, T_REF, CARRIERS, CABLES, PLATFORM, MEMORY, A, W, BOUNDS, ALL };
     arrays given;
-    double dt, since;
-    if (!take_numbers(arguments, count, &dt, &since) || !take(&given, arguments + 2, count - 2, ALL, CARRIERS)) {
+    double times[2];
+    if (!take_numbers(arguments, count, 2, times) || !take(&given, arguments + 2, count - 2, ALL, CARRIERS)) {
         return NULL;
     }
     const towline_robot *robot = robot_of(&given);
@@ -130,30 +160,28 @@ PyObject *towline_py_control_problem(PyObject *module, PyObject *const *argument
     int fits = robot && controller && of[MEASURED] && of[REFERENCE] && of[T_REF] && of[CABLES] && of[PLATFORM] &&
                of[A] && of[W] && of[BOUNDS] && (!controller->reacts || (of[CARRIERS] && of[MEMORY]));
     if (fits) {
-        const Py_ssize_t rows = given.size[W] / 6, m = robot->cables, c = robot->carriers;
+        const Py_ssize_t rows = given.size[W] / 6, m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
         const Py_ssize_t sizes[ALL] = {
-            0,  0, MOTION * (1 + c), MOTION * (1 + c), ORDER, m, ORDER * c, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER,
-            6 * m, 6, 2 * m};
-        for (int i = MEASURED; i < ALL; i++) {
-            fits = fits && has(&given, i, rows * sizes[i]);
-        }
+            0, 0, motions, motions, ORDER, m, ORDER * c, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER, 6 * m, 6, 2 * m,
+        };
+        fits = have_rows(&given, MEASURED, ALL, rows, sizes);
         Py_BEGIN_ALLOW_THREADS;
         for (Py_ssize_t row = 0; fits && row < rows; row++) {
             const towline_row here = {
-                .measured = of[MEASURED] + row * sizes[MEASURED],
-                .late = of[LATE] ? of[LATE] + row * sizes[LATE] : NULL,
-                .reference = of[REFERENCE] + row * sizes[REFERENCE],
-                .t_ref = of[T_REF] + row * sizes[T_REF],
-                .carriers = of[CARRIERS] ? of[CARRIERS] + row * sizes[CARRIERS] : NULL,
+                .measured = of[MEASURED] + row * motions,
+                .late = of[LATE] ? of[LATE] + row * motions : NULL,
+                .reference = of[REFERENCE] + row * ORDER,
+                .t_ref = of[T_REF] + row * m,
+                .carriers = of[CARRIERS] ? of[CARRIERS] + row * c * ORDER : NULL,
                 .cables = (towline_cable_memory *)(void *)of[CABLES] + row * m,
                 .platform = (towline_platform_memory *)(void *)of[PLATFORM] + row,
                 .carrier_memory = of[MEMORY] ? (towline_carrier_memory *)(void *)of[MEMORY] + row * c : NULL,
-                .A = of[A] + row * sizes[A],
-                .w = of[W] + row * sizes[W],
+                .A = of[A] + row * 6 * m,
+                .w = of[W] + row * 6,
                 .low = of[BOUNDS] + row * m,
                 .high = of[BOUNDS] + (rows + row) * m,
             };
-            towline_write_problem(robot, controller, dt, since, here);
+            towline_write_problem(robot, controller, times[0], times[1], here);
         }
         Py_END_ALLOW_THREADS;
     }
@@ -165,8 +193,63 @@ PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *argument
     enum { ROBOT, CONTROLLER, MEASURED, CARRIERS, TENSIONS, CABLES, PLATFORM, MEMORY, ACTUATION, ALL };
     arrays given;
     double dt;
-    if (!take_numbers(arguments, count, &dt, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEMORY)) {
+    if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEMORY)) {
         return NULL;
     }
-    return done(&given, 0);
+    const towline_robot *robot = robot_of(&given);
+    const towline_controller *controller = controller_of(&given);
+    double *const *of = given.of;
+    int fits = robot && controller;
+    for (int i = MEASURED; i < ALL; i++) {
+        fits = fits && of[i];
+    }
+    if (fits) {
+        const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
+        const Py_ssize_t rows = given.size[TENSIONS] / m, each = c * towline_most_actuators(robot);
+        const Py_ssize_t sizes[ALL] = {
+            0, 0, motions, ORDER * c, m, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER, each,
+        };
+        fits = have_rows(&given, MEASURED, ALL, rows, sizes);
+        Py_BEGIN_ALLOW_THREADS;
+        for (Py_ssize_t row = 0; fits && row < rows; row++) {
+            const towline_flight here = {
+                .measured = of[MEASURED] + row * motions,
+                .carriers = of[CARRIERS] + row * ORDER * c,
+                .tensions = of[TENSIONS] + row * m,
+                .cables = (const towline_cable_memory *)(const void *)of[CABLES] + row * m,
+                .platform = (const towline_platform_memory *)(const void *)of[PLATFORM] + row,
+                .memory = (towline_carrier_memory *)(void *)of[MEMORY] + row * c,
+                .actuation = of[ACTUATION] + row * each,
+            };
+            towline_write_thrusts(robot, controller, dt, here);
+        }
+        Py_END_ALLOW_THREADS;
+    }
+    return done(&given, fits);
+}
+
+PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, DISTURBANCE, TENSIONS, ACCELERATIONS, MEASURED, ALL };
+    arrays given;
+    double dt;
+    if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEASURED)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    double *const *of = given.of;
+    int fits = robot && of[DISTURBANCE] && of[TENSIONS] && of[ACCELERATIONS] && of[MEASURED];
+    if (fits) {
+        const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
+        const Py_ssize_t rows = given.size[DISTURBANCE] / 6, parts = rows ? given.size[TENSIONS] / (rows * m) : 0;
+        const Py_ssize_t sizes[ALL] = {0, 6, parts * m, 6 * c, motions};
+        fits = have_rows(&given, DISTURBANCE, ALL, rows, sizes) && parts < MOST_PARTS;
+        Py_BEGIN_ALLOW_THREADS;
+        for (Py_ssize_t row = 0; fits && row < rows; row++) {
+            towline_move_on(robot, dt, (int)parts, of[DISTURBANCE] + 6 * row, of[TENSIONS] + m * row, rows * m,
+                            of[ACCELERATIONS] + 6 * c * row, of[MEASURED] + motions * row);
+        }
+        Py_END_ALLOW_THREADS;
+    }
+    return done(&given, fits);
 }

@@ -23,7 +23,8 @@ static PyMethodDef functions[] = {
      "Find whether matrices of n rows have n independent columns, 1 or 0."},
     {"lines", (PyCFunction)(void (*)(void))towline_py_lines, METH_FASTCALL,
      "lines(robot, poses, carriers, lengths, A, J, anchors, sensitivity)\n--\n\n"
-     "Compute the lines of the cables at each pose, of those results that are not None; carriers has as many rows or one."},
+     "Compute the lines of the cables at each pose, of those results that are not None; carriers has as many rows or "
+     "one."},
     {"required_wrench", (PyCFunction)(void (*)(void))towline_py_required_wrench, METH_FASTCALL,
      "required_wrench(robot, poses, velocities, accelerations, wind, w)\n--\n\n"
      "Compute the wrench that each motion needs; wind has as many rows, or one, or is None."},
@@ -38,6 +39,31 @@ static PyMethodDef functions[] = {
     {"horizon_solve", (PyCFunction)(void (*)(void))towline_py_horizon_solve, METH_FASTCALL,
      "horizon_solve(N, n, m, p, processor, beginning, iterations_max, tolerance, memory, residuals)\n--\n\n"
      "Solve the problem in memory; return how many iterations it took, and whether it converged."},
+    {"control_take", (PyCFunction)(void (*)(void))towline_py_control_take, METH_FASTCALL,
+     "control_take(state, reference, robot, measured, cables, wanted, carriers, t_ref)\n--\n\n"
+     "Copy a state and a reference, arrays of float64, to where the other functions read them."},
+    {"control_problem", (PyCFunction)(void (*)(void))towline_py_control_problem, METH_FASTCALL,
+     "control_problem(dt, since, robot, controller, measured, late, wanted, t_ref, carriers, "
+     " cables, platform, memory, A, w, bounds)\n--\n\n"
+     "Update the memory of each row, and write the problem of tension distribution of this step."},
+    {"control_thrusts", (PyCFunction)(void (*)(void))towline_py_control_thrusts, METH_FASTCALL,
+     "control_thrusts(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, actuation)\n--\n\n"
+     "Write the commands of the actuators of flying carriers."},
+    {"control_move_on", (PyCFunction)(void (*)(void))towline_py_control_move_on, METH_FASTCALL,
+     "control_move_on(dt, robot, disturbance, tensions, accelerations, measured)\n--\n\n"
+     "Move motions that were measured earlier on, with the tensions (parts, N, m) since."},
+    {"control_stages", (PyCFunction)(void (*)(void))towline_py_control_stages, METH_FASTCALL,
+     "control_stages(robot, freed, tethers, steps, disturbance, carriers, states, controls, A, B, c)\n--\n\n"
+     "Write the dynamics of stages to first order about states and controls."},
+    {"control_aim", (PyCFunction)(void (*)(void))towline_py_control_aim, METH_FASTCALL,
+     "control_aim(length, A, B, c, steps, efforts, wanted, planned)\n--\n\n"
+     "Change a reference the least so that the platform obeys the dynamics of stages."},
+    {"control_coordinates", (PyCFunction)(void (*)(void))towline_py_control_coordinates, METH_FASTCALL,
+     "control_coordinates(robot, tethers, motions, coordinates)\n--\n\n"
+     "Compute the coordinates that tethers leave carriers, and two derivatives over time."},
+    {"control_carriers", (PyCFunction)(void (*)(void))towline_py_control_carriers, METH_FASTCALL,
+     "control_carriers(robot, tethers, motion, carriers)\n--\n\n"
+     "Compute how carriers move if the platform and those coordinates do."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -22,4 +22,16 @@ PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments
 PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* control.c */
+PyObject *towline_py_control_take(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_problem(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
+/* stages.c */
+PyObject *towline_py_control_stages(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_aim(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_coordinates(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_carriers(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 #endif

@@ -1,0 +1,55 @@
+"""What controllers are set to and what they remember: the records of core/control/controller.h as NumPy dtypes.
+
+Units and meanings of the fields are explained there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core import MOST_CABLES, MOST_CARRIERS
+from ..models.record import MOST_ACTUATORS
+
+__all__ = ["CABLE", "CARRIER", "CONTROLLER", "MOST_TETHERS", "PLATFORM", "TETHER"]
+
+MOST_TETHERS = 3  # cables of fixed length that hold a carrier
+
+_LIMITS = np.dtype([(name, "f8") for name in ("low", "high", "rate")])
+CONTROLLER = np.dtype(
+    [
+        *((name, "f8", 6) for name in ("kp", "kd", "ki")),
+        *((name, "f8") for name in ("observer", "learning", "patience")),
+        *((name, "i4") for name in ("reacts", "corrects")),
+        *((name, "f8") for name in ("carrier_bandwidth", "carrier_acceleration")),
+        ("reach", "f8", (MOST_CARRIERS, 6)),
+        ("place", "f8"),
+        ("by_wrench", "f8", (MOST_CARRIERS, MOST_ACTUATORS, 6)),
+        ("limits", _LIMITS, MOST_CABLES),
+    ]
+)
+CABLE = np.dtype(
+    [
+        *((name, "f8") for name in ("measured", "last", "known", "then", "reported", "commanded", "excess")),
+        ("is_cut", "i8"),
+    ]
+)
+PLATFORM = np.dtype(
+    [*((name, "f8", 6) for name in ("integral", "disturbance", "explained")), ("attitude", "f8"), ("integrates", "i8")]
+)
+CARRIER = np.dtype(
+    [
+        *((name, "f8", 6) for name in ("offset", "offset_rate")),
+        *((name, "f8", 3) for name in ("force", "explained", "ordered", "turning")),
+    ]
+)
+TETHER = np.dtype(
+    [
+        *((name, "i4") for name in ("carrier", "cables")),
+        ("cable", "i4", MOST_TETHERS),
+        ("length", "f8", MOST_TETHERS),
+        ("at_home", "f8", 3),
+        ("farthest", "f8"),
+        ("axes", "f8", (3, 3)),
+    ],
+    align=True,
+)
