@@ -9,7 +9,8 @@
 #include "mechanics/lines.h"
 #include "mechanics/rigid_body.h"
 
-enum { MOTION = 12 }; /* numbers of a body's motion: pose and velocity */
+enum { MOTION = 12 };                 /* numbers of a body's motion: pose and velocity */
+static const double SHORTEST = 1e-12; /* [m]: of less, a cable has no direction */
 
 /* A cable, in the axes of {G}. */
 typedef struct {
@@ -67,7 +68,7 @@ INLINE void run_cables(const towline_robot *robot, const double *positions, ptrd
             turn_constant(carrier->R, cable->axis, axis);
             found = line_over_sheave(cable->radius, d, axis);
         }
-        const int runs = dot(found.pull, found.pull) > 0.5; /* not of nan */
+        const int runs = found.length > SHORTEST && dot(found.pull, found.pull) > 0.5; /* not of nan */
         run->length = runs ? found.length : 0;
         for (int j = 0; j < 3; j++) {
             run->pull[j] = runs ? found.pull[j] : 0;

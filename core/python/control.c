@@ -150,7 +150,7 @@ PyObject *towline_py_control_problem(PyObject *module, PyObject *const *argument
     (void)module;
     enum { ROBOT, CONTROLLER, MEASURED, LATE, REFERENCE, T_REF, CARRIERS, CABLES, PLATFORM, MEMORY, A, W, BOUNDS, ALL };
     arrays given;
-    double times[2];
+    double times[2] = {0, 0};
     if (!take_numbers(arguments, count, 2, times) || !take(&given, arguments + 2, count - 2, ALL, CARRIERS)) {
         return NULL;
     }
@@ -192,7 +192,7 @@ PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *argument
     (void)module;
     enum { ROBOT, CONTROLLER, MEASURED, CARRIERS, TENSIONS, CABLES, PLATFORM, MEMORY, ACTUATION, ALL };
     arrays given;
-    double dt;
+    double dt = 0;
     if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEMORY)) {
         return NULL;
     }
@@ -232,7 +232,7 @@ PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *argument
     (void)module;
     enum { ROBOT, DISTURBANCE, TENSIONS, ACCELERATIONS, MEASURED, ALL };
     arrays given;
-    double dt;
+    double dt = 0;
     if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEASURED)) {
         return NULL;
     }
