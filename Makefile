@@ -31,7 +31,6 @@ types: .venv/dev.stamp
 kernels: .venv/dev.stamp
 	$(BIN)/python -c "from towline.plant import machine; machine.run_rows()"
 	$(BIN)/python -c "from towline.estimation.pose import machine; machine.load()"
-	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"
 	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has

@@ -8,21 +8,12 @@ import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
+from ..core import control_carriers, control_coordinates
 from ..models.dynamics import dynamics_of
+from ..models.record import record_of
 from ..models.robot import Robot
 from .command_delay import Pending
-from .fixed_length_carriers import (
-    AT_HOME,
-    AXES,
-    CABLES,
-    FARTHEST,
-    HELD,
-    LENGTHS_OF,
-    TETHER_COLUMNS,
-    WHICH,
-    coordinates_of,
-)
-from .machine import carriers_of, directions
+from .records import MOST_TETHERS, TETHER
 
 __all__ = ["Flown", "Freed", "Moved", "Tethered"]
 
@@ -37,7 +28,7 @@ class Moved(Protocol):
     freed
         Carrier and coordinate of each that may leave the reference, (f, 2) or (0, 2).
     tethers
-        (k, TETHER_COLUMNS), the carriers that cables of fixed length hold.
+        (k,) of `TETHER`, the carriers that cables of fixed length hold.
     count
         How many coordinates there are, f.
     """
@@ -97,7 +88,7 @@ class Freed:
 
     def __init__(self, reach: np.ndarray, strongest: float, boxes: tuple[np.ndarray, np.ndarray] | None = None):
         self.freed = np.ascontiguousarray(np.argwhere(reach))
-        self.tethers, self.count = np.zeros((0, TETHER_COLUMNS)), len(self.freed)
+        self.tethers, self.count = np.zeros(0, TETHER), len(self.freed)
         self._strongest = strongest
         self._low, self._high = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         if boxes is not None:
@@ -202,14 +193,13 @@ class Flown(Freed):
 class Tethered:
     """Coordinates that cables of fixed length leave to carriers: a solution starts where they are measured."""
 
-    def __init__(self, robot: Robot, arrays: tuple[np.ndarray, ...], delay: float, stage: float):
+    def __init__(self, robot: Robot, delay: float, stage: float):
         self.freed = np.zeros((0, 2), dtype=np.int64)
         self.tethers = _tethers(robot)
-        self.count, self._robot = coordinates_of(self.tethers), arrays
+        self.count, self._robot = int((MOST_TETHERS - self.tethers["cables"]).sum()), record_of(robot)
         late = round(delay / stage)
         self._under_way = late * stage, late, stage
         self._pending = Pending(delay + stage)
-        self._directions, self._carriers_of = directions(), carriers_of()
         self.reset()
 
     def reset(self) -> None:
@@ -221,7 +211,7 @@ class Tethered:
         """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
         result = np.zeros((len(platform), 3, self.count))
         motions = np.concatenate([platform[:, None], carriers], axis=1)
-        self._directions(self._robot, self.tethers, motions.reshape(*motions.shape[:2], 18), result)
+        control_coordinates(self._robot, self.tethers, motions, result)
         return result
 
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -230,7 +220,7 @@ class Tethered:
         self._pending.wait(dt)
         self._measured = measured
         motions = np.concatenate([measured, np.zeros((len(measured), 6))], axis=1)
-        self._directions(self._robot, self.tethers, motions[None], self._now)
+        control_coordinates(self._robot, self.tethers, motions, self._now)
         return self._now[0, :2]
 
     def under_way(self) -> np.ndarray:
@@ -245,7 +235,7 @@ class Tethered:
         motion[2, :6], motion[2, 6:] = platform, planned + more
         moving = np.zeros((len(carriers), 3, 6))
         moving[:, :2] = self._measured[1:].reshape(-1, 2, 6)
-        self._carriers_of(self._robot, self.tethers, motion, moving)
+        control_carriers(self._robot, self.tethers, motion, moving)
         carriers[:, :, :3] = moving[:, :, :3]
 
     def rest(self, stage: float, carriers: np.ndarray) -> None:
@@ -258,7 +248,7 @@ class Tethered:
 
 
 def _tethers(robot: Robot) -> np.ndarray:
-    """Return the carriers that cables of fixed length hold, in the columns of `tethers`.
+    """Return the carriers that cables of fixed length hold, (c,) of `TETHER`.
 
     Raises
     ------
@@ -269,7 +259,7 @@ def _tethers(robot: Robot) -> np.ndarray:
     anchors, attachments = dynamics_of(robot).points(robot.home, robot.carrier_home)
     cy, sy = np.cos(robot.home[5]), np.sin(robot.home[5])
     level = np.array([[cy, sy, 0], [-sy, cy, 0], [0, 0, 1]])
-    result = np.zeros((len(robot.carriers), TETHER_COLUMNS))
+    result = np.zeros(len(robot.carriers), TETHER)
     for index, (row, carrier) in enumerate(zip(result, robot.carriers, strict=True)):
         which = np.flatnonzero(robot.carrier_of_cable == index)
         if not 1 <= len(which) <= 3:
@@ -282,10 +272,9 @@ def _tethers(robot: Robot) -> np.ndarray:
         axes = np.concatenate([axes[len(which) :], axes[: len(which)]])
         place = level @ (robot.carrier_home[index, :3] - attachments[which].mean(axis=0))
         at_home = axes @ place
-        row[HELD], row[CABLES] = index, len(which)
-        row[WHICH : WHICH + len(which)], row[LENGTHS_OF : LENGTHS_OF + len(which)] = which, lengths[which]
-        row[AT_HOME : AT_HOME + 3], row[AXES:] = at_home, axes.ravel()
+        row["carrier"], row["cables"], row["cable"][: len(which)] = index, len(which), which
+        row["length"][: len(which)], row["at_home"], row["axes"] = lengths[which], at_home, axes
         baseline = np.ptp(attachments[which], axis=0)
         radius = lengths[which].mean() ** 2 - (baseline @ baseline) / 4
-        row[FARTHEST] = SHARE * np.sqrt(max(radius, 0.0))
+        row["farthest"] = SHARE * np.sqrt(max(radius, 0.0))
     return result

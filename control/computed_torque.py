@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from math import ceil
 from numbers import Real
 from typing import Any
@@ -11,49 +12,28 @@ import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
-from ..base.inputs import number, repeated, shown
-from ..models.batch import as_array
+from ..base.inputs import number, shown
+from ..core import control_move_on, control_problem, control_take, control_thrusts
 from ..models.files import as_robot
+from ..models.record import record_of
 from ..models.robot import Robot
-from ..plant import layout
-from ..plant.packing import bodies_of, cables_of, settings_of
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
-from .actuators import actuators
 from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command
 from .command_delay import Pending
 from .controllability import uncontrolled
 from .controller import Controller
-from .machine import mechanics, move_on, thrusts
-from .mechanics import (
-    CARRIERS,
-    DISTURBANCE,
-    GAINS,
-    HEARD,
-    IS_CUT,
-    KD,
-    KI,
-    KNOWN,
-    KP,
-    LAST,
-    MEASURED,
-    MEMORY,
-    OBSERVER,
-    PULLS,
-    SOMETHING,
-    THEN,
-    WINCHES,
-)
+from .records import CABLE, CARRIER, PLATFORM
 from .reference import Reference
+from .settings import limits_of, reach_of, set_reach, settings_of
 from .state import State
 from .tension_loop import TensionLoop
-from .thrusts import OTHER, OTHERS, TURN, TURNS
 from .turning import Turning
 
-__all__ = ["ComputedTorque", "positive", "reach_of"]
+__all__ = ["SOMETHING", "ComputedTorque"]
 
-SLOW = 20.0  # [rad/s], see `mechanics.know`
+SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 SHORTEST_LAG = 0.005  # [s]
 ROUNDING = 1e-9  # [s]
 LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
@@ -93,7 +73,7 @@ class ComputedTorque(Controller):
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     reach
-        How far carriers may go off their reference to help the tensions (see `carrier_compensation`): position [m] and
+        How far carriers may go off their reference to help the tensions (see `core/control/compensation.c`): position [m] and
         attitude [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may go 0.5 m.
     carrier_bandwidth, carrier_acceleration
         Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
@@ -140,42 +120,22 @@ class ComputedTorque(Controller):
         self.robot = as_robot(robot)
         few = self._few = self.robot.m < len(self.robot.platform.dof)
         self._scale = self.robot.wrench_scale
-        w = positive("bandwidth", (1.5 if few else 10.0) if bandwidth is None else bandwidth, 6)
-        z = positive("damping", damping, 6)
-        self._gains = np.zeros((GAINS, 6))
-        self._gains[KP], self._gains[KD], self._gains[KI] = w**2, 2 * z * w, positive("integral", integral, 6)
-        self._gains[OBSERVER] = number("observer", observer, 0.0, 1e4)
-        self._gains[CARRIERS, :3] = (
-            number("carrier_bandwidth", carrier_bandwidth, 0.0, 1e3),
-            number("carrier_acceleration", carrier_acceleration, 0.0, 1e4),
-            float(few),
-        )
-        # Cables of a fixed length have no winch that could be off: their tensions are what carriers make of them.
-        self._gains[CARRIERS, WINCHES] = SLOW if self.robot.fixed_lengths is None else 0.0
-        patience = number("patience", patience, 1e-6, 1e6)
-        self._patience = patience if self.robot.fixed_lengths is None else np.inf
+        self._limits = limits_of(self.robot, rate)
+        if bandwidth is None:
+            bandwidth = 1.5 if few else 10.0
+        gains = bandwidth, damping, integral, observer, carrier_bandwidth, carrier_acceleration, place, patience
+        self._settings = settings_of(self.robot, self._limits, *gains)
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
-        self._reach = far if far.any() else np.zeros((0, 6))
-        fastest = np.full(self.robot.m, np.inf) if rate is None else positive("rate", rate, self.robot.m)
-        self._limits = np.stack([self.robot.t_min, self.robot.t_max, fastest])
+        set_reach(self._settings, far)
+        self._attitude = number("attitude", attitude, 0.1, 1e3)
         loop = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1e3)
         self._loop = TensionLoop(loop[0], max(loop[1], SHORTEST_LAG), *self._limits) if loop[0] else None
-        self._little = np.maximum(self.robot.t_min, SOMETHING * self.robot.t_max)
-        self._boxes = boxes(self.robot) if len(self._reach) else None
-        bodies = bodies_of(self.robot)
-        bodies[:, layout.MOTION] = layout.FREE  # where they are is measured, whatever moves them
-        none, platform = np.zeros(self.robot.m), self.robot.platform
-        settings = np.array([*settings_of(self.robot), *platform.com, platform.mass])
-        self._robot = (bodies, cables_of(self.robot, none, none), settings, self.robot.dof_mask.astype(float))
-        mechanics()  # loaded now, not in the first step
-        self._inverses, self._actuators, self._forces = actuators(self.robot)
-        loops = number("place", place, 0.1, 1e3), number("attitude", attitude, 0.1, 1e3), self._gains[OBSERVER, 0]
-        self._loops = np.array(loops)
-        self._flies = bool(self._inverses.any())
-        self._moves_carriers = self._flies or len(self._reach) > 0
-        if self._flies:
-            thrusts()
-        self._turning = Turning(self._loops[1]) if self._flies else None
+        self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
+        self._boxes = boxes(self.robot) if far.any() else None
+        self._robot = record_of(self.robot)
+        self._flies = bool(self._settings["by_wrench"].any())
+        self._moves_carriers = self._flies or bool(far.any())
+        self._turning = Turning(self._attitude) if self._flies else None
         self._begin(1)
 
     @override
@@ -185,23 +145,22 @@ class ComputedTorque(Controller):
     @property
     def disturbance(self) -> np.ndarray:
         """Return the estimated force [N] and moment about the CoM [N m] beside cables and weight, (n, 6)."""
-        return self._memory[:, DISTURBANCE].copy()
+        return self._platform["disturbance"].copy()
 
     @property
     def disturbance_of_carriers(self) -> np.ndarray:
         """Return the estimated force on each flying carrier beside thrust, cables and weight, (n, c, 3) [N]."""
-        return self._others[:, :, OTHER].copy()
+        return self._of_carriers["force"].copy()
 
     @property
     def uncontrolled(self) -> np.ndarray:
         """Return what the controller cannot change at home: wrench directions (k, 6), moments over the length [N]."""
-        reach = self._reach if len(self._reach) else np.zeros((len(self.robot.carriers), 6))
-        return uncontrolled(self.robot, reach)
+        return uncontrolled(self.robot, self._settings["reach"][: len(self.robot.carriers)])
 
     @property
     def cut(self) -> np.ndarray:
         """Return which cables count as cut, (n, m)."""
-        return self._heard[:, IS_CUT] > 0
+        return self._cables["is_cut"] > 0
 
     @property
     def problems(self) -> InPlace:
@@ -216,24 +175,20 @@ class ComputedTorque(Controller):
         self._seen, self._commanded = 0.0, Pending(2 * OLDEST)
         self._commanded.reset(rows * m)
         self._accelerations = np.zeros((rows, count, 6))  # of carriers, as ordered last
-        self._of_now = np.zeros((0, 1 + count, 12))
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
-        self._pulls, self._integrates = np.zeros((rows, PULLS, m)), np.ones(rows, dtype=bool)
-        self._memory, self._reactions = np.zeros((rows, MEMORY, 6)), np.zeros((rows, 2, len(self._reach), 6))
-        # Carriers have a command of their own where they react or fly.
-        self._carriers = np.zeros((rows, count if self._moves_carriers else 0, 3, 6))
-        self._actuation = np.zeros((rows, *self._inverses.shape[:2]))
-        self._held = np.zeros_like(self._actuation)
-        self._stable, self._lags = np.tile(self._loops, (rows, 1)), np.zeros(rows)
-        self._ordered = np.zeros((rows, count, 3))
+        self._carriers = np.zeros((rows, count, 3, 6))  # how they should move, where they have a command of their own
+        self._cables, self._platform = np.zeros((rows, m), CABLE), np.zeros(rows, PLATFORM)
+        self._platform["attitude"], self._platform["integrates"] = self._attitude, 1
+        self._of_carriers = np.zeros((rows, count), CARRIER)
+        self._actuation = np.zeros((rows, count, max(len(carrier.actuators) for carrier in self.robot.carriers)))
+        self._lags = np.zeros(rows)
         if self._turning is not None:
             self._turning.reset()
-        self._others = np.zeros((rows, count, OTHERS, 3))
-        self._problems = InPlace(rows, 6, m, self.robot.length)
-        self._heard = np.zeros((rows, HEARD, m))
-        given = (self._wanted, self._problems.t_ref, self._pulls, self._heard)
-        results = (self._carriers, self._problems.A, self._problems.w, self._problems.bounds)
-        self._arrays = (*given, self._integrates, self._memory, self._reactions, *results)
+        self._problems = problems = InPlace(rows, 6, m, self.robot.length)
+        orders = self._carriers if self._moves_carriers else None
+        memory = self._cables, self._platform, self._of_carriers
+        self._inputs = self._robot, self._measured, self._cables, self._wanted, orders, problems.t_ref
+        self._arrays = self._wanted, problems.t_ref, orders, *memory, problems.A, problems.w, problems.bounds
         if self._loop is not None:
             self._loop.reset()
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
@@ -252,9 +207,9 @@ class ComputedTorque(Controller):
         self._measure(time, state, reference)
         tensions, answered, proof = self._distribute()
         if answered is not self._as_planned:
-            self._integrates[:] = answered == PLANNED
+            self._platform["integrates"] = answered == PLANNED
         elif self._paused:
-            self._integrates[:] = True
+            self._platform["integrates"] = 1
         self._paused = answered is not self._as_planned
         return self._command(reference, tensions, answered, proof, np.ndim(state.pose) == 1)
 
@@ -284,46 +239,45 @@ class ComputedTorque(Controller):
             )
         self._take(state, reference)
         since, late = self._move_on(float(time), state, dt)
-        settings = self._robot, self._gains, self._limits, self._reach, self._patience
-        mechanics()(*settings, dt, since, late, self._measured, *self._arrays)
+        control_problem(dt, since, self._robot, self._settings, self._measured, late, *self._arrays)
         self._first = float(time) if self._time is None else self._first
         self._time, self._elapsed = float(time), dt
         return dt
 
-    def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray]:
+    def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray | None]:
         """Make the measured state that of now; return how long after the last it was measured [s], and itself if late.
 
         The observers compare it as it was measured: with one that is predicted they would correct what they predict,
         and be unstable from the inverse of their bandwidth on.
         """
-        pulls, measured = self._pulls, self._measured
+        cables, measured = self._cables, self._measured
         seen = time if state.time is None else state.time
         if not isinstance(seen, Real) or not -LATEST <= seen <= time + ROUNDING:
             raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
         age, since = time - float(seen), 0.0 if self._time is None else float(seen) - self._seen
-        otherwise, self._seen = pulls[:, KNOWN] - pulls[:, THEN], float(seen)
+        self._seen = float(seen)
         first = dt > 0 and self._time == self._first  # whose command is taken for that of the time before
         for lasted in (OLDEST, dt) if first else (dt,):
-            self._commanded.add(pulls[:, LAST].ravel())
+            self._commanded.add(cables["last"].ravel())
             self._commanded.wait(lasted)
+        otherwise = cables["known"] - cables["then"]
         if age <= ROUNDING and since == dt:
-            pulls[:, THEN] = pulls[:, LAST]
+            cables["then"] = cables["last"]
         elif dt > 0:
             window = since if since > 0 else dt
-            pulls[:, THEN] = self._commanded.means(age + window, 1, window).reshape(len(pulls), -1)
+            cables["then"] = self._commanded.means(age + window, 1, window).reshape(cables.shape)
         if not self._senses:
-            pulls[:, MEASURED] = pulls[:, THEN]
+            cables["measured"] = cables["then"]
         if age <= ROUNDING:
-            return since, self._of_now
+            return since, None
         late = measured.copy()
         if age > OLDEST:
             measured[:] = np.nan
         else:
             parts = ceil(age / PART)
             tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
-            disturbance = np.ascontiguousarray(self._memory[:, DISTURBANCE])
-            given = disturbance, np.maximum(tensions, 0.0), self._accelerations, measured
-            move_on()(self._robot, age / parts, *given)
+            given = self._platform["disturbance"].copy(), np.maximum(tensions, 0.0), self._accelerations
+            control_move_on(age / parts, self._robot, *given, measured)
         return since, late
 
     def _command(
@@ -336,10 +290,10 @@ class ComputedTorque(Controller):
     ) -> Command:
         """Return the command of tensions (N, m) and the carriers' reference, which those that react or fly leave."""
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
-        if np.count_nonzero(self._heard[:, IS_CUT]):
+        if np.count_nonzero(self._cables["is_cut"]):
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
-        rows, self._pulls[:, LAST] = len(tensions), tensions
-        if len(self._carriers[0]):
+        rows, self._cables["last"] = len(tensions), tensions
+        if self._moves_carriers:
             own = self._carriers.copy()
             if self._boxes is not None:
                 stay_inside(own, *self._boxes)
@@ -348,12 +302,8 @@ class ComputedTorque(Controller):
         self._accelerations[:] = carriers[2]
         actuation = None
         if self._flies:
-            given = self._measured, self._carriers, tensions, self._pulls, self._held, self._others
-            thrusts()(self._robot, self._stable, self._inverses, self._forces, self._elapsed, *given, self._actuation)
-            # A state that is no state leaves its actuators as they were.
-            inside = np.clip(self._actuation, *self._actuators)
-            actuation = self._held = np.where(np.isfinite(inside), inside, self._held)
-            self._slow_down()
+            self._actuate(tensions)
+            actuation = self._actuation.copy()
         tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
@@ -361,39 +311,34 @@ class ComputedTorque(Controller):
         pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
 
-    def _slow_down(self) -> None:
-        """Lower the bandwidth of attitudes where carriers turn too late for it."""
+    def _actuate(self, tensions: np.ndarray) -> None:
+        """Write the commands of actuators; lower the bandwidth of attitudes where carriers turn too late for it."""
+        carriers, attitude = self._of_carriers, self._platform["attitude"]
+        ordered = carriers["ordered"].copy()
+        given = self._measured, self._carriers, tensions, self._cables, self._platform, carriers
+        control_thrusts(self._elapsed, self._robot, self._settings, *given, self._actuation)
         if self._turning is not None:
-            self._lags = self._turning.lag(self._elapsed, self._ordered, self._others[:, :, TURNS])
+            self._lags = self._turning.lag(self._elapsed, ordered, carriers["turning"])
             if self._lags.any():
-                longest = np.maximum(self._lags, 1.0 / self._loops[1])
-                self._stable[:, 1] = np.minimum(self._stable[:, 1], 1.0 / longest)
-        inside = (self._actuation == self._held).all(axis=2, keepdims=True)
-        self._ordered = np.where(inside, self._others[:, :, TURN], np.nan)
+                attitude[:] = np.minimum(attitude, 1.0 / np.maximum(self._lags, 1.0 / self._attitude))
 
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
         """Return what winches are sent so that tensions are as wanted, (N, m) [N]."""
         if self._loop is None:
             return wanted
-        reports = self._pulls[:, MEASURED] if self._senses else None
-        return self._loop.sent(self._elapsed, wanted, self._pulls[:, THEN], reports, self.cut)
+        reports = self._cables["measured"] if self._senses else None
+        return self._loop.sent(self._elapsed, wanted, self._cables["then"], reports, self.cut)
 
     def _take(self, state: State, reference: Reference) -> None:
-        """Copy a state and a reference to where the kernel reads them."""
-        measured, wanted, pulls = self._measured, self._wanted, self._pulls
+        """Copy a state and a reference to where the core reads them."""
+        self._senses = state.tensions is not None
         try:
-            measured[:, 0, :6], measured[:, 0, 6:] = state.pose, state.velocity
-            measured[:, 1:, :6], measured[:, 1:, 6:] = state.carrier_pose, state.carrier_velocity
-            wanted[:, :6], wanted[:, 6:12], wanted[:, 12:] = reference[:3]
-            if len(self._carriers[0]):
-                for order in range(3):
-                    self._carriers[:, :, order] = reference[3 + order]
-            self._problems.t_ref[:] = 0.0 if reference.tensions is None else reference.tensions
-            self._senses = state.tensions is not None
-            if self._senses:
-                pulls[:, MEASURED] = state.tensions
-        except (ValueError, TypeError):
-            raise InputError(self._misfit(state, reference)) from None
+            control_take(state, reference, *self._inputs)
+        except (ValueError, TypeError, BufferError):
+            try:  # as arrays of float64, which they need not be
+                control_take(_floats(state[:5]), _floats(reference), *self._inputs)
+            except (ValueError, TypeError):
+                raise InputError(self._misfit(state, reference)) from None
 
     def _misfit(self, state: State, reference: Reference) -> str:
         """Return which array of a state or a reference does not fit the robot."""
@@ -422,32 +367,14 @@ class ComputedTorque(Controller):
         answered = np.where((problems.code == OPTIMAL) | nearly, PLANNED, SOFT).astype(np.int8)
         for row in np.flatnonzero(~np.isfinite(problems.tensions).all(axis=1)):
             answered[row] = HOLD
-            last, reference = self._pulls[row, LAST], problems.t_ref[row]
+            last, reference = self._cables["last"][row], problems.t_ref[row]
             target = np.where(np.isfinite(reference), reference, last)
             problems.tensions[row] = np.clip(target, *problems.bounds[:, row])
         return answered
 
 
-def reach_of(robot: Robot, reach: Any) -> np.ndarray:
-    """Return how far each coordinate of each carrier may go, (c, 6) [m, rad]."""
-    far = as_array("reach", reach, (2,))
-    if far.shape != (2,) or not ((far >= 0) & (far <= [1e3, 1.0])).all():
-        raise InputError(f"reach must be a distance [m] and an angle up to 1 rad, got {shown(reach)}")
-    result = np.zeros((len(robot.carriers), 6))
-    for row, carrier in zip(result, robot.carriers, strict=True):
-        free = list(carrier.free_coordinates(robot.drive))
-        row[free] = np.repeat(far, 3)[free]
-        if carrier.efforts:
-            row[3:] = 0.0  # its attitude follows from its thrust
-    return result
-
-
-def positive(name: str, value: Any, size: int) -> np.ndarray:
-    """Return numbers from 0 on, one or `size` of them, as (size,)."""
-    result = repeated(name, value, size)
-    if not ((result >= 0) & (result <= 1e9)).all():
-        raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")
-    return result
+def _floats(parts: Iterable[Any]) -> tuple[np.ndarray | None, ...]:
+    return tuple(None if part is None else np.asarray(part, dtype=float) for part in parts)
 
 
 def _for_all(value: np.ndarray, rows: int) -> np.ndarray:

@@ -13,6 +13,7 @@ from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import number, whole_number
+from ..core import control_aim, control_stages
 from ..models.files import as_robot
 from ..models.robot import Robot
 from ..models.shapes import Shape
@@ -21,13 +22,11 @@ from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
 from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
-from .computed_torque import ComputedTorque, positive, reach_of
+from .computed_torque import SOMETHING, ComputedTorque
 from .keep_out import Surroundings
-from .machine import aim
-from .machine import stages as write_stages
-from .mechanics import DISTURBANCE, HIGHEST, KNOWN, LAST, LOWEST, OBSERVER, RATE_MAX, SOMETHING
 from .preview import Preview, turns
 from .reference import Reference
+from .settings import positive, reach_of, set_reach
 from .stability import grows
 from .state import State
 from .watch import LATE, UNSTABLE, HandOver, Watch
@@ -149,16 +148,16 @@ class Predictive(ComputedTorque):
         self._beside = ComputedTorque(the_robot, reach=given, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
         super().__init__(the_robot, observer=observer, reach=reach, **loops)
-        self._reach = reacts if reacts.any() else np.zeros((0, 6))
+        set_reach(self._settings, reacts)
         self._followed = np.flatnonzero(flies & ~far.any(axis=1))
         # What is under way for longer than half of the stages would leave nothing to decide.
-        delay = min(2.0 / self._loops[1], self._times[-1] / 2), self._steps[0]
+        delay = min(2.0 / self._attitude, self._times[-1] / 2), self._steps[0]
         if the_robot.fixed_lengths is None:
             late = Flown(far, self._strongest, *delay) if (far.any(axis=1) & flies).any() else None
             self._moved: Moved = late or Freed(far, self._strongest, self._boxes)
             reaches = far[far > 0]
         else:
-            self._moved = Tethered(self.robot, self._robot, *delay)
+            self._moved = Tethered(self.robot, *delay)
             least = LEAST_REACH * float(the_robot.fixed_lengths.mean())
             reaches = np.full(self._moved.count, max(far.max(), least))
         m, f = self.robot.m, self._moved.count
@@ -166,7 +165,7 @@ class Predictive(ComputedTorque):
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
         unknown = np.zeros(self.robot.m) if the_robot.fixed_lengths is None else self._statics
         # How far rates let tensions go until the end of each stage.
-        self._room = self._limits[RATE_MAX] * self._times[1:, None]
+        self._room = self._limits.rate * self._times[1:, None]
         self._preview = Preview(self._steps, self._moved, unknown)
         A, B = self._at_home()
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
@@ -202,17 +201,17 @@ class Predictive(ComputedTorque):
         controls[0, : robot.m] = self._statics
         A, B, c = np.zeros((1, n, n)), np.zeros((1, n, u)), np.zeros((1, n))
         about = self._steps[:1], np.zeros(6), carriers[None], states, controls
-        write_stages()(self._robot, self._moved.freed, self._moved.tethers, *about, A, B, c)
+        control_stages(self._robot, self._moved.freed, self._moved.tethers, *about, A, B, c)
         return A[0], B[0]
 
     def _ripple(self) -> np.ndarray | None:
         """Return tensions that unit rates require, over their distance from limits at home, (m, 6) [s/m]."""
-        low, high = self._limits[LOWEST], self._limits[HIGHEST]
+        low, high, _ = self._limits
         best = tensions_at(self.robot, self.robot.home, method="largest-margin")
         if best.tensions is None:
             return None
         room = np.minimum(best.tensions - low, high - best.tensions)
-        asked = tensions_of(self.robot) * (2 * self._bandwidth + self._gains[OBSERVER])
+        asked = tensions_of(self.robot) * (2 * self._bandwidth + float(self._settings["observer"]))
         return asked / np.maximum(room, SOMETHING * high)[:, None]
 
     @override
@@ -280,7 +279,7 @@ class Predictive(ComputedTorque):
         command = self._command(reference, tensions, answered, proof, alone=True)
         self._agree(self, self._beside)
         if lag := self._lags[0]:
-            self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._loops[1]:.0f}")
+            self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._attitude:.0f}")
         return command._replace(unexplained=unexplained)
 
     def _compare(self, time: float, dt: float, reference: Reference) -> None:
@@ -288,22 +287,23 @@ class Predictive(ComputedTorque):
         if not np.isfinite(self._problems.w).all():
             self._watch.interrupt()
             return
-        otherwise = self._pulls[0, KNOWN] - self._pulls[0, LAST] if self._has_winches else self._none
+        otherwise = self._cables["known"][0] - self._cables["last"][0] if self._has_winches else self._none
         self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
-        if self.handed_over is not None and len(self._beside._reach):
+        if self.handed_over is not None and self._beside._settings["reacts"]:
             carriers = np.stack(reference[3:6], axis=1)
             self._moved.now(dt, self._measured[0], self._preview.moved_of(self._preview.rows([reference])))
             offsets = self._moved.offsets(carriers)
             if offsets is not None:
-                self._beside._reactions[0] = offsets
-                self._beside._reactions[0, 0] -= dt * offsets[1]  # which this step adds
+                memory, (offset, rate) = self._beside._of_carriers[0], offsets
+                memory["offset"], memory["offset_rate"] = offset - dt * rate, rate  # this step adds the rest
 
     @staticmethod
     def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
         """Let another controller of the same robot know what one has sent as if it were its own."""
-        other._pulls[:, LAST], other._held = sender._pulls[:, LAST], sender._held
-        other._accelerations[:], other._stable[:, 1] = sender._accelerations, sender._stable[:, 1]
-        other._ordered = sender._ordered
+        other._cables["last"], other._actuation[:] = sender._cables["last"], sender._actuation
+        other._accelerations[:] = sender._accelerations
+        other._platform["attitude"] = sender._platform["attitude"]
+        other._of_carriers["ordered"] = sender._of_carriers["ordered"]
 
     @property
     @override
@@ -325,12 +325,12 @@ class Predictive(ComputedTorque):
         # Carriers that fly are where they are, not where they should be.
         for which in self._followed:
             carriers[:, which, :3] += self._measured[0, 1 + which, :3] - carriers[0, which, :3]
-        about = self._memory[0, DISTURBANCE], carriers, states, controls
-        write_stages()(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
+        about = self._platform["disturbance"][0], carriers, states, controls
+        control_stages(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
         h.c += ramps
         # The model knows what the reference does not, the estimated disturbance: a solution would be off by a balance
         # of errors and tensions for as long as it stays.
-        aim()(self._steps, self.robot.length, self._efforts, h.A, h.B, h.c, wanted, planned)
+        control_aim(self.robot.length, h.A, h.B, h.c, self._steps, self._efforts, wanted, planned)
         under_way = self._moved.under_way()
         for k, more in enumerate(under_way):
             h.c[k] += h.B[k, :, m:] @ (planned[k, m:] + more)
@@ -385,10 +385,10 @@ class Predictive(ComputedTorque):
     def _write_bounds(self, controls: np.ndarray, planned: np.ndarray) -> None:
         """Write limits of tensions, as far as their rates let them go, and of the carriers' accelerations."""
         h, m = self._horizon, self.robot.m
-        low, high = self._limits[LOWEST], self._limits[HIGHEST]
+        low, high, _ = self._limits
         h.u_min[:, :m], h.u_max[:, :m] = low, high
         if isfinite(self._solved):
-            last = self._pulls[0, LAST]
+            last = self._cables["last"][0]
             h.u_min[:, :m] = np.minimum(np.maximum(low, last - self._room), high)
             h.u_max[:, :m] = np.maximum(np.minimum(high, last + self._room), low)
         if self._moved.count:

@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 
 from ..base.machine_code.kernel import GIVEN, Kernel, compile_function
-from ..control.machine import mechanics
 from ..plant import machine
 from ..plant.machine import joined, run_rows
 
@@ -40,5 +39,5 @@ def prepare() -> None:
 
     A machine compiles it once, which takes some 30 s; loading takes less than a second.
     """
-    for kernel in (run_rows, mechanics, sense_rows, write_lengths):
+    for kernel in (run_rows, sense_rows, write_lengths):
         kernel()

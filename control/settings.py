@@ -1,0 +1,106 @@
+"""`settings_of`: what a controller is set to, as the record that the core reads, from checked arguments."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.inputs import number, repeated, shown
+from ..models.batch import as_array
+from ..models.robot import Robot
+from .records import CONTROLLER
+
+__all__ = ["Limits", "limits_of", "positive", "reach_of", "set_reach", "settings_of"]
+
+SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
+
+
+class Limits(NamedTuple):
+    """Limits of tensions and of their rates, each (m,).
+
+    Attributes
+    ----------
+    low, high
+        [N].
+    rate
+        [N/s], infinite without a limit.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    rate: np.ndarray
+
+
+def limits_of(robot: Robot, rate: Any) -> Limits:
+    """Return the limits of a robot's tensions, with a largest rate for all or for each [N/s], or None."""
+    fastest = np.full(robot.m, np.inf) if rate is None else positive("rate", rate, robot.m)
+    return Limits(np.asarray(robot.t_min), np.asarray(robot.t_max), fastest)
+
+
+def settings_of(
+    robot: Robot,
+    limits: Limits,
+    bandwidth: Any,
+    damping: Any,
+    integral: Any,
+    observer: float,
+    carrier_bandwidth: float,
+    carrier_acceleration: float,
+    place: float,
+    patience: float,
+) -> np.ndarray:
+    """Return the settings of `ComputedTorque`, whose arguments these are, a record (); the reach is zero.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value.
+    """
+    settings = np.zeros((), CONTROLLER)
+    w, z = positive("bandwidth", bandwidth, 6), positive("damping", damping, 6)
+    settings["kp"], settings["kd"], settings["ki"] = w**2, 2 * z * w, positive("integral", integral, 6)
+    settings["observer"] = number("observer", observer, 0.0, 1e4)
+    settings["carrier_bandwidth"] = number("carrier_bandwidth", carrier_bandwidth, 0.0, 1e3)
+    settings["carrier_acceleration"] = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
+    settings["corrects"] = robot.m < len(robot.platform.dof)
+    patience = number("patience", patience, 1e-6, 1e6)
+    # Cables of a fixed length have no winch that could be off: their tensions are what carriers make of them.
+    has_winches = robot.fixed_lengths is None
+    settings["learning"], settings["patience"] = (SLOW, patience) if has_winches else (0.0, np.inf)
+    settings["place"] = number("place", place, 0.1, 1e3)
+    for name, values in limits._asdict().items():
+        settings["limits"][name][: robot.m] = values
+    for by_wrench, carrier in zip(settings["by_wrench"], robot.carriers, strict=False):
+        if own := carrier.actuators:
+            by_wrench[: len(own)] = np.linalg.pinv(np.array([each.wrench for each in own]).T)
+    return settings
+
+
+def set_reach(settings: np.ndarray, reach: np.ndarray) -> None:
+    """Set how far carriers may go off their reference to help the tensions, (c, 6) [m, rad]; zeros: they do not."""
+    settings["reach"][: len(reach)] = reach
+    settings["reacts"] = reach.any()
+
+
+def reach_of(robot: Robot, reach: Any) -> np.ndarray:
+    """Return how far each coordinate of each carrier may go, (c, 6) [m, rad]."""
+    far = as_array("reach", reach, (2,))
+    if far.shape != (2,) or not ((far >= 0) & (far <= [1e3, 1.0])).all():
+        raise InputError(f"reach must be a distance [m] and an angle up to 1 rad, got {shown(reach)}")
+    result = np.zeros((len(robot.carriers), 6))
+    for row, carrier in zip(result, robot.carriers, strict=True):
+        free = list(carrier.free_coordinates(robot.drive))
+        row[free] = np.repeat(far, 3)[free]
+        if carrier.efforts:
+            row[3:] = 0.0  # its attitude follows from its thrust
+    return result
+
+
+def positive(name: str, value: Any, size: int) -> np.ndarray:
+    """Return numbers from 0 on, one or `size` of them, as (size,)."""
+    result = repeated(name, value, size)
+    if not ((result >= 0) & (result <= 1e9)).all():
+        raise InputError(f"{name} must be numbers from 0 to 1e9, one or {size}, got {shown(value)}")
+    return result
