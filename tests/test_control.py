@@ -5,15 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Reference, State, mechanics
-from towline.control.carrier_compensation import write_columns
-from towline.control.computed_torque import reach_of
-from towline.control.machine import move_on
+from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Reference, State
+from towline.control.settings import reach_of
 from towline.control.tension_loop import TensionLoop
+from towline.core import control_move_on
 from towline.models import Dynamics, load
-from towline.plant import Plant, layout
-from towline.plant.bodies import place_bodies
-from towline.plant.lines import run_cables
+from towline.models.record import record_of
+from towline.plant import Plant
 from towline.simulation import simulate
 from towline.solvers import TensionProblem, solve
 from towline.statics.distribution import tensions as distribute
@@ -132,7 +130,7 @@ def test_a_state_of_earlier_is_moved_on_as_the_plant_moves():
     measured[0, 0], measured[0, 1, :6] = np.append(robot.home, velocity), robot.carrier_home
     was = measured.copy()
     parts = np.repeat(commanded, 10, axis=0)[:, None]
-    move_on()(ComputedTorque(robot)._robot, age / 20, push[None], parts, bend[None], measured)
+    control_move_on(age / 20, record_of(robot), push[None], parts, bend[None], measured)
     exact = np.concatenate([[np.append(now.pose, now.velocity)], np.hstack([now.carrier_pose, now.carrier_velocity])])
     np.testing.assert_allclose(measured[0, :, :6], exact[:, :6], atol=1e-6)
     np.testing.assert_allclose(measured[0, :, 6:], exact[:, 6:], atol=1e-3)

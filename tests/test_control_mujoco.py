@@ -182,9 +182,9 @@ def test_an_attitude_loop_is_slowed_down_before_late_rotors_make_it_unstable():
     task = Task(robot, [rest] * 1500, None, Hardware(stiffness=2e4, damping=50.0), (2, 1.5, 0.3), 1.0, 0.1)
     controller = ComputedTorque(robot)
     assert fly(task, controller, **TEAMS["rotor lag 60 ms"]).error.max() < 0.05
-    assert controller._stable[0, 1] < 28
+    assert controller._platform["attitude"][0] < 28
     fly(shorter(task, 500), controller, **TEAMS["rotor lag 30 ms"])
-    assert controller._stable[0, 1] == 40
+    assert controller._platform["attitude"][0] == 40
 
 
 def hooked_below(depth):

@@ -11,12 +11,13 @@ from towline import plan
 from towline.base.errors import InputError
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
 from towline.control.carrier_references import Freed
-from towline.control.fixed_length_carriers import AXES, TETHER_COLUMNS
 from towline.control.keep_out import Surroundings, _distance
-from towline.control.machine import carriers_of, directions, stages
+from towline.control.records import TETHER
 from towline.control.weights import Weights, terminal, weights
+from towline.core import control_carriers, control_coordinates, control_stages
 from towline.models import Dynamics, Robot, load
 from towline.models.points import placed
+from towline.models.record import record_of
 from towline.simulation import simulate
 from towline.solvers.horizon import Horizon, Residuals
 
@@ -43,8 +44,8 @@ def test_stages_are_the_symbolic_dynamics_to_first_order(name):
     states[:, 6:12] = 0.3 * rng.normal(size=(count + 1, 6)) * robot.dof_mask
     states[:, 12:15] = robot.carrier_home[0, :3] + 0.02 * rng.normal(size=(count + 1, 3))
     disturbance = rng.normal(size=6)
-    given = (freed, np.zeros((0, TETHER_COLUMNS)), np.full(count, dt), disturbance, carriers, states, controls)
-    stages()(ComputedTorque(robot)._robot, *given, A, B, offset)
+    given = (freed, np.zeros(0, TETHER), np.full(count, dt), disturbance, carriers, states, controls)
+    control_stages(record_of(robot), *given, A, B, offset)
 
     def move(x, u):
         places = robot.carrier_home.copy()
@@ -79,7 +80,7 @@ def team_motion(robot, rng):
         cy, sy = np.cos(pose[5]), np.sin(pose[5])
         places = robot.carrier_home.copy()
         for i, (a, b) in enumerate(coordinates.reshape(-1, 2)):
-            e1, e2, n = tethers[i, AXES:].reshape(3, 3)
+            e1, e2, n = tethers["axes"][i]
             n = n if n[2] > 0 else -n  # up
             along = a * e1 + b * e2 + np.sqrt(lengths[i] ** 2 - a**2 - b**2) * n
             places[i, :3] = attachments[i] + [cy * along[0] - sy * along[1], sy * along[0] + cy * along[1], along[2]]
@@ -100,7 +101,7 @@ def test_stages_of_a_team_are_the_symbolic_dynamics_to_first_order():
     still = np.concatenate([robot.carrier_home, 0 * robot.carrier_home], axis=1)[None]
     disturbance = rng.normal(size=6)
     given = (np.zeros((0, 2), dtype=np.int64), tethers, np.full(1, dt), disturbance, still, x[None], u[None])
-    stages()(ComputedTorque(robot)._robot, *given, A, B, offset)
+    control_stages(record_of(robot), *given, A, B, offset)
 
     def move(x, u):
         rest = dynamics.required_wrench(x[:6], x[6:12], np.zeros(6))
@@ -124,15 +125,14 @@ def test_directions_are_measured_as_carriers_are_commanded():
     """Carriers that move as directions say have cables of constant length, and give the directions back."""
     robot, rng = load("multi-quadrotor-4"), np.random.default_rng(6)
     tethers, carriers, coordinates = team_motion(robot, rng)
-    arrays = ComputedTorque(robot)._robot
     motion = np.concatenate([0.3 * rng.normal(size=(3, 6)), 0.1 * rng.normal(size=(3, 8))], axis=1)
     motion[0, 6:] = coordinates
     commanded = np.zeros((4, 3, 6))
-    carriers_of()(arrays, tethers, motion, commanded)
+    control_carriers(record_of(robot), tethers, motion, commanded)
     np.testing.assert_allclose(commanded[:, 0, :3], carriers(motion[0, :6], coordinates)[:, :3], atol=1e-12)
     both = np.concatenate([motion[None, :, :6], commanded])
     found = np.zeros((1, 3, 8))
-    directions()(arrays, tethers, both.reshape(1, 5, 18), found)
+    control_coordinates(record_of(robot), tethers, both, found)
     np.testing.assert_allclose(found[0], motion[:, 6:], atol=1e-5)
     for s in (-0.01, 0.0, 0.01):  # its second derivative over time is zero, so that the length changes by s^3
         place = both[:, 0] + s * both[:, 1] + s**2 / 2 * both[:, 2]
@@ -148,12 +148,12 @@ def test_carriers_with_two_cables_have_one_coordinate():
     motion = np.concatenate([0.3 * rng.normal(size=(3, 6)), 0.1 * rng.normal(size=(3, 3))], axis=1)
     motion[0, 3:5] *= 0.3
     commanded = np.zeros((3, 3, 6))
-    carriers_of()(controller._robot, controller._moved.tethers, motion, commanded)
+    control_carriers(record_of(robot), controller._moved.tethers, motion, commanded)
     lengths = Dynamics(robot).cable_lengths(motion[0, :6], commanded[:, 0])
     np.testing.assert_allclose(lengths, robot.fixed_lengths, atol=1e-12)
     found = np.zeros((1, 3, 3))
     both = np.concatenate([motion[None, :, :6], commanded])
-    directions()(controller._robot, controller._moved.tethers, both.reshape(1, 4, 18), found)
+    control_coordinates(record_of(robot), controller._moved.tethers, both, found)
     np.testing.assert_allclose(found[0], motion[:, 6:], atol=1e-5)
     push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
     flight = simulate(robot, robot.home, duration=3.0, controller=controller, disturbance=push)
@@ -171,7 +171,7 @@ def test_a_carrier_with_three_cables_is_where_the_load_has_it():
     controller = Predictive(robot)
     assert controller._moved.count == 0
     motion, commanded = 0.2 * np.random.default_rng(1).normal(size=(3, 6)), np.zeros((1, 3, 6))
-    carriers_of()(controller._robot, controller._moved.tethers, motion, commanded)
+    control_carriers(record_of(robot), controller._moved.tethers, motion, commanded)
     lengths = Dynamics(robot).cable_lengths(motion[0], commanded[:, 0])
     np.testing.assert_allclose(lengths, robot.fixed_lengths, atol=1e-12)
     push = [1, 0, 0, 0, 0, 0]

@@ -88,8 +88,8 @@ typedef struct {
 } towline_stages;
 
 /*
- * Write the dynamics to first order about states (N + 1, n) and controls (N, u), with a disturbance (6) on the platform
- * and carriers that move as (N + 1, c, 12) where they do not leave their reference; see stages.c.
+ * Write the dynamics to first order about states (N, n) and controls (N, u), with a disturbance (6) on the platform and
+ * carriers that move as (N, c, 12) where they do not leave their reference; see stages.c.
  */
 void towline_write_stages(const towline_robot *robot, towline_moved moved, const double *disturbance,
                           const double *carriers, const double *states, const double *controls, towline_stages stages);

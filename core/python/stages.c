@@ -129,12 +129,9 @@ PyObject *towline_py_control_stages(PyObject *module, PyObject *const *arguments
     int fits = robot && moved_of(&given, FREED, TETHERS, robot, &moved);
     if (fits) {
         const Py_ssize_t stages = to.A.stages, n = to.A.columns, u = to.B.columns, free = towline_moved_count(moved);
-        const Py_ssize_t sizes[ALL] = {
-            0, 0, 0, stages, 6, (1 + stages) * STATES * robot->carriers, (1 + stages) * n, stages * u};
-        fits = n == STATES + 2 * free && u == robot->cables + free;
-        for (int i = STEPS; i < ALL; i++) {
-            fits = fits && given.size[i] == sizes[i];
-        }
+        fits = n == STATES + 2 * free && u == robot->cables + free && given.size[STEPS] == stages &&
+               given.size[DISTURBANCE] == 6 && given.size[CARRIERS] >= stages * STATES * robot->carriers &&
+               given.size[AT_STATES] >= stages * n && given.size[CONTROLS] == stages * u;
     }
     if (fits) {
         Py_BEGIN_ALLOW_THREADS;
