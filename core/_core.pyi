@@ -12,3 +12,19 @@ def lines(
     robot: Any, poses: Any, carriers: Any, lengths: Any, A: Any, J: Any, anchors: Any, sensitivity: Any
 ) -> None: ...
 def required_wrench(robot: Any, poses: Any, velocities: Any, accelerations: Any, wind: Any, w: Any) -> None: ...
+def run_plant(
+    robot: Any,
+    settings: Any,
+    states: Any,
+    commands: Any,
+    history: Any,
+    tensions: Any,
+    steps: int,
+    period: float,
+    substeps: int,
+    keep: int,
+) -> None: ...
+def sense(robot: Any, states: Any, motions: Any, lengths: Any) -> None: ...
+def winch_lengths(
+    robot: Any, states: Any, lengths: Any, tensions: Any, last_rates: Any, commands: Any, period: float
+) -> None: ...

@@ -12,4 +12,9 @@ PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* plant.c */
+PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 #endif
