@@ -48,24 +48,24 @@ typedef struct {
 } towline_run;
 
 /* How many numbers a state and a command have. */
-ptrdiff_t towline_plant_state_size(const towline_robot* robot);
-ptrdiff_t towline_plant_command_size(const towline_robot* robot);
+ptrdiff_t towline_plant_state_size(const towline_robot *robot);
+ptrdiff_t towline_plant_command_size(const towline_robot *robot);
 
 /*
  * Run each row. The history (rows, 1 + steps / keep, state) gets every state of which the number is a multiple of
  * `keep`, after the impacts of the command that begins there, and `tensions` (.., m) those there under that command
  * [N]; at the end, the state that the last command leaves and the tensions under it.
  */
-void towline_plant_run(const towline_robot* robot, const towline_plant* plant, const towline_run* run,
-                       const double* states, const double* commands, double* history, double* tensions);
+void towline_plant_run(const towline_robot *robot, const towline_plant *plant, const towline_run *run,
+                       const double *states, const double *commands, double *history, double *tensions);
 
 /*
  * What perfect sensors measure of states: `motions` (rows, 1 + carriers, 12), pose and its time derivative of platform
  * frame and carriers, and `lengths` (rows, 2, m), distances along the cables and their rates. At a pitch of 90 degrees
  * the derivatives of roll and yaw are nan.
  */
-void towline_plant_sense(const towline_robot* robot, ptrdiff_t rows, const double* states, double* motions,
-                         double* lengths);
+void towline_plant_sense(const towline_robot *robot, ptrdiff_t rows, const double *states, double *motions,
+                         double *lengths);
 
 /*
  * The unstrained lengths that winches without a model reach within a period, so that tensions are as ordered; see
@@ -73,8 +73,8 @@ void towline_plant_sense(const towline_robot* robot, ptrdiff_t rows, const doubl
  * `towline_plant_sense`, and `commands`, `commands_per` numbers from one row's command to the next, of which those of
  * the cables are written. `last_rates` has the rates one period before [m/s], nan if there was none, and gets those now.
  */
-void towline_plant_winch_lengths(const towline_robot* robot, ptrdiff_t rows, double period, const double* states,
-                                 const double* lengths, const double* tensions, double* last_rates, double* commands,
+void towline_plant_winch_lengths(const towline_robot *robot, ptrdiff_t rows, double period, const double *states,
+                                 const double *lengths, const double *tensions, double *last_rates, double *commands,
                                  ptrdiff_t commands_per);
 
 #endif

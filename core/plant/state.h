@@ -82,15 +82,15 @@ typedef struct {
 typedef enum { ELASTIC, WITH_FRICTION, CONSTRAINED } kind;
 
 typedef struct {
-    const towline_robot* robot;
-    const towline_plant* settings;
+    const towline_robot *robot;
+    const towline_plant *settings;
     int bodies, cables;
     int locates; /* 1: steps end where a contact changes */
     int has_winches, air;
     kind kind;
     double attachment[CABLES][3]; /* from the CoM, in the platform's axes */
     /* of the command */
-    const platform_command* on_platform;
+    const platform_command *on_platform;
     double commanded[CABLES];
     double thrust[CARRIERS][6];  /* force and moment of a carrier's actuators, in its axes */
     carrier_path path[CARRIERS]; /* of those that are imposed or lagged */
@@ -122,10 +122,10 @@ INLINE double smaller(double a, double b) { return a < b ? a : b; }
 INLINE double between(double low, double x, double high) { return smaller(larger(low, x), high); }
 
 /* Which body a cable hangs from. */
-INLINE int owner_of(const plant* p, int i) { return 1 + p->robot->cable[i].carrier; }
+INLINE int owner_of(const plant *p, int i) { return 1 + p->robot->cable[i].carrier; }
 
-INLINE int is_free(const plant* p, int b) { return p->robot->body[b].motion == TOWLINE_FREE; }
+INLINE int is_free(const plant *p, int b) { return p->robot->body[b].motion == TOWLINE_FREE; }
 
-INLINE int never_stretches(const plant* p, int i) { return p->robot->cable[i].stiffness == 0; }
+INLINE int never_stretches(const plant *p, int i) { return p->robot->cable[i].stiffness == 0; }
 
 #endif

@@ -7,15 +7,15 @@
  * and the mean of dl/dt in the period, extrapolated from the last one: with dl/dt at the beginning, a damper would pull
  * too much by C dt/2 times the acceleration, as if the platform were heavier.
  */
-#include "plant/internal.h"
+#include "plant/state.h"
 
-void towline_plant_winch_lengths(const towline_robot* robot, ptrdiff_t rows, double period, const double* states,
-                                 const double* lengths, const double* tensions, double* last_rates, double* commands,
+void towline_plant_winch_lengths(const towline_robot *robot, ptrdiff_t rows, double period, const double *states,
+                                 const double *lengths, const double *tensions, double *last_rates, double *commands,
                                  ptrdiff_t commands_per) {
     const ptrdiff_t m = robot->cables, size = towline_plant_state_size(robot);
     for (ptrdiff_t row = 0; row < rows; row++) {
-        const double* unstrained = states + row * size + TOWLINE_BODY_NUMBERS * (1 + robot->carriers);
-        double* commanded = commands + row * commands_per + TOWLINE_PLATFORM_COMMANDS;
+        const double *unstrained = states + row * size + TOWLINE_BODY_NUMBERS * (1 + robot->carriers);
+        double *commanded = commands + row * commands_per + TOWLINE_PLATFORM_COMMANDS;
         for (ptrdiff_t i = 0; i < m; i++) {
             const double EA = robot->cable[i].stiffness, C = robot->cable[i].damping, own = unstrained[i];
             const double rate = lengths[2 * row * m + m + i];

@@ -5,7 +5,7 @@
 #include "python/extension.h"
 
 /* Read whole numbers, and return 0 with an exception if one is none from 1 to `most`. */
-static int whole_number(PyObject* argument, Py_ssize_t most, Py_ssize_t* number) {
+static int whole_number(PyObject *argument, Py_ssize_t most, Py_ssize_t *number) {
     *number = PyLong_AsSsize_t(argument);
     if (*number == -1 && PyErr_Occurred()) {
         return 0;
@@ -17,7 +17,7 @@ static int whole_number(PyObject* argument, Py_ssize_t most, Py_ssize_t* number)
     return 1;
 }
 
-PyObject* towline_py_run_plant(PyObject* module, PyObject* const* arguments, Py_ssize_t count) {
+PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     enum { ROBOT, SETTINGS, STATES, COMMANDS, HISTORY, TENSIONS, ARRAYS };
     enum { STEPS = ARRAYS, PERIOD, SUBSTEPS, KEEP, ALL };
@@ -33,7 +33,7 @@ PyObject* towline_py_run_plant(PyObject* module, PyObject* const* arguments, Py_
         !whole_number(arguments[KEEP], PTRDIFF_MAX / 2, &keep) || !take(&given, arguments, ARRAYS, ARRAYS, HISTORY)) {
         return NULL;
     }
-    const towline_robot* robot = robot_of(&given);
+    const towline_robot *robot = robot_of(&given);
     int fits = robot && given.of[SETTINGS] && given.view[SETTINGS].len == (Py_ssize_t)sizeof(towline_plant);
     for (int i = STATES; i < ARRAYS; i++) {
         fits = fits && given.of[i];
@@ -48,7 +48,7 @@ PyObject* towline_py_run_plant(PyObject* module, PyObject* const* arguments, Py_
         if (fits) {
             const towline_run run = {rows, commands, steps, keep, (int32_t)substeps, period};
             Py_BEGIN_ALLOW_THREADS;
-            towline_plant_run(robot, (const void*)given.of[SETTINGS], &run, given.of[STATES], given.of[COMMANDS],
+            towline_plant_run(robot, (const void *)given.of[SETTINGS], &run, given.of[STATES], given.of[COMMANDS],
                               given.of[HISTORY], given.of[TENSIONS]);
             Py_END_ALLOW_THREADS;
         }
@@ -56,14 +56,14 @@ PyObject* towline_py_run_plant(PyObject* module, PyObject* const* arguments, Py_
     return done(&given, fits);
 }
 
-PyObject* towline_py_sense(PyObject* module, PyObject* const* arguments, Py_ssize_t count) {
+PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     enum { ROBOT, STATES, MOTIONS, LENGTHS, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, MOTIONS)) {
         return NULL;
     }
-    const towline_robot* robot = robot_of(&given);
+    const towline_robot *robot = robot_of(&given);
     int fits = robot && given.of[STATES] && given.of[MOTIONS] && given.of[LENGTHS];
     if (fits) {
         const Py_ssize_t size = towline_plant_state_size(robot), rows = given.size[STATES] / size;
@@ -78,7 +78,7 @@ PyObject* towline_py_sense(PyObject* module, PyObject* const* arguments, Py_ssiz
     return done(&given, fits);
 }
 
-PyObject* towline_py_winch_lengths(PyObject* module, PyObject* const* arguments, Py_ssize_t count) {
+PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     enum { ROBOT, STATES, LENGTHS, TENSIONS, LAST_RATES, COMMANDS, ARRAYS, PERIOD = ARRAYS, ALL };
     arrays given;
@@ -90,7 +90,7 @@ PyObject* towline_py_winch_lengths(PyObject* module, PyObject* const* arguments,
     if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, LAST_RATES)) {
         return NULL;
     }
-    const towline_robot* robot = robot_of(&given);
+    const towline_robot *robot = robot_of(&given);
     int fits = robot != NULL;
     for (int i = STATES; i < ARRAYS; i++) {
         fits = fits && given.of[i];

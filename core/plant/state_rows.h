@@ -1,15 +1,10 @@
 /* Rows of numbers as states of a plant, and back. */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_STATE_ROWS_H
+#define TOWLINE_PLANT_STATE_ROWS_H
 
-ptrdiff_t towline_plant_state_size(const towline_robot* robot) {
-    return TOWLINE_BODY_NUMBERS * (1 + robot->carriers) + TOWLINE_CABLE_BLOCKS * robot->cables;
-}
+#include "plant/state.h"
 
-ptrdiff_t towline_plant_command_size(const towline_robot* robot) {
-    return TOWLINE_PLATFORM_COMMANDS + robot->cables + TOWLINE_CARRIER_COMMANDS * robot->carriers;
-}
-
-static kind kind_of(const towline_robot* robot, const towline_plant* settings) {
+static kind kind_of(const towline_robot *robot, const towline_plant *settings) {
     kind found = ELASTIC;
     for (int i = 0; i < robot->cables && settings->drive != TOWLINE_TENSIONS; i++) {
         if (robot->cable[i].stiffness == 0) {
@@ -23,7 +18,7 @@ static kind kind_of(const towline_robot* robot, const towline_plant* settings) {
 }
 
 /* Set what is the same for all rows. */
-void plant_set_plant(plant* p, const towline_robot* robot, const towline_plant* settings) {
+static void set_plant(plant *p, const towline_robot *robot, const towline_plant *settings) {
     p->robot = robot;
     p->settings = settings;
     p->bodies = 1 + robot->carriers;
@@ -40,9 +35,9 @@ void plant_set_plant(plant* p, const towline_robot* robot, const towline_plant* 
 }
 
 /* Take the bodies and unstrained lengths of a row. */
-void plant_take_motion(const plant* p, const double* row, motion* now) {
+static void take_motion(const plant *p, const double *row, motion *now) {
     const int m = p->cables;
-    const double* cables = row + TOWLINE_BODY_NUMBERS * p->bodies;
+    const double *cables = row + TOWLINE_BODY_NUMBERS * p->bodies;
     memcpy(now->body, row, (size_t)p->bodies * sizeof now->body[0]);
     memcpy(now->length, cables, (size_t)m * sizeof cables[0]);
     memcpy(now->rate, cables + m, (size_t)m * sizeof cables[0]);
@@ -53,10 +48,10 @@ static int condition_of(double number) {
 }
 
 /* Take a row as the state, and forget the row before. */
-void plant_take_state(plant* p, const double* row, motion* now) {
+static void take_state(plant *p, const double *row, motion *now) {
     const int m = p->cables;
-    const double* references = row + TOWLINE_BODY_NUMBERS * p->bodies + 2 * m;
-    plant_take_motion(p, row, now);
+    const double *references = row + TOWLINE_BODY_NUMBERS * p->bodies + 2 * m;
+    take_motion(p, row, now);
     memcpy(p->reference, references, (size_t)m * sizeof references[0]);
     for (int i = 0; i < m; i++) {
         p->condition[i] = condition_of(references[m + i]);
@@ -67,15 +62,15 @@ void plant_take_state(plant* p, const double* row, motion* now) {
 }
 
 /* Make a derivative zero. */
-void plant_clear(const plant* p, motion* change) {
+static void clear(const plant *p, motion *change) {
     memset(change->body, 0, (size_t)p->bodies * sizeof change->body[0]);
     memset(change->length, 0, (size_t)p->cables * sizeof change->length[0]);
     memset(change->rate, 0, (size_t)p->cables * sizeof change->rate[0]);
 }
 
-void plant_record_state(const plant* p, const motion* now, double* row) {
+static void record_state(const plant *p, const motion *now, double *row) {
     const int m = p->cables;
-    double* cables = row + TOWLINE_BODY_NUMBERS * p->bodies;
+    double *cables = row + TOWLINE_BODY_NUMBERS * p->bodies;
     memcpy(row, now->body, (size_t)p->bodies * sizeof now->body[0]);
     memcpy(cables, now->length, (size_t)m * sizeof cables[0]);
     memcpy(cables + m, now->rate, (size_t)m * sizeof cables[0]);
@@ -85,8 +80,10 @@ void plant_record_state(const plant* p, const motion* now, double* row) {
     }
 }
 
-void plant_record_tensions(const plant* p, double* row) {
+static void record_tensions(const plant *p, double *row) {
     for (int i = 0; i < p->cables; i++) {
         row[i] = p->cable[i].tension;
     }
 }
+
+#endif

@@ -13,7 +13,10 @@
  *
  * Source: C. Lawson, R. Hanson, Solving Least Squares Problems, 1974, chapter 23, with a Cholesky factor of G.
  */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_CONSTRAINTS_H
+#define TOWLINE_PLANT_CONSTRAINTS_H
+
+#include "plant/winches.h"
 
 /* Of the mean entry on G's diagonal, added there: dependent cables share what they carry. */
 static const double GIVING = 1e-10;
@@ -23,7 +26,7 @@ enum { REFINED = 2 };
 static const double DEPENDENT = 1e-14;
 
 /* The angular acceleration in {G} of a body by a moment in {G}. */
-static void turning_by(const plant* p, int b, const double* moment, double* turning) {
+static void turning_by(const plant *p, int b, const double *moment, double *turning) {
     double own[3], result[3];
     turn_back(p->body[b].R, moment, own);
     turn(p->robot->body[b].inverse_inertia, own, result);
@@ -31,19 +34,19 @@ static void turning_by(const plant* p, int b, const double* moment, double* turn
 }
 
 /* What a body adds to G for two cables that pull on it. */
-static double coupling(const double* inverse_mass, const double* pull, const double* moment, const double* other_pull,
-                       const double* other_turning) {
+static double coupling(const double *inverse_mass, const double *pull, const double *moment, const double *other_pull,
+                       const double *other_turning) {
     const double accelerated[3] = {inverse_mass[0] * other_pull[0], inverse_mass[1] * other_pull[1],
                                    inverse_mass[2] * other_pull[2]};
     return dot(pull, accelerated) + dot(moment, other_turning);
 }
 
 /* Write G among the candidates, and the angular accelerations per newton of them. */
-void plant_set_gram(plant* p) {
-    constraints* taut = &p->taut;
+static void set_gram(plant *p) {
+    constraints *taut = &p->taut;
     double trace = 0, lengths = 1e-300;
     for (int i = 0; i < p->cables; i++) {
-        cable_now* one = &p->cable[i];
+        cable_now *one = &p->cable[i];
         const int owner = owner_of(p, i);
         if (!taut->candidate[i]) {
             continue;
@@ -55,7 +58,7 @@ void plant_set_gram(plant* p) {
             turning_by(p, owner, one->carrier_moment, one->carrier_turning);
         }
         for (int j = 0; j <= i; j++) {
-            const cable_now* other = &p->cable[j];
+            const cable_now *other = &p->cable[j];
             if (!taut->candidate[j]) {
                 continue;
             }
@@ -67,7 +70,7 @@ void plant_set_gram(plant* p) {
             }
             taut->gram[i][j] = taut->gram[j][i] = total;
         }
-        taut->gram[i][i] += plant_winch_yielding(p, i);
+        taut->gram[i][i] += winch_yielding(p, i);
         trace += taut->gram[i][i];
         lengths += one->length;
     }
@@ -77,9 +80,9 @@ void plant_set_gram(plant* p) {
 }
 
 /* Acceleration in {G} of the point of body `b` at `arm` from its position, and its velocity. */
-static void moved_point(const plant* p, const motion* now, const motion* change, int b, const double* arm,
-                        double* acceleration, double* velocity) {
-    const double* omega = p->body[b].omega;
+static void moved_point(const plant *p, const motion *now, const motion *change, int b, const double *arm,
+                        double *acceleration, double *velocity) {
+    const double *omega = p->body[b].omega;
     double turning[3], tangential[3], around[3], centripetal[3];
     turn(p->body[b].R, change->body[b].rate, turning);
     cross(turning, arm, tangential);
@@ -92,8 +95,8 @@ static void moved_point(const plant* p, const motion* now, const motion* change,
 }
 
 /* d2e/dt2 [m/s^2] of cable `i` for the accelerations in `change`. */
-double plant_free_stretch_acceleration(const plant* p, const motion* now, const motion* change, int i) {
-    const cable_now* on = &p->cable[i];
+static double free_stretch_acceleration(const plant *p, const motion *now, const motion *change, int i) {
+    const cable_now *on = &p->cable[i];
     const int owner = owner_of(p, i);
     double a[3], v[3], carrier_a[3], carrier_v[3], coriolis[3];
     moved_point(p, now, change, 0, on->arm, a, v);
@@ -109,11 +112,11 @@ double plant_free_stretch_acceleration(const plant* p, const motion* now, const 
 }
 
 /* Add a cable to the factor; return 0, and leave it out, if it depends on those before. */
-static int append(constraints* taut, int one) {
+static int append(constraints *taut, int one) {
     const int at = taut->count;
     double *row = taut->factor[at], left = taut->gram[one][one] + taut->give[one];
     for (int b = 0; b < at; b++) {
-        const double* other = taut->factor[b];
+        const double *other = taut->factor[b];
         double total = taut->gram[one][taut->picked[b]];
         for (int k = 0; k < b; k++) {
             total -= row[k] * other[k];
@@ -132,7 +135,7 @@ static int append(constraints* taut, int one) {
 }
 
 /* Replace x by what the factor times its transpose makes x of. */
-static void solve_factored(const constraints* taut, double* x) {
+static void solve_factored(const constraints *taut, double *x) {
     for (int a = 0; a < taut->count; a++) {
         for (int k = 0; k < a; k++) {
             x[a] -= taut->factor[a][k] * x[k];
@@ -152,7 +155,7 @@ static void solve_factored(const constraints* taut, double* x) {
  *
  * The factor is that of cables that give a little: each round after the first refines the solution to one of G.
  */
-static void solve_picked(const constraints* taut, int rounds, double* z) {
+static void solve_picked(const constraints *taut, int rounds, double *z) {
     double step[CABLES];
     for (int a = 0; a < taut->count; a++) {
         z[a] = taut->right[taut->picked[a]];
@@ -160,7 +163,7 @@ static void solve_picked(const constraints* taut, int rounds, double* z) {
     solve_factored(taut, z);
     for (int round = 1; round < rounds; round++) {
         for (int a = 0; a < taut->count; a++) {
-            const double* row = taut->gram[taut->picked[a]];
+            const double *row = taut->gram[taut->picked[a]];
             step[a] = taut->right[taut->picked[a]];
             for (int b = 0; b < taut->count; b++) {
                 step[a] -= row[taut->picked[b]] * z[b];
@@ -174,8 +177,8 @@ static void solve_picked(const constraints* taut, int rounds, double* z) {
 }
 
 /* Solve G x = c for the picked cables; x of others is 0. */
-void plant_solve_pulling(plant* p) {
-    constraints* taut = &p->taut;
+static void solve_pulling(plant *p) {
+    constraints *taut = &p->taut;
     double z[CABLES];
     solve_picked(taut, REFINED, z);
     memset(taut->solution, 0, (size_t)p->cables * sizeof taut->solution[0]);
@@ -185,7 +188,7 @@ void plant_solve_pulling(plant* p) {
 }
 
 /* Factor G over the candidates, but for those that depend on others. */
-void plant_factor_pulling(plant* p) {
+static void factor_pulling(plant *p) {
     p->taut.count = 0;
     for (int i = 0; i < p->cables; i++) {
         if (p->taut.candidate[i]) {
@@ -195,7 +198,7 @@ void plant_factor_pulling(plant* p) {
 }
 
 /* Take the picked cable at `gone` out of the factor and of x. */
-static void drop(constraints* taut, int gone, double* x) {
+static void drop(constraints *taut, int gone, double *x) {
     const int count = taut->count;
     int picked[CABLES];
     double kept[CABLES];
@@ -209,8 +212,8 @@ static void drop(constraints* taut, int gone, double* x) {
 }
 
 /* Move x to the solution over the picked cables, without those that would push. */
-static void bring_inside(plant* p, int* barred, double* x) {
-    constraints* taut = &p->taut;
+static void bring_inside(plant *p, int *barred, double *x) {
+    constraints *taut = &p->taut;
     for (;;) {
         double z[CABLES], share = 1;
         int first = -1;
@@ -238,8 +241,8 @@ static void bring_inside(plant* p, int* barred, double* x) {
 }
 
 /* Return the candidate that would stretch most for the tensions x, or -1 if none does by more than `most`. */
-static int most_violated(const plant* p, const int* barred, const double* x, double most) {
-    const constraints* taut = &p->taut;
+static int most_violated(const plant *p, const int *barred, const double *x, double most) {
+    const constraints *taut = &p->taut;
     int best = -1;
     for (int i = 0; i < p->cables; i++) {
         double left = barred[i] ? 0 : taut->right[i];
@@ -255,8 +258,8 @@ static int most_violated(const plant* p, const int* barred, const double* x, dou
 }
 
 /* Solve x >= 0, G x - c >= 0, x (G x - c) = 0 for the candidates. */
-void plant_solve_non_negative(plant* p) {
-    constraints* taut = &p->taut;
+static void solve_non_negative(plant *p) {
+    constraints *taut = &p->taut;
     int barred[CABLES];
     double x[CABLES], largest = 0;
     for (int i = 0; i < p->cables; i++) {
@@ -276,5 +279,7 @@ void plant_solve_non_negative(plant* p) {
             bring_inside(p, barred, x);
         }
     }
-    plant_solve_pulling(p);
+    solve_pulling(p);
 }
+
+#endif

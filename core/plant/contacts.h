@@ -3,12 +3,15 @@
  *
  * Modes are fixed during a step; step.c finds where one changes, and here the next ones are chosen.
  */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_CONTACTS_H
+#define TOWLINE_PLANT_CONTACTS_H
+
+#include "plant/impacts.h"
 
 /* By how much a cable is beyond its mode [m]; above zero it has changed. */
-static double cable_violation(const plant* p, const motion* now, int i) {
-    const towline_robot* robot = p->robot;
-    const cable_now* on = &p->cable[i];
+static double cable_violation(const plant *p, const motion *now, int i) {
+    const towline_robot *robot = p->robot;
+    const cable_now *on = &p->cable[i];
     if (never_stretches(p, i)) {
         return on->mode == PULLS ? -on->tension * (robot->length_scale / robot->force_scale)
                                  : on->stretch - CAUGHT_LENGTH * robot->length_scale;
@@ -20,25 +23,25 @@ static double cable_violation(const plant* p, const motion* now, int i) {
     return on->mode == PULLS ? -pull : larger(-on->stretch, pull);
 }
 
-static int can_stick(const plant* p, int i) {
+static int can_stick(const plant *p, int i) {
     return p->settings->drive == TOWLINE_FORCES && p->condition[i] == TOWLINE_WORKS &&
            p->robot->cable[i].winch_friction > 0;
 }
 
 /* By how much a winch is beyond its mode [m]. */
-static double winch_violation(const plant* p, const motion* now, int i) {
+static double winch_violation(const plant *p, const motion *now, int i) {
     if (p->cable[i].slip != 0) {
         return -p->cable[i].slip * now->rate[i];
     }
-    const double beyond = fabs(plant_drive_force(p, i)) - p->robot->cable[i].winch_friction;
+    const double beyond = fabs(drive_force(p, i)) - p->robot->cable[i].winch_friction;
     return beyond * (p->robot->length_scale / p->robot->force_scale);
 }
 
 /* Write by how much each cable and winch is beyond its mode, and return the largest; above zero it has changed. */
-double plant_largest_violation(plant* p, const motion* now) {
+static double largest_violation(plant *p, const motion *now) {
     double largest = -1;
     for (int i = 0; i < p->cables; i++) {
-        cable_now* on = &p->cable[i];
+        cable_now *on = &p->cable[i];
         const int counts = p->condition[i] != TOWLINE_CUT;
         on->beyond = counts ? cable_violation(p, now, i) : -1;
         on->sliding = counts && can_stick(p, i) ? winch_violation(p, now, i) : -1;
@@ -48,7 +51,7 @@ double plant_largest_violation(plant* p, const motion* now) {
 }
 
 /* Return the time at which a slack cable may get taut and slack again inside of a step, or else the step's end. */
-double plant_graze_of(const plant* p, const double* stretch, const double* rate, double step) {
+static double graze_of(const plant *p, const double *stretch, const double *rate, double step) {
     for (int i = 0; i < p->cables; i++) {
         const double e0 = stretch[i], d0 = step * rate[i];
         const double e1 = p->cable[i].stretch, d1 = step * p->cable[i].stretch_rate;
@@ -73,7 +76,7 @@ double plant_graze_of(const plant* p, const double* stretch, const double* rate,
 }
 
 /* Return which slack cable is beyond its mode by `most`, or -1. */
-int plant_caught_of(const plant* p, double most) {
+static int caught_of(const plant *p, double most) {
     for (int i = 0; i < p->cables; i++) {
         if (p->cable[i].mode == SLACK && p->cable[i].beyond == most) {
             return i;
@@ -83,7 +86,7 @@ int plant_caught_of(const plant* p, double most) {
 }
 
 /* Return where in (0, 1) the cubic with these values and slopes at the ends, e0 <= 0 < e1, gets above zero. */
-double plant_rise_of(double e0, double d0, double e1, double d1) {
+static double rise_of(double e0, double d0, double e1, double d1) {
     double low = 0, high = 1;
     for (int halved = 0; halved < 40; halved++) {
         const double s = 0.5 * (low + high), r = 1 - s;
@@ -94,8 +97,8 @@ double plant_rise_of(double e0, double d0, double e1, double d1) {
 }
 
 /* Return the direction in which a winch slips, or 0 where friction holds it at the tension of its cable. */
-static int slip_of(const plant* p, const motion* now, int i) {
-    const double speed = now->rate[i], force = plant_drive_force(p, i), friction = p->robot->cable[i].winch_friction;
+static int slip_of(const plant *p, const motion *now, int i) {
+    const double speed = now->rate[i], force = drive_force(p, i), friction = p->robot->cable[i].winch_friction;
     if (speed != 0) {
         return speed > 0 ? 1 : -1;
     }
@@ -106,7 +109,7 @@ static int slip_of(const plant* p, const motion* now, int i) {
 }
 
 /* Let the winches that friction does not hold at the tensions of now slip; return whether there are any. */
-static int begin_to_slip(plant* p, const motion* now) {
+static int begin_to_slip(plant *p, const motion *now) {
     int slipped = 0;
     for (int i = 0; i < p->cables; i++) {
         if (p->cable[i].slip == 0) {
@@ -125,28 +128,28 @@ static int begin_to_slip(plant* p, const motion* now) {
  *
  * Whether friction holds a winch depends on the tension with the winch at rest, so that is computed first.
  */
-static void settle(plant* p, motion* now, motion* change, double time, double parting) {
+static void settle(plant *p, motion *now, motion *change, double time, double parting) {
     do {
         if (p->kind == CONSTRAINED) {
-            plant_resolve(p, now, change, time, parting);
+            resolve(p, now, change, time, parting);
         } else {
-            plant_set_forces(p, now, change, time);
+            set_forces(p, now, change, time);
         }
     } while (p->settings->drive == TOWLINE_FORCES && begin_to_slip(p, now));
 }
 
 /* A winch with friction is held at first if it rests. */
-static void set_slip(plant* p, const motion* now, int i) {
+static void set_slip(plant *p, const motion *now, int i) {
     const int rests = now->rate[i] == 0 && p->robot->cable[i].winch_friction > 0;
     p->cable[i].slip = rests ? 0 : slip_of(p, now, i);
     p->taut.holds = 0;
 }
 
 /* Choose the modes of a state, with the impacts that this needs, and write its derivative and tensions. */
-void plant_begin_contacts(plant* p, motion* now, motion* change, double time) {
-    plant_set_geometry(p, now, change, time);
+static void begin_contacts(plant *p, motion *now, motion *change, double time) {
+    set_geometry(p, now, change, time);
     if (p->settings->drive != TOWLINE_TENSIONS) {
-        plant_set_modes(p);
+        set_modes(p);
     }
     for (int i = 0; i < p->cables && p->settings->drive == TOWLINE_FORCES; i++) {
         set_slip(p, now, i);
@@ -155,7 +158,7 @@ void plant_begin_contacts(plant* p, motion* now, motion* change, double time) {
 }
 
 /* The next mode of an elastic cable that is beyond its own. */
-static contact next_mode(const cable_now* on) {
+static contact next_mode(const cable_now *on) {
     const int stretched = on->stretch > 0;
     if (on->mode == PULLS) {
         return stretched ? LIMP : SLACK;
@@ -167,9 +170,9 @@ static contact next_mode(const cable_now* on) {
 }
 
 /* Bring cables and winches that are beyond their modes into other ones, and write derivative and tensions. */
-void plant_change_contacts(plant* p, motion* now, motion* change, double time, double parting) {
+static void change_contacts(plant *p, motion *now, motion *change, double time, double parting) {
     for (int i = 0; i < p->cables; i++) {
-        cable_now* on = &p->cable[i];
+        cable_now *on = &p->cable[i];
         if (on->beyond > 0 && !never_stretches(p, i)) {
             on->mode = next_mode(on);
         }
@@ -177,7 +180,7 @@ void plant_change_contacts(plant* p, motion* now, motion* change, double time, d
             now->rate[i] = 0;
         }
     }
-    plant_set_geometry(p, now, change, time);
+    set_geometry(p, now, change, time);
     for (int i = 0; i < p->cables; i++) {
         if (p->cable[i].sliding > 0) {
             set_slip(p, now, i);
@@ -185,3 +188,5 @@ void plant_change_contacts(plant* p, motion* now, motion* change, double time, d
     }
     settle(p, now, change, time, parting);
 }
+
+#endif

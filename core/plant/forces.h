@@ -7,18 +7,24 @@
  * Which cables pull, and which winches slip, is fixed while a step is computed: then the derivative is smooth and
  * Runge-Kutta keeps its order. step.c finds the times at which that changes.
  */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_FORCES_H
+#define TOWLINE_PLANT_FORCES_H
+
+#include "plant/bodies.h"
+#include "plant/cables.h"
+#include "plant/constraints.h"
+#include "plant/loads.h"
 
 /* Write all that depends on the motion alone. */
-void plant_set_geometry(plant* p, motion* now, motion* change, double time) {
-    plant_place_bodies(p, now, change, time);
-    plant_set_lines(p, now);
+static void set_geometry(plant *p, motion *now, motion *change, double time) {
+    place_bodies(p, now, change, time);
+    set_lines(p, now);
 }
 
 /* Write which elastic cables pull, by their elongation and its rate. */
-void plant_set_modes(plant* p) {
+static void set_modes(plant *p) {
     for (int i = 0; i < p->cables; i++) {
-        cable_now* on = &p->cable[i];
+        cable_now *on = &p->cable[i];
         if (never_stretches(p, i)) {
             continue;
         }
@@ -31,7 +37,7 @@ void plant_set_modes(plant* p) {
 }
 
 /* Write the tensions of a robot of which they are commanded, and their derivatives. */
-static void commanded_tensions(plant* p, const motion* now, motion* change) {
+static void commanded_tensions(plant *p, const motion *now, motion *change) {
     const double lag = p->settings->tension_lag;
     for (int i = 0; i < p->cables; i++) {
         const int pulls = p->condition[i] != TOWLINE_CUT && p->cable[i].length > NO_LENGTH;
@@ -41,10 +47,10 @@ static void commanded_tensions(plant* p, const motion* now, motion* change) {
 }
 
 /* Write the tensions of elastic cables in their modes, and 0 for others; return whether one of these pulls. */
-static int elastic_tensions(plant* p, const motion* now, motion* change) {
+static int elastic_tensions(plant *p, const motion *now, motion *change) {
     int constrained = 0;
     for (int i = 0; i < p->cables; i++) {
-        cable_now* on = &p->cable[i];
+        cable_now *on = &p->cable[i];
         const int pulls = on->mode == PULLS, elastic = !never_stretches(p, i);
         on->tension = pulls && elastic ? on->spring : 0;
         constrained |= pulls && !elastic;
@@ -54,45 +60,45 @@ static int elastic_tensions(plant* p, const motion* now, motion* change) {
 }
 
 /* Write the tensions that keep the pulling cables without stiffness from stretching, and what they accelerate. */
-static void constrain(plant* p, const motion* now, motion* change, double time) {
-    constraints* taut = &p->taut;
+static void constrain(plant *p, const motion *now, motion *change, double time) {
+    constraints *taut = &p->taut;
     if (!taut->holds) {
         for (int i = 0; i < p->cables; i++) {
             taut->candidate[i] = never_stretches(p, i) && p->cable[i].mode == PULLS;
         }
-        plant_set_gram(p);
-        plant_factor_pulling(p);
+        set_gram(p);
+        factor_pulling(p);
     }
     for (int i = 0; i < p->cables; i++) {
-        taut->right[i] = taut->candidate[i] ? plant_free_stretch_acceleration(p, now, change, i) : 0;
+        taut->right[i] = taut->candidate[i] ? free_stretch_acceleration(p, now, change, i) : 0;
     }
-    plant_solve_pulling(p);
+    solve_pulling(p);
     for (int i = 0; i < p->cables; i++) {
         if (taut->candidate[i]) {
             p->cable[i].tension = taut->solution[i];
         }
     }
-    plant_pull_bodies(p, taut->candidate);
-    plant_accelerate_bodies(p, now, change);
+    pull_bodies(p, taut->candidate);
+    accelerate_bodies(p, now, change);
     if (p->has_winches) {
-        plant_move_winches(p, now, change, time);
+        move_winches(p, now, change, time);
     }
 }
 
 /* Write the derivative of a motion whose geometry is written, and all tensions. */
-void plant_set_forces(plant* p, const motion* now, motion* change, double time) {
+static void set_forces(plant *p, const motion *now, motion *change, double time) {
     int constrained = 0;
     if (p->settings->drive == TOWLINE_TENSIONS) {
         commanded_tensions(p, now, change);
     } else {
         constrained = elastic_tensions(p, now, change);
     }
-    plant_load_bodies(p, now);
-    plant_pull_bodies(p, NULL);
-    plant_move_bodies(p, now, change);
-    plant_accelerate_bodies(p, now, change);
+    load_bodies(p, now);
+    pull_bodies(p, NULL);
+    move_bodies(p, now, change);
+    accelerate_bodies(p, now, change);
     if (p->has_winches) {
-        plant_move_winches(p, now, change, time);
+        move_winches(p, now, change, time);
     }
     if (constrained) {
         constrain(p, now, change, time);
@@ -100,11 +106,13 @@ void plant_set_forces(plant* p, const motion* now, motion* change, double time) 
 }
 
 /* Write the derivative of a motion; elastic cables pull by their elongation unless contacts are located. */
-void plant_evaluate(plant* p, motion* now, motion* change, double time) {
-    plant_set_geometry(p, now, change, time);
+static void evaluate(plant *p, motion *now, motion *change, double time) {
+    set_geometry(p, now, change, time);
     p->taut.holds = 0;
     if (!p->settings->located && p->settings->drive != TOWLINE_TENSIONS) {
-        plant_set_modes(p);
+        set_modes(p);
     }
-    plant_set_forces(p, now, change, time);
+    set_forces(p, now, change, time);
 }
+
+#endif

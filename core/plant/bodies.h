@@ -5,25 +5,26 @@
  *     dq = q (0, Omega) / 2
  *     I dOmega = R^T moment - Omega x I Omega
  */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_BODIES_H
+#define TOWLINE_PLANT_BODIES_H
+
+#include "plant/carrier_paths.h"
 
 /* R and omega of a body. */
-void plant_set_attitude(const body_motion* now, body_now* body) {
+INLINE void set_attitude(const body_motion *now, body_now *body) {
     const double w = now->quaternion[0], x = now->quaternion[1], y = now->quaternion[2], z = now->quaternion[3];
     /* Inside of a step its norm leaves one by the error of the step. */
     const double two = 2 / (w * w + x * x + y * y + z * z);
-    const double R[9] = {
-        1 - two * (y * y + z * z), two * (x * y - w * z),     two * (x * z + w * y),     /* */
-        two * (x * y + w * z),     1 - two * (x * x + z * z), two * (y * z - w * x),     /* */
-        two * (x * z - w * y),     two * (y * z + w * x),     1 - two * (x * x + y * y), /* */
-    };
-    memcpy(body->R, R, sizeof R);
-    turn(body->R, now->rate, body->omega);
+    double *R = body->R;
+    R[0] = 1 - two * (y * y + z * z), R[1] = two * (x * y - w * z), R[2] = two * (x * z + w * y);
+    R[3] = two * (x * y + w * z), R[4] = 1 - two * (x * x + z * z), R[5] = two * (y * z - w * x);
+    R[6] = two * (x * z - w * y), R[7] = two * (y * z + w * x), R[8] = 1 - two * (x * x + y * y);
+    turn(R, now->rate, body->omega);
 }
 
 /* Write a motion by roll, pitch and yaw, and their derivatives, as quaternion, rate and its derivative. */
-static void impose_attitude(const double* angles, const double* rates, const double* accelerations, body_motion* now,
-                            body_motion* change) {
+static void impose_attitude(const double *angles, const double *rates, const double *accelerations, body_motion *now,
+                            body_motion *change) {
     double sine[3], cosine[3]; /* of half the angles */
     attitude at;
     for (int i = 0; i < 3; i++) {
@@ -41,13 +42,13 @@ static void impose_attitude(const double* angles, const double* rates, const dou
 }
 
 /* Put an imposed carrier where its path is; return whether its attitude may be another than before. */
-static int impose(const carrier_path* path, body_motion* now, body_motion* change, double time) {
+static int impose(const carrier_path *path, body_motion *now, body_motion *change, double time) {
     double angles[3], rates[3], accelerations[3];
     for (int i = 0; i < 3; i++) {
-        const double* c = path->coefficient[i];
-        now->position[i] = path->moves ? plant_position_on(c, time) : c[0];
-        now->velocity[i] = path->moves ? plant_velocity_on(c, time) : 0;
-        change->velocity[i] = path->moves ? plant_acceleration_on(c, time) : 0;
+        const double *c = path->coefficient[i];
+        now->position[i] = path->moves ? position_on(c, time) : c[0];
+        now->velocity[i] = path->moves ? velocity_on(c, time) : 0;
+        change->velocity[i] = path->moves ? acceleration_on(c, time) : 0;
     }
     if (time != 0 && !path->turns) {
         for (int i = 0; i < 3; i++) {
@@ -56,26 +57,26 @@ static int impose(const carrier_path* path, body_motion* now, body_motion* chang
         return 0;
     }
     for (int i = 0; i < 3; i++) {
-        const double* c = path->coefficient[3 + i];
-        angles[i] = plant_position_on(c, time);
-        rates[i] = plant_velocity_on(c, time);
-        accelerations[i] = plant_acceleration_on(c, time);
+        const double *c = path->coefficient[3 + i];
+        angles[i] = position_on(c, time);
+        rates[i] = velocity_on(c, time);
+        accelerations[i] = acceleration_on(c, time);
     }
     impose_attitude(angles, rates, accelerations, now, change);
     return 1;
 }
 
-static void set_lead(const carrier_path* path, body_motion* lead, double time) {
+static void set_lead(const carrier_path *path, body_motion *lead, double time) {
     for (int i = 0; i < 3; i++) {
-        const double* c = path->coefficient[i];
-        lead->position[i] = path->moves ? plant_position_on(c, time) : c[0];
-        lead->velocity[i] = path->moves ? plant_velocity_on(c, time) : 0;
-        lead->rate[i] = path->moves ? plant_acceleration_on(c, time) : 0;
+        const double *c = path->coefficient[i];
+        lead->position[i] = path->moves ? position_on(c, time) : c[0];
+        lead->velocity[i] = path->moves ? velocity_on(c, time) : 0;
+        lead->rate[i] = path->moves ? acceleration_on(c, time) : 0;
     }
 }
 
 /* Put imposed carriers where they are `time` [s] after the command began, and write R and omega of all bodies. */
-void plant_place_bodies(plant* p, motion* now, motion* change, double time) {
+static void place_bodies(plant *p, motion *now, motion *change, double time) {
     for (int b = 0; b < p->bodies; b++) {
         const int32_t moved_by = p->robot->body[b].motion;
         int turned = moved_by == TOWLINE_FREE || time == 0;
@@ -86,13 +87,13 @@ void plant_place_bodies(plant* p, motion* now, motion* change, double time) {
         }
         p->body[b].turned = turned;
         if (turned) {
-            plant_set_attitude(&now->body[b], &p->body[b]);
+            set_attitude(&now->body[b], &p->body[b]);
         }
     }
 }
 
 /* Scale a vector to a length of at most `most`. */
-static void shorten(double* x, double most) {
+static void shorten(double *x, double most) {
     const double square = dot(x, x);
     if (square > most * most) {
         const double share = most / sqrt(square);
@@ -109,8 +110,8 @@ static void shorten(double* x, double most) {
  * limit of speed, and so v stays inside. From farther away it grows with the root of the distance, so that a carrier can
  * brake with 0.8 of its largest acceleration.
  */
-static void follow(const towline_body* body, const body_motion* lead, double bandwidth, const body_motion* now,
-                   double* acceleration) {
+static void follow(const towline_body *body, const body_motion *lead, double bandwidth, const body_motion *now,
+                   double *acceleration) {
     const double rate = 0.5 * bandwidth, most = 0.8 * body->acceleration_max;
     double away[3], wanted[3], share = rate;
     for (int i = 0; i < 3; i++) {
@@ -132,11 +133,11 @@ static void follow(const towline_body* body, const body_motion* lead, double ban
 }
 
 /* Write how positions and quaternions change, and what lagged carriers do. */
-void plant_move_bodies(const plant* p, const motion* now, motion* change) {
+static void move_bodies(const plant *p, const motion *now, motion *change) {
     for (int b = 0; b < p->bodies; b++) {
-        const towline_body* body = &p->robot->body[b];
-        const body_motion* at = &now->body[b];
-        body_motion* by = &change->body[b];
+        const towline_body *body = &p->robot->body[b];
+        const body_motion *at = &now->body[b];
+        body_motion *by = &change->body[b];
         if (body->motion != TOWLINE_FREE && body->motion != TOWLINE_LAGGED) {
             continue;
         }
@@ -156,10 +157,10 @@ void plant_move_bodies(const plant* p, const motion* now, motion* change) {
 }
 
 /* Write the accelerations of free bodies, from the forces and moments on them. */
-void plant_accelerate_bodies(const plant* p, const motion* now, motion* change) {
+static void accelerate_bodies(const plant *p, const motion *now, motion *change) {
     for (int b = 0; b < p->bodies; b++) {
-        const towline_body* body = &p->robot->body[b];
-        const double* rate = now->body[b].rate;
+        const towline_body *body = &p->robot->body[b];
+        const double *rate = now->body[b].rate;
         double spin[3], gyroscopic[3], moment[3];
         if (body->motion != TOWLINE_FREE) {
             continue;
@@ -176,9 +177,9 @@ void plant_accelerate_bodies(const plant* p, const motion* now, motion* change) 
 }
 
 /* Give the quaternions of free bodies their length of one. */
-void plant_normalise(const plant* p, motion* now) {
+static void normalise(const plant *p, motion *now) {
     for (int b = 0; b < p->bodies; b++) {
-        double* q = now->body[b].quaternion;
+        double *q = now->body[b].quaternion;
         if (is_free(p, b)) {
             const double inverse = 1 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
             for (int i = 0; i < 4; i++) {
@@ -187,3 +188,5 @@ void plant_normalise(const plant* p, motion* now) {
         }
     }
 }
+
+#endif

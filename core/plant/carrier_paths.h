@@ -11,21 +11,24 @@
  * jumps, and a taut cable that never stretches stays taut. Where the reference is farther away than either moves in the
  * step, or so far that the way there needs an acceleration beyond SUDDEN, it has jumped, and the carrier does.
  */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_CARRIER_PATHS_H
+#define TOWLINE_PLANT_CARRIER_PATHS_H
+
+#include "plant/state.h"
 
 static const double PI = 3.14159265358979323846;
 /* [m/s^2, rad/s^2] that a polynomial would need beyond those of its reference: the carrier jumps to it. */
 static const double SUDDEN = 100.0;
 
-double plant_position_on(const double* c, double s) {
+static double position_on(const double *c, double s) {
     return c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))));
 }
 
-double plant_velocity_on(const double* c, double s) {
+static double velocity_on(const double *c, double s) {
     return c[1] + s * (2 * c[2] + s * (3 * c[3] + s * (4 * c[4] + s * (5 * c[5]))));
 }
 
-double plant_acceleration_on(const double* c, double s) {
+static double acceleration_on(const double *c, double s) {
     return 2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * (20 * c[5])));
 }
 
@@ -34,7 +37,7 @@ typedef struct {
     double position[6], velocity[6];
 } coordinates;
 
-static coordinates coordinates_of(const body_motion* body) {
+static coordinates coordinates_of(const body_motion *body) {
     const double *q = body->quaternion, *rate = body->rate;
     coordinates at = {{body->position[0], body->position[1], body->position[2], 0, 0, 0},
                       {body->velocity[0], body->velocity[1], body->velocity[2], rate[0], rate[1], rate[2]}};
@@ -56,7 +59,7 @@ static coordinates coordinates_of(const body_motion* body) {
 }
 
 /* Take the reference from where an imposed carrier is; return whether it continues there: not if it jumps, or is on it. */
-static int continues(const body_motion* body, const carrier_command* to, double period, coordinates* off) {
+static int continues(const body_motion *body, const carrier_command *to, double period, coordinates *off) {
     const coordinates at = coordinates_of(body);
     int sudden = 0, missed = 0;
     double away = 0, way = 0;
@@ -84,7 +87,7 @@ static int continues(const body_motion* body, const carrier_command* to, double 
 }
 
 /* Return whether a reference goes on to that of the next command, and does not jump there. */
-static int leads_on(const carrier_command* from, const carrier_command* to, double period) {
+static int leads_on(const carrier_command *from, const carrier_command *to, double period) {
     double away = 0, way = 0;
     for (int i = 0; i < 6; i++) {
         const double v = from->velocity[i], a = from->acceleration[i];
@@ -106,7 +109,7 @@ static int leads_on(const carrier_command* from, const carrier_command* to, doub
 }
 
 /* Write the coefficients of coordinate `i`, see the head of this file; return whether it moves. */
-static int set_polynomial(double* c, const carrier_command* from, const carrier_command* to, const coordinates* off,
+static int set_polynomial(double *c, const carrier_command *from, const carrier_command *to, const coordinates *off,
                           double period, int i) {
     const double p = from->pose[i], v = from->velocity[i], a = from->acceleration[i];
     const double ahead = off ? off->position[i] : 0, faster = off ? off->velocity[i] : 0;
@@ -128,18 +131,18 @@ static int set_polynomial(double* c, const carrier_command* from, const carrier_
     return v != 0 || a != 0 || gap != 0 || speed != 0 || bend != 0;
 }
 
-void plant_set_paths(plant* p, const motion* now, const carrier_command* command, const carrier_command* after,
-                     double period) {
+static void set_paths(plant *p, const motion *now, const carrier_command *command, const carrier_command *after,
+                      double period) {
     for (int k = 0; k < p->robot->carriers; k++) {
         const int32_t moved_by = p->robot->body[1 + k].motion;
         if (moved_by != TOWLINE_IMPOSED && moved_by != TOWLINE_LAGGED) {
             continue;
         }
         const int imposed = moved_by == TOWLINE_IMPOSED;
-        carrier_path* path = &p->path[k];
+        carrier_path *path = &p->path[k];
         coordinates off;
         const int misses = imposed && continues(&now->body[1 + k], &command[k], period, &off);
-        const carrier_command* to = after && leads_on(&command[k], &after[k], period) ? &after[k] : NULL;
+        const carrier_command *to = after && leads_on(&command[k], &after[k], period) ? &after[k] : NULL;
         path->moves = path->turns = 0;
         for (int i = 0; i < (imposed ? 6 : 3); i++) {
             const int moves = set_polynomial(path->coefficient[i], &command[k], to, misses ? &off : NULL, period, i);
@@ -147,3 +150,5 @@ void plant_set_paths(plant* p, const motion* now, const carrier_command* command
         }
     }
 }
+
+#endif

@@ -4,28 +4,31 @@
  * Where lengths or rates are commanded, a winch is a servo loop that compensates tension and friction as far as its
  * limits permit. A cable without a winch in its file follows exactly.
  */
-#include "plant/internal.h"
+#ifndef TOWLINE_PLANT_WINCHES_H
+#define TOWLINE_PLANT_WINCHES_H
 
-static int works(const plant* p, int i) { return p->condition[i] == TOWLINE_WORKS; }
+#include "plant/state.h"
+
+static int works(const plant *p, int i) { return p->condition[i] == TOWLINE_WORKS; }
 
 /* 1 / J of a winch that the tension moves [1/kg], else 0. */
-double plant_winch_yielding(const plant* p, int i) {
+static double winch_yielding(const plant *p, int i) {
     const int slips = p->settings->drive == TOWLINE_FORCES && p->cable[i].slip != 0 && works(p, i);
     return slips ? 1 / p->robot->cable[i].winch_inertia : 0;
 }
 
 /* The force that would pay cable out, beside friction [N]. */
-double plant_drive_force(const plant* p, int i) {
+static double drive_force(const plant *p, int i) {
     const double strongest = p->robot->cable[i].winch_force_max;
     return p->cable[i].tension - between(-strongest, p->commanded[i], strongest);
 }
 
 /* The acceleration of a winch whose motor's force is commanded. */
-static double acceleration_by_force(const plant* p, const motion* now, int i) {
-    const towline_cable* cable = &p->robot->cable[i];
+static double acceleration_by_force(const plant *p, const motion *now, int i) {
+    const towline_cable *cable = &p->robot->cable[i];
     const double speed = now->rate[i], fastest = cable->winch_speed_max;
     const int slip = p->cable[i].slip;
-    const double result = (plant_drive_force(p, i) - slip * cable->winch_friction) / cable->winch_inertia;
+    const double result = (drive_force(p, i) - slip * cable->winch_friction) / cable->winch_inertia;
     if (slip == 0 || (speed >= fastest && result > 0) || (speed <= -fastest && result < 0)) {
         return 0;
     }
@@ -33,8 +36,8 @@ static double acceleration_by_force(const plant* p, const motion* now, int i) {
 }
 
 /* The acceleration that a servo loop gives. */
-static double acceleration_by_servo(const plant* p, const motion* now, double time, int i) {
-    const towline_cable* cable = &p->robot->cable[i];
+static double acceleration_by_servo(const plant *p, const motion *now, double time, int i) {
+    const towline_cable *cable = &p->robot->cable[i];
     const double J = cable->winch_inertia, bandwidth = p->settings->winch_bandwidth, speed = now->rate[i];
     const double fastest = cable->winch_speed_max, strongest = cable->winch_force_max;
     double wanted = p->commanded[i];
@@ -50,7 +53,7 @@ static double acceleration_by_servo(const plant* p, const motion* now, double ti
 }
 
 /* Write the second derivatives of all unstrained lengths. */
-void plant_move_winches(const plant* p, const motion* now, motion* change, double time) {
+static void move_winches(const plant *p, const motion *now, motion *change, double time) {
     for (int i = 0; i < p->cables; i++) {
         if (p->robot->cable[i].winch_inertia == 0 || !works(p, i)) {
             change->rate[i] = 0;
@@ -63,7 +66,7 @@ void plant_move_winches(const plant* p, const motion* now, motion* change, doubl
 }
 
 /* Set the rates with which cables follow what is commanded. */
-void plant_take_command(plant* p, motion* now, double period) {
+static void take_command(plant *p, motion *now, double period) {
     for (int i = 0; i < p->cables; i++) {
         const int follows = p->robot->cable[i].winch_inertia == 0;
         if (p->settings->drive == TOWLINE_TENSIONS) {
@@ -85,9 +88,9 @@ void plant_take_command(plant* p, motion* now, double period) {
 }
 
 /* Keep winches inside their speeds, and cables from being wound in completely. */
-void plant_limit_winches(const plant* p, motion* now) {
+static void limit_winches(const plant *p, motion *now) {
     for (int i = 0; i < p->cables && p->settings->drive != TOWLINE_TENSIONS; i++) {
-        const towline_cable* cable = &p->robot->cable[i];
+        const towline_cable *cable = &p->robot->cable[i];
         if (cable->winch_inertia > 0) {
             now->rate[i] = between(-cable->winch_speed_max, now->rate[i], cable->winch_speed_max);
         }
@@ -97,3 +100,5 @@ void plant_limit_winches(const plant* p, motion* now) {
         }
     }
 }
+
+#endif
