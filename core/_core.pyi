@@ -32,3 +32,19 @@ def horizon_solve(
     memory: Any,
     residuals: Any,
 ) -> tuple[int, bool]: ...
+def run_plant(
+    robot: Any,
+    settings: Any,
+    states: Any,
+    commands: Any,
+    history: Any,
+    tensions: Any,
+    steps: int,
+    period: float,
+    substeps: int,
+    keep: int,
+) -> None: ...
+def sense(robot: Any, states: Any, motions: Any, lengths: Any) -> None: ...
+def winch_lengths(
+    robot: Any, states: Any, lengths: Any, tensions: Any, last_rates: Any, commands: Any, period: float
+) -> None: ...

@@ -22,4 +22,9 @@ PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments
 PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* plant.c */
+PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 #endif
