@@ -36,11 +36,6 @@ SHORTEST_STEP, LONGEST_STEP = 1e-12, 1e3  # [s]
 STEPS_WORTH_A_THREAD = 20_000  # some 20 milliseconds
 
 
-def contiguous(*arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return arrays as the numeric core reads them."""
-    return tuple(np.ascontiguousarray(array) for array in arrays)
-
-
 class History(NamedTuple):
     """States over time, with leading dimensions of a batch.
 
@@ -329,7 +324,8 @@ class Plant:
         if not math.isfinite(np.vdot(state, state) + np.vdot(rows, rows)):
             return None
         history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
-        run_plant(self.record, self._settings, *contiguous(state, rows), history, tensions, 1, dt, 1, 1)
+        given = np.ascontiguousarray(state), np.ascontiguousarray(rows)
+        run_plant(self.record, self._settings, given[0], given[1], history, tensions, 1, dt, 1, 1)
         return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
 
     def run(
@@ -392,18 +388,14 @@ class Plant:
         batch = leading({"state": states.shape[:-1], "commands": rows.shape[:-2]})
         count, kept = math.prod(batch), 1 + steps // keep
         history, tensions = np.empty((count, kept, self.size)), np.empty((count, kept, self.robot.m))
-        of_rows = (
-            *contiguous(
-                np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size),
-                np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:]),
-            ),
-            history,
-            tensions,
-        )
+        states = np.ascontiguousarray(np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size))
+        rows = np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:])
+        rows = np.ascontiguousarray(rows)
 
         def run_rows(begin: int, end: int) -> None:
-            some = (array[begin:end] for array in of_rows)
-            run_plant(self.record, self._settings, *some, steps, period, substeps, keep)
+            some = slice(begin, end)
+            given = states[some], rows[some], history[some], tensions[some]
+            run_plant(self.record, self._settings, *given, steps, period, substeps, keep)
 
         if threads is None:
             threads = min(processors.available(), count * steps * substeps // STEPS_WORTH_A_THREAD)

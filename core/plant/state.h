@@ -115,10 +115,6 @@ static const double STILL = 1e-12; /* [m/s] with which a taut one stretches with
 /* [m/s] with which a taut one gets slack; a slower one is held, which ends trains of ever smaller impacts. */
 static const double PARTING = 1e-6;
 
-INLINE double larger(double a, double b) { return a > b ? a : b; }
-
-INLINE double smaller(double a, double b) { return a < b ? a : b; }
-
 INLINE double between(double low, double x, double high) { return smaller(larger(low, x), high); }
 
 /* Which body a cable hangs from. */
