@@ -210,7 +210,7 @@ class Tethered:
     def along(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
         """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
         result = np.zeros((len(platform), 3, self.count))
-        motions = np.concatenate([platform[:, None], carriers], axis=1)
+        motions = np.ascontiguousarray(np.concatenate([platform[:, None], carriers], axis=1))
         control_coordinates(self._robot, self.tethers, motions, result)
         return result
 

@@ -32,7 +32,8 @@ class Command(NamedTuple):
         as modelled").
     direction, shortfall
         Where no tensions inside the limits and rates give the required wrench: a direction along which they miss it,
-        (..., 6), and by how much [N], (...); nan elsewhere, which is the default.
+        (..., 6), and by how much [N], (...); nan elsewhere, which is the default. Where tensions would, but a carrier
+        that flies lacks thrust for them, only by how much.
     actuation
         Commands of the actuators of each carrier, (..., c, a); None if no carrier has any.
     unexplained

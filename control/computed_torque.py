@@ -73,8 +73,9 @@ class ComputedTorque(Controller):
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
     reach
-        How far carriers may go off their reference to help the tensions (see `core/control/compensation.c`): position [m] and
-        attitude [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may go 0.5 m.
+        How far carriers may go off their reference to help the tensions (see `core/control/compensation.c`): position
+        [m] and attitude [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may
+        go 0.5 m.
     carrier_bandwidth, carrier_acceleration
         Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
@@ -304,12 +305,22 @@ class ComputedTorque(Controller):
         if self._flies:
             self._actuate(tensions)
             actuation = self._actuation.copy()
+            lacking = self._of_carriers["lacking"].max(axis=1)
+            if lacking.max() > NEGLIGIBLE * self.robot.force_scale:
+                answered, proof = self._with_thrust_lacking(lacking, answered, proof)
         tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
             return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)
         pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
+
+    def _with_thrust_lacking(
+        self, lacking: np.ndarray, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray]
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Return how rows were answered, and what was missing, where carriers lack thrust [N] for the tensions."""
+        lacks = (answered == PLANNED) & (lacking > NEGLIGIBLE * self.robot.force_scale)
+        return np.where(lacks, SOFT, answered).astype(np.int8), (proof[0], np.where(lacks, lacking, proof[1]))
 
     def _actuate(self, tensions: np.ndarray) -> None:
         """Write the commands of actuators; lower the bandwidth of attitudes where carriers turn too late for it."""

@@ -40,6 +40,7 @@ CARRIER = np.dtype(
     [
         *((name, "f8", 6) for name in ("offset", "offset_rate")),
         *((name, "f8", 3) for name in ("force", "explained", "ordered", "turning")),
+        ("lacking", "f8"),
     ]
 )
 TETHER = np.dtype(

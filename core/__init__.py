@@ -1,4 +1,4 @@
-"""The numeric core, in C: tension distribution, a robot's mechanics, and the program of predictive control.
+"""The numeric core, in C: tension distribution, a robot's mechanics and motion, and the program of predictive control.
 
 Its functions work on the memory of arrays; what they take is in `_core.pyi` and the headers beside it. Packages above
 call them with arrays that they have checked.
@@ -26,8 +26,11 @@ from ._core import (
     horizon_solve,
     lines,
     required_wrench,
+    run_plant,
+    sense,
     solve_packed,
     solve_rows,
+    winch_lengths,
 )
 
 __all__ = [
@@ -52,6 +55,9 @@ __all__ = [
     "horizon_solve",
     "lines",
     "required_wrench",
+    "run_plant",
+    "sense",
     "solve_packed",
     "solve_rows",
+    "winch_lengths",
 ]

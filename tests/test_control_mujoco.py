@@ -249,10 +249,13 @@ def test_a_jump_of_the_reference_is_no_fault_of_the_model():
 
 
 def test_only_what_is_missing_counts_as_missing_in_a_team(load_on_three):
-    """Three cables never give six components; a team that flies well says so, and one that is too heavy does not."""
+    """Three cables never give six components; teams that carry what is half as heavy again are as planned.
+
+    One with three times the load lacks thrust, though no cable is at its limit.
+    """
     task = load_on_three
-    for case, soft in (("ideal", False), ("load +50 %", True)):
-        flown = fly(task, ComputedTorque(task.robot), **TEAMS[case])
-        assert (flown.error.max() > 0.1) == soft
+    for mass, soft in ((1.0, False), (1.5, False), (3.0, True)):
+        flown = fly(task, ComputedTorque(task.robot), mass=mass)
+        assert (flown.error[-300:].max() > 0.03) == soft
         assert (np.count_nonzero(flown.answered == SOFT) > 100) == soft
         assert soft or (flown.answered == 0).all()

@@ -6,7 +6,9 @@
  *     dw = A dt + G dp        G: moves or turns the cables of a carrier, with t_ref in them
  *
  * of which the solution of least norm is taken, each coordinate of a carrier measured by its reach and each tension by a
- * share of the weight. Carriers go there as a critically damped lag of second order does: their command is smooth.
+ * share of the weight. Carriers go there as a critically damped lag of second order does: their command is smooth, and
+ * has its acceleration too. Without that they would be as late as their own loops are slow, which have no more bandwidth
+ * than this lag; with fewer cables than degrees of freedom the loop over errors of the platform would be unstable.
  *
  * With as many cables as degrees of freedom or more, dw = -d, the disturbance: the carriers take over what is steady,
  * and the tensions correct errors. With fewer the carriers have to correct them too: dw = w - A t_ref where they are now,
@@ -15,7 +17,10 @@
 #include "control/equations.h"
 #include "control/internal.h"
 
-static const double SHARE = 0.05;  /* of the weight: the change of a tension that costs as much as all of a reach */
+/* Of the weight: the change of a tension that costs as much as all of a reach, for carriers that spare the tensions, */
+static const double SHARE = 0.05;
+/* and for those that correct errors, which leave to the tensions what tensions can give. */
+static const double ALONG = 1;
 static const double DAMPED = 1e-4; /* of the largest entry of the gram matrix */
 
 enum { CARRIERS = TOWLINE_MOST_CARRIERS };
@@ -65,10 +70,9 @@ void towline_carrier_columns(const towline_robot *robot, const towline_controlle
 }
 
 /* Solve (share^2 A A' + G G') x = dw for what makes dw with least effort, dp = G' x; moments times `scale`. */
-static void least_effort(const towline_robot *robot, const double *A, const double *missing, double scale,
+static void least_effort(const towline_robot *robot, double share, const double *A, const double *missing, double scale,
                          double columns[][6], double *x) {
     const int m = robot->cables;
-    const double share = SHARE * robot->force_scale;
     double gram[6][7], largest = 0;
     for (int j = 0; j < 6; j++) {
         const double by = j < 3 ? 1 : scale;
@@ -94,39 +98,22 @@ static void least_effort(const towline_robot *robot, const double *A, const doub
     }
 }
 
-/* Let an offset go towards where it is wanted, by a lag of second order, for `dt` [s]. */
-static void follow(const towline_controller *controller, double dt, double wanted, double *offset, double *rate) {
+/* Let an offset go towards where it is wanted, by a lag of second order, for `dt` [s]; return its acceleration. */
+static double follow(const towline_controller *controller, double dt, double wanted, double *offset, double *rate) {
     const double bandwidth = controller->carrier_bandwidth, most = controller->carrier_acceleration;
-    const double bend = bandwidth * (bandwidth * (wanted - *offset) - 2 * *rate);
-    if (dt > 0) {
-        *rate += dt * fmin(fmax(bend, -most), most);
-        *offset += dt * *rate;
+    if (!(dt > 0)) {
+        return 0;
     }
+    const double bend = fmin(fmax(bandwidth * (bandwidth * (wanted - *offset) - 2 * *rate), -most), most);
+    *rate += dt * bend;
+    *offset += dt * *rate;
+    return bend;
 }
 
-void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,
-                        const configuration *at, const double *A, const double *missing, towline_row *row) {
-    const double scale = 1 / robot->length_scale;
-    double columns[6 * CARRIERS][6], x[6];
-    towline_carrier_columns(robot, controller, at, row->t_ref, scale, columns);
-    least_effort(robot, A, missing, scale, columns, x);
-    for (int c = 0; c < robot->carriers; c++) {
-        towline_carrier_memory *memory = &row->carrier_memory[c];
-        for (int k = 0; k < 6; k++) {
-            const double reach = controller->reach[c][k];
-            double change = 0;
-            for (int j = 0; j < 6; j++) {
-                change += columns[6 * c + k][j] * x[j];
-            }
-            const double wanted = (controller->corrects ? memory->offset[k] : 0) + change * reach;
-            follow(controller, dt, fmin(fmax(wanted, -reach), reach), &memory->offset[k], &memory->offset_rate[k]);
-        }
-    }
-    towline_add_offsets(robot, row);
-}
-
-/* Add an offset (6) to coordinates (6); small rotations of a carrier that is nearly level become angles. */
-static void add_offset(const double *offset, double cosine, double sine, double *coordinates) {
+/* Add an offset (6) to coordinates (6) of a carrier turned by `turn`; its small rotations become angles. */
+static void add_offset(double turn, const double *offset, double *coordinates) {
+    double sine, cosine;
+    sine_and_cosine(turn, &sine, &cosine);
     for (int k = 0; k < 3; k++) {
         coordinates[k] += offset[k];
     }
@@ -135,11 +122,36 @@ static void add_offset(const double *offset, double cosine, double sine, double 
     coordinates[5] += offset[5];
 }
 
+void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,
+                        const configuration *at, const double *A, const double *missing, towline_row *row) {
+    const double scale = 1 / robot->length_scale, share = controller->corrects ? ALONG : SHARE;
+    double columns[6 * CARRIERS][6], x[6];
+    towline_carrier_columns(robot, controller, at, row->t_ref, scale, columns);
+    least_effort(robot, share * robot->force_scale, A, missing, scale, columns, x);
+    for (int c = 0; c < robot->carriers; c++) {
+        towline_carrier_memory *memory = &row->carrier_memory[c];
+        double *carrier = row->carriers + 18 * c, bends[6];
+        for (int k = 0; k < 6; k++) {
+            const double reach = controller->reach[c][k];
+            double change = 0;
+            for (int j = 0; j < 6; j++) {
+                change += columns[6 * c + k][j] * x[j];
+            }
+            const double wanted = (controller->corrects ? memory->offset[k] : 0) + change * reach;
+            bends[k] = follow(controller, dt, fmin(fmax(wanted, -reach), reach), &memory->offset[k],
+                              &memory->offset_rate[k]);
+        }
+        add_offset(carrier[5], bends, carrier + 12);
+    }
+    towline_add_offsets(robot, row);
+}
+
 void towline_add_offsets(const towline_robot *robot, towline_row *row) {
     for (int c = 0; c < robot->carriers; c++) {
-        double *pose = row->carriers + 18 * c, sine, cosine;
-        sine_and_cosine(pose[5], &sine, &cosine);
-        add_offset(row->carrier_memory[c].offset, cosine, sine, pose);
-        add_offset(row->carrier_memory[c].offset_rate, cosine, sine, pose + 6);
+        const towline_carrier_memory *memory = &row->carrier_memory[c];
+        double *carrier = row->carriers + 18 * c;
+        const double turn = carrier[5];
+        add_offset(turn, memory->offset, carrier);
+        add_offset(turn, memory->offset_rate, carrier + 6);
     }
 }

@@ -60,6 +60,7 @@ typedef struct {
     double explained[3];              /* momentum less what the estimate explains */
     double ordered[3];                /* angular acceleration, in its own axes; nan where an actuator is at its limit */
     double turning[3];                /* rate that is measured, in its own axes */
+    double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */
 } towline_carrier_memory;
 
 enum { TOWLINE_MOST_TETHERS = 3 };

@@ -124,9 +124,10 @@ static void wrench_of_carrier(const flier *it, const double *tensions, double *w
     wrench[2] = dot(force, axis);
 }
 
-/* Write commands inside their limits, where they are numbers, and forget an order that is not followed. */
+/* Write commands inside their limits, where they are numbers, and remember what they lack of an order. */
 static void command(const flier *it, const double *wrench, double *actuation) {
     int followed = 1;
+    double thrust = 0;
     for (int a = 0; a < it->body->actuators; a++) {
         const towline_actuator *limits = &it->body->actuator[a];
         double wanted = 0;
@@ -138,7 +139,9 @@ static void command(const flier *it, const double *wrench, double *actuation) {
             actuation[a] = inside;
         }
         followed &= wanted == actuation[a];
+        thrust += actuation[a] * limits->wrench[2];
     }
+    it->memory->lacking = fabs(wrench[2] - thrust);
     for (int k = 0; k < 3 && !followed; k++) {
         it->memory->ordered[k] = NAN;
     }

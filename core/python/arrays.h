@@ -72,6 +72,11 @@ static inline const towline_robot *robot_of(const arrays *given) {
         robot->cables > TOWLINE_MOST_CABLES || robot->carriers < 1 || robot->carriers > TOWLINE_MOST_CARRIERS) {
         return NULL;
     }
+    for (int b = 0; b <= robot->carriers; b++) {
+        if (robot->body[b].actuators < 0 || robot->body[b].actuators > TOWLINE_MOST_ACTUATORS) {
+            return NULL;
+        }
+    }
     for (int i = 0; i < robot->cables; i++) {
         if (robot->cable[i].carrier < 0 || robot->cable[i].carrier >= robot->carriers) {
             return NULL;

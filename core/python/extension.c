@@ -64,6 +64,15 @@ static PyMethodDef functions[] = {
     {"control_carriers", (PyCFunction)(void (*)(void))towline_py_control_carriers, METH_FASTCALL,
      "control_carriers(robot, tethers, motion, carriers)\n--\n\n"
      "Compute how carriers move if the platform and those coordinates do."},
+    {"run_plant", (PyCFunction)(void (*)(void))towline_py_run_plant, METH_FASTCALL,
+     "run_plant(robot, settings, states, commands, history, tensions, steps, period, substeps, keep)\n--\n\n"
+     "Run each state under its commands, and write every keep-th state and its tensions."},
+    {"sense", (PyCFunction)(void (*)(void))towline_py_sense, METH_FASTCALL,
+     "sense(robot, states, motions, lengths)\n--\n\n"
+     "Write the motions of platform and carriers in states of a plant, and lengths of the cables with their rates."},
+    {"winch_lengths", (PyCFunction)(void (*)(void))towline_py_winch_lengths, METH_FASTCALL,
+     "winch_lengths(robot, states, lengths, tensions, last_rates, commands, period)\n--\n\n"
+     "Write the unstrained lengths that give tensions within a period into commands of a plant."},
     {NULL, NULL, 0, NULL},
 };
 

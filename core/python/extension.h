@@ -34,4 +34,9 @@ PyObject *towline_py_control_aim(PyObject *module, PyObject *const *arguments, P
 PyObject *towline_py_control_coordinates(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_control_carriers(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* plant.c */
+PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 #endif

@@ -1,0 +1,39 @@
+"""Teams at home: whether what a push leaves decays in the whole loop of controller, carriers' own loops and plant."""
+
+import numpy as np
+import pytest
+
+from towline.control import ComputedTorque, Reference, State
+from towline.models import load
+from towline.plant import Plant
+from towline.statics.distribution import tensions
+
+PERIOD, SECONDS, PUSH = 4e-3, 8.0, 1e-4  # [s], [s], of the weight
+
+
+def decay(robot, controller):
+    """Return how much smaller the largest distance from home is in the last 3 s than in the 3 s before."""
+    plant, still = Plant(robot, drive="lengths"), np.zeros_like(robot.carrier_home)
+    at_rest = np.asarray(tensions(robot, robot.home, method="soft-wrench").tensions)
+    reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, at_rest)
+    scale = np.repeat([1.0, robot.length], 3)
+    push = PUSH * robot.weight * scale * np.random.default_rng(0).normal(size=6)
+    state, pulls, off = plant.start(tensions=at_rest), at_rest, []
+    for k in range(round(SECONDS / PERIOD)):
+        now = plant.read(state)
+        off.append(np.append(scale * (now.pose - robot.home), (now.carrier_pose - robot.carrier_home)[:, :3]))
+        measured = State(now.pose, now.velocity, now.carrier_pose, now.carrier_velocity, pulls)
+        command = controller.step(PERIOD * k, measured, reference)
+        wrench = push if PERIOD * k < 0.05 else None
+        row = plant.command(robot.fixed_lengths, command.actuation, *command[1:4], wrench=wrench)
+        run = plant.run(state, row[None], PERIOD)
+        state, pulls = run.states[-1], run.tensions.mean(axis=0)
+    sizes, part = np.linalg.norm(off, axis=1), round(3.0 / PERIOD)
+    return sizes[-part:].max() / sizes[-2 * part : -part].max()
+
+
+@pytest.mark.parametrize("name", ["multi-quadrotor-3", "multi-quadrotor-4", "multi-quadrotor-6"])
+def test_teams_come_to_rest(name):
+    """Slower than the carriers' own loops: 0.13 rad/s is a decay by a third in 3 s."""
+    robot = load(name)
+    assert decay(robot, ComputedTorque(robot)) < 0.8
