@@ -12,3 +12,15 @@ def lines(
     robot: Any, poses: Any, carriers: Any, lengths: Any, A: Any, J: Any, anchors: Any, sensitivity: Any
 ) -> None: ...
 def required_wrench(robot: Any, poses: Any, velocities: Any, accelerations: Any, wind: Any, w: Any) -> None: ...
+def pose_from_lengths(
+    robot: Any,
+    carriers: Any,
+    lengths: Any,
+    weights: Any,
+    free: Any,
+    damping: Any,
+    poses: Any,
+    errors: Any,
+    steps: Any,
+) -> None: ...
+def pose_covariance(robot: Any, carriers: Any, weights: Any, poses: Any, covariances: Any) -> None: ...

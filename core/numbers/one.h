@@ -3,6 +3,7 @@
 #define TOWLINE_ONE_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -12,16 +13,36 @@
 #define INLINE static inline
 #endif
 
+enum { LANES = 1 };
+
 typedef double num;
+typedef int mask;
 typedef uint64_t bits;
 
 INLINE num number(double x) { return x; }
+
+INLINE num where(mask chosen, num yes, num no) { return chosen ? yes : no; }
 
 INLINE num square_root(num x) { return sqrt(x); }
 
 INLINE num magnitude(num x) { return fabs(x); }
 
-INLINE num angle_of(num y, num x) { return atan2(y, x); }
+INLINE num smaller(num x, num y) { return x < y ? x : y; }
+
+INLINE num larger(num x, num y) { return x > y ? x : y; }
+
+INLINE int any(mask chosen) { return chosen; }
+
+/* Rows in lanes, of which there is one, see lanes.h. */
+INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, ptrdiff_t rows, int size) {
+    (void)rows;
+    memcpy(to, from + first * per, (size_t)size * sizeof *to);
+}
+
+INLINE void scatter(double *to, const num *from, ptrdiff_t first, ptrdiff_t rows, int size) {
+    (void)rows;
+    memcpy(to + first * size, from, (size_t)size * sizeof *to);
+}
 
 INLINE bits bits_of(num x) {
     bits b;
@@ -35,6 +56,8 @@ INLINE num from_bits(bits b) {
     return x;
 }
 
+/* These need `num`. */
+#include "angle.h"
 #include "sine.h"
 
 #endif

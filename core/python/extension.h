@@ -12,4 +12,8 @@ PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* pose.c */
+PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_pose_covariance(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 #endif
