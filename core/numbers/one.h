@@ -33,7 +33,7 @@ INLINE num larger(num x, num y) { return x > y ? x : y; }
 
 INLINE int any(mask chosen) { return chosen; }
 
-/* Rows in lanes, of which there is one, see lanes.h. */
+/* The numbers of rows in lanes, of which there is one, see lanes.h. */
 INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, ptrdiff_t rows, int size) {
     (void)rows;
     memcpy(to, from + first * per, (size_t)size * sizeof *to);
@@ -41,7 +41,9 @@ INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, 
 
 INLINE void scatter(double *to, const num *from, ptrdiff_t first, ptrdiff_t rows, int size) {
     (void)rows;
-    memcpy(to + first * size, from, (size_t)size * sizeof *to);
+    if (to) {
+        memcpy(to + first * size, from, (size_t)size * sizeof *to);
+    }
 }
 
 INLINE bits bits_of(num x) {
