@@ -29,7 +29,6 @@ types: .venv/dev.stamp
 
 # The machine code of controllers, once; otherwise each of the tests' processes compiles it or computes without.
 kernels: .venv/dev.stamp
-	$(BIN)/python -c "from towline.estimation.pose import machine; machine.load()"
 	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has
