@@ -8,14 +8,14 @@ INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-versi
 # What the extension is built from.
 CORE := setup.py $(wildcard core/*.h core/*/*.[ch] core/packaging/*.py)
 
-.PHONY: demo test setup lint types kernels unit docs lowest newest errata pictures clean
+.PHONY: demo test setup lint types unit docs lowest newest errata pictures clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
 
 # The tests have two workers of their own; what comes before them has not, and the type checker takes longest.
 test: .venv/dev.stamp
-	$(MAKE) --jobs=2 lint types kernels docs
+	$(MAKE) --jobs=2 lint types docs
 	$(MAKE) unit
 
 setup: .venv/dev.stamp
@@ -26,10 +26,6 @@ lint: .venv/dev.stamp
 
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
-
-# The machine code of forward kinematics, once; otherwise each of the tests' processes compiles it or computes without.
-kernels: .venv/dev.stamp
-	$(BIN)/python -c "from towline.estimation.pose import machine; machine.load()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has
 # one thread: two workers with two each would wait for one another.

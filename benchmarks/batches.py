@@ -15,7 +15,6 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..estimation.pose import machine as code
 from ..models import Dynamics, Robot, batch, load, points, pose_from_lengths
 from ..workspace import (
     Condition,
@@ -88,7 +87,6 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=200_000)
     parser.add_argument("--runs", type=int, default=5)
     options = parser.parse_args()
-    code.load()
     print(f"Measured on {machine()}.\n\n{head('robot | what | us a pose | times as long', 2)}")
     for name in ROBOTS:
         for what, seconds, beside in measure(load(name), options.poses, options.runs):

@@ -18,7 +18,6 @@ from towline.estimation.calibration.parameters import OF_CABLE, Parameters
 from towline.estimation.calibration.pose_track import PoseTrack
 from towline.estimation.calibration.rotations import from_vectors
 from towline.estimation.calibration.solving import length_of, model_of
-from towline.estimation.pose import machine
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
 from towline.models.rotation import rotation
@@ -253,7 +252,6 @@ def test_the_schur_complement_finds_what_a_sparse_solver_finds():
 
 def test_200_poses_with_all_parameters_take_less_than_a_fifth_of_a_second():
     robot, built = load("cogiro"), as_built(200, 0)
-    machine.load()  # poses are searched for by machine code, which a process loads, and a machine compiles, once
     for known in (True, False):
         times = []
         for _ in range(4):

@@ -46,13 +46,6 @@ INLINE num square_root(num x) {
     return x;
 }
 
-INLINE num angle_of(num y, num x) {
-    for (int lane = 0; lane < LANES; lane++) {
-        ((double *)&y)[lane] = atan2(((const double *)&y)[lane], ((const double *)&x)[lane]);
-    }
-    return y;
-}
-
 INLINE int any(mask chosen) {
     int64_t all = 0;
     for (int lane = 0; lane < LANES; lane++) {
@@ -84,6 +77,8 @@ INLINE void scatter(double *to, const num *from, ptrdiff_t first, ptrdiff_t rows
     }
 }
 
+/* These need `num`. */
+#include "angle.h"
 #include "sine.h"
 
 #endif

@@ -23,21 +23,26 @@ INLINE num number(double x) { return x; }
 
 INLINE num where(mask chosen, num yes, num no) { return chosen ? yes : no; }
 
-INLINE num smaller(num x, num y) { return x < y ? x : y; }
-
-INLINE num larger(num x, num y) { return x > y ? x : y; }
-
 INLINE num square_root(num x) { return sqrt(x); }
 
 INLINE num magnitude(num x) { return fabs(x); }
 
-INLINE num angle_of(num y, num x) { return atan2(y, x); }
+INLINE num smaller(num x, num y) { return x < y ? x : y; }
 
-/* The numbers of a row, as those of lanes.h. */
+INLINE num larger(num x, num y) { return x > y ? x : y; }
+
+INLINE int any(mask chosen) { return chosen; }
+
+/* The numbers of rows in lanes, of which there is one, see lanes.h. */
 INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, ptrdiff_t rows, int size) {
     (void)rows;
-    for (int i = 0; i < size; i++) {
-        to[i] = from[first * per + i];
+    memcpy(to, from + first * per, (size_t)size * sizeof *to);
+}
+
+INLINE void scatter(double *to, const num *from, ptrdiff_t first, ptrdiff_t rows, int size) {
+    (void)rows;
+    if (to) {
+        memcpy(to + first * size, from, (size_t)size * sizeof *to);
     }
 }
 
@@ -53,6 +58,8 @@ INLINE num from_bits(bits b) {
     return x;
 }
 
+/* These need `num`. */
+#include "angle.h"
 #include "sine.h"
 
 #endif

@@ -28,6 +28,12 @@ static PyMethodDef functions[] = {
     {"required_wrench", (PyCFunction)(void (*)(void))towline_py_required_wrench, METH_FASTCALL,
      "required_wrench(robot, poses, velocities, accelerations, wind, w)\n--\n\n"
      "Compute the wrench that each motion needs; wind has as many rows, or one, or is None."},
+    {"pose_from_lengths", (PyCFunction)(void (*)(void))towline_py_pose_from_lengths, METH_FASTCALL,
+     "pose_from_lengths(robot, carriers, lengths, weights, free, damping, poses, errors, steps)\n--\n\n"
+     "Move poses to where the errors of their lengths are least; carriers has as many rows or one."},
+    {"pose_covariance", (PyCFunction)(void (*)(void))towline_py_pose_covariance, METH_FASTCALL,
+     "pose_covariance(robot, carriers, weights, poses, covariances)\n--\n\n"
+     "Compute how the noise of the lengths spreads each pose; carriers has as many rows or one."},
     {"horizon_size", (PyCFunction)(void (*)(void))towline_py_horizon_size, METH_FASTCALL,
      "horizon_size(N, n, m, p)\n--\n\n"
      "Return how many numbers of memory a horizon of N stages, n states, m controls and p soft rows needs."},

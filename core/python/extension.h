@@ -16,6 +16,10 @@ PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* pose.c */
+PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_pose_covariance(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 /* horizon.c */
 PyObject *towline_py_horizon_size(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments, Py_ssize_t count);

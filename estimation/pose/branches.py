@@ -88,7 +88,7 @@ def _spread(robot: Robot, problem: Problem, level: np.ndarray, count: int, seed:
     from scipy.spatial.transform import Rotation
 
     rng = np.random.default_rng(seed)
-    reach = 2.0 * robot.length + 0.5 * np.ptp(problem.geometry[0, :, :3], axis=0).max()
+    reach = 2.0 * robot.length + 0.5 * np.ptp(points.anchors(robot, problem.carriers), axis=0).max()
     poses = np.tile(level, (count, 1))
     poses[:, :3] += rng.uniform(-1.0, 1.0, (count, 3)) * reach
     turning = problem.free[3:] > 0.0

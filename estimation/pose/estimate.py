@@ -10,8 +10,10 @@ import numpy as np
 
 from ...base.display import Displayed, Fact, brief
 from ...base.text import quantity, quantity_range, quantity_row
+from ...core import pose_covariance
 from ...models import points
 from ...models.dynamics import dynamics_of
+from ...models.record import record_of
 from ...models.robot import Robot
 
 __all__ = ["PoseEstimate", "gradient", "largest_cost"]
@@ -20,7 +22,6 @@ FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
 MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear
 MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standard deviations away
-SINGULAR = 1e-9  # of the gradient, relative to its largest singular value
 
 
 class PoseEstimate(Displayed):
@@ -113,7 +114,10 @@ class PoseEstimate(Displayed):
         """
         if self._covariance is not None:
             return self._covariance
-        return covariance_of(self._weighted_gradient(), self.robot)
+        covariances = np.empty((*self.pose.shape[:-1], 6, 6))
+        poses = np.ascontiguousarray(self.pose)
+        pose_covariance(record_of(self.robot), self._carriers(), 1.0 / self.sigma, poses, covariances)
+        return covariances
 
     @property
     def sigmas(self) -> np.ndarray:
@@ -150,11 +154,7 @@ class PoseEstimate(Displayed):
         """Return whether tensions of at least zero can hold the weight at rest there, (...)."""
         from .taut import taut
 
-        carriers = self.carrier_pose
-        if carriers is not None and carriers.ndim > 2:
-            carriers = np.broadcast_to(carriers, (*self.pose.shape[:-1], *carriers.shape[-2:]))
-            carriers = carriers.reshape(-1, *carriers.shape[-2:])
-        held = taut(self.robot, self.pose.reshape(-1, 6), carriers)
+        held = taut(self.robot, self.pose.reshape(-1, 6), self._carriers())
         return held.reshape(self.pose.shape[:-1]) if self.pose.ndim > 1 else bool(held[0])
 
     def suspects(self) -> np.ndarray:
@@ -175,6 +175,14 @@ class PoseEstimate(Displayed):
         finite = np.where(np.isfinite(self.covariance), self.covariance, np.nan).astype(object)
         finite[finite != finite] = None  # JSON has no infinity
         return plain | {"covariance": finite.tolist(), "ambiguous": np.asarray(self.ambiguous).tolist()}
+
+    def _carriers(self) -> np.ndarray:
+        """Return the poses of the carriers, (c, 6), or (N, c, 6) for N poses."""
+        carriers = self.robot.carrier_home if self.carrier_pose is None else self.carrier_pose
+        if carriers.ndim > 2:
+            carriers = np.broadcast_to(carriers, (*self.pose.shape[:-1], *carriers.shape[-2:]))
+            carriers = carriers.reshape(-1, *carriers.shape[-2:])
+        return np.ascontiguousarray(carriers)
 
     def _weighted_gradient(self) -> np.ndarray:
         return gradient(self.robot, self.pose, self.carrier_pose) / self.sigma[:, None]
@@ -205,21 +213,6 @@ def gradient(robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray | None) ->
     arm = np.einsum("...ij,j->...i", points.rotations(pose[..., 3:]), np.array(robot.platform.com))
     moments = A[..., 3:, :] + np.cross(arm[..., :, None], A[..., :3, :], axis=-2)
     return -np.swapaxes(np.concatenate([A[..., :3, :], moments], axis=-2) * robot.dof_mask[:, None], -1, -2)
-
-
-def covariance_of(J: np.ndarray, robot: Robot) -> np.ndarray:
-    """Return (J^T J)^-1 of the coordinates that move, (..., 6, 6), infinite without full rank."""
-    rows = np.flatnonzero(robot.dof_mask)
-    scale = robot.wrench_scale[rows]  # metres for all coordinates
-    _, values, axes = np.linalg.svd(J[..., rows] * scale, full_matrices=False)
-    result = np.zeros((*J.shape[:-2], 6, 6))
-    full = (values.shape[-1] == len(rows)) & (values[..., -1] > SINGULAR * values[..., 0])
-    inverse = np.where(full[..., None], 1.0 / np.where(values > 0, values, 1.0), np.inf)
-    with np.errstate(invalid="ignore"):
-        spread = np.swapaxes(axes, -1, -2) * inverse[..., None, :] * scale[:, None]
-        block = np.where(full[..., None, None], spread @ np.swapaxes(spread, -1, -2), np.inf)
-    result[..., rows[:, None], rows] = block
-    return result
 
 
 def moved(pose: np.ndarray, step: np.ndarray) -> np.ndarray:

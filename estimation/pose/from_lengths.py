@@ -54,7 +54,7 @@ def pose_from_lengths(
     Raises
     ------
     InputError
-        If an argument has a wrong shape or value.
+        If an argument has a wrong shape or value, or the robot has more than 32 cables or 8 carriers.
     """
     robot = as_robot(robot)
     lengths, deviations = checked_lengths(lengths, robot), checked_sigma(sigma, robot.m)

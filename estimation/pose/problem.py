@@ -1,4 +1,4 @@
-"""A robot's forward kinematics as arrays: what the kernel reads, and the calls of it."""
+"""A robot's forward kinematics with its carriers in one place, or in one place for each pose: descents in the core."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...models import points
+from ...core import pose_from_lengths as descend
+from ...models.record import record_of
 from ...models.robot import Robot
 from .estimate import gradient
-from .machine import run
 
 __all__ = ["Problem", "problem_of"]
 
-FEW, STEPS = 6, 60  # most steps of a descent; from a start nearby it takes three
-ROUNDING = 1e-11  # times the platform's size: a step that is rounding
-NEGLIGIBLE = 1e-8  # times the platform's size and the least sigma [m]: a step that is nothing beside the noise
 DAMPING = 1e-3  # of a first step from afar
 MILD = 3.0  # largest ratio of weights in a descent from afar
 OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, relative to the largest
@@ -27,38 +24,33 @@ class Problem(NamedTuple):
 
     Attributes
     ----------
-    geometry
-        Anchor in {G}, attachment in the platform frame and swivel axis in {G} of each cable, (N, m, 9) or (1, m, 9).
-    radii
-        Of the pulleys, (m,) [m].
+    record
+        The robot as the core reads it.
+    carriers
+        Poses of the carriers, (c, 6), or (N, c, 6) for N poses of the platform.
     free
         1 for coordinates that move, else 0, (6,).
     home
         Pose of the platform to start from, (6,) [m, rad].
-    scale
-        Length that makes a rotation comparable with a displacement [m].
+    m
+        Number of cables.
     freedoms
         How many coordinates move.
     open
         Whether the lengths leave a motion open at home, as parallel cables do, so that gravity decides.
     """
 
-    geometry: np.ndarray
-    radii: np.ndarray
+    record: np.ndarray
+    carriers: np.ndarray
     free: np.ndarray
     home: np.ndarray
-    scale: float
+    m: int
     freedoms: int
     open: bool
 
-    @property
-    def m(self) -> int:
-        """Return the number of cables."""
-        return len(self.radii)
-
     def of(self, rows: np.ndarray) -> Problem:
         """Return the problem of some of the poses."""
-        return self if len(self.geometry) == 1 else self._replace(geometry=self.geometry[rows])
+        return self if self.carriers.ndim == 2 else self._replace(carriers=self.carriers[rows])
 
     def descend(
         self,
@@ -87,22 +79,10 @@ class Problem(NamedTuple):
         -------
         Poses (N, 6), weighted errors (N, m) [m], and whether each descent ended at a minimum, (N,).
         """
-        moved = np.array(poses, dtype=float, order="C")  # the kernel works in place
-        errors, info = np.empty((len(lengths), self.m)), np.empty((len(lengths), 2))
+        moved, errors, steps = np.array(poses, order="C"), np.empty((len(lengths), self.m)), np.empty(len(lengths))
         free = self.free if free is None else free
-        smallest = max(ROUNDING, NEGLIGIBLE / weights.max(initial=0.0)) * self.scale
-        how = (weights, free, smallest, damping)
-        alone = len(lengths) == 1
-        self._run(lengths, *how, STEPS if alone else FEW, moved, errors, info)
-        if not alone and not info[:, 0].all():
-            # The others together: in a vector of many problems all wait for the slowest.
-            slow = np.flatnonzero(info[:, 0] == 0.0)
-            rest = moved[slow], errors[slow], info[slow]
-            self.of(slow)._run(lengths[slow], *how, STEPS, *rest)
-            moved[slow], errors[slow], info[slow] = rest
-        if self.freedoms < 6 or free is not self.free:
-            _keep_locked(moved, poses, free[3:] > 0.0)
-        return moved, errors, info[:, 0] > 0.0
+        descend(self.record, self.carriers, lengths, weights, free, np.array(damping), moved, errors, steps)
+        return moved, errors, steps > 0.0
 
     def descend_from_afar(
         self, lengths: np.ndarray, weights: np.ndarray, poses: np.ndarray
@@ -120,24 +100,6 @@ class Problem(NamedTuple):
         """Return weights, (m,), with none far above those of the cables that are needed to decide the pose."""
         return np.minimum(weights, MILD * np.sort(weights)[max(self.m - self.freedoms, 0)])
 
-    def _run(
-        self,
-        lengths: np.ndarray,
-        weights: np.ndarray,
-        free: np.ndarray,
-        smallest: float,
-        damping: float,
-        steps: int,
-        poses: np.ndarray,
-        errors: np.ndarray,
-        info: np.ndarray,
-    ) -> None:
-        """Call the kernel, which works in place of poses, errors and info."""
-        each = 0 if len(self.geometry) == 1 else 9 * self.m
-        given = (self.geometry.reshape(-1), each, lengths.reshape(-1), weights, self.radii, free)
-        how = (self.scale, smallest, damping, steps, 0, len(lengths))
-        run(*given, *how, poses.reshape(-1), errors.reshape(-1), info.reshape(-1))
-
 
 def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:
     """Return the problem of a robot with its carriers at home, or at (c, 6) or (N, c, 6)."""
@@ -149,7 +111,7 @@ def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:
         _last = robot, problem
     if carrier_pose is None:
         return problem
-    return problem._replace(geometry=_geometry(robot, carrier_pose.reshape(-1, *robot.carrier_home.shape)))
+    return problem._replace(carriers=np.ascontiguousarray(carrier_pose))
 
 
 _last: tuple[Robot | None, Problem | None] = (None, None)
@@ -157,23 +119,8 @@ _last: tuple[Robot | None, Problem | None] = (None, None)
 
 @lru_cache(maxsize=16)
 def _at_home(robot: Any) -> Problem:
-    geometry = _geometry(robot, robot.carrier_home[None])
     J = gradient(robot, robot.home, None)[:, robot.dof_mask > 0.0]
     values = np.linalg.svd(J * robot.wrench_scale[robot.dof_mask > 0.0], compute_uv=False)
     is_open = robot.m < J.shape[1] or bool(values[-1] < OPEN * values[0])
-    return Problem(geometry, robot.pulley_radii, robot.dof_mask, robot.home, robot.length, J.shape[1], is_open)
-
-
-def _keep_locked(poses: np.ndarray, starts: np.ndarray, turning: np.ndarray) -> None:
-    """Write the angles that cannot move as they were, in place: the kernel returns any that give the same attitude."""
-    if turning[1]:  # beyond a quarter turn roll and yaw would be half turns
-        poses[:, 4] = np.arctan2(np.sin(poses[:, 4]), np.cos(poses[:, 4]) * np.cos(poses[:, 5]))
-    poses[:, 3:][:, ~turning] = starts[:, 3:][:, ~turning]
-
-
-def _geometry(robot: Robot, carriers: np.ndarray) -> np.ndarray:
-    """Return (N, m, 9) for carriers at (N, c, 6)."""
-    turned = points.rotations(carriers[:, robot.carrier_of_cable, 3:])
-    parts = [points.anchors(robot, carriers), robot.attachments, np.einsum("nmij,mj->nmi", turned, robot.pulley_axes)]
-    shape = (len(carriers), robot.m, 3)
-    return np.ascontiguousarray(np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=2))
+    of_robot = record_of(robot), robot.carrier_home, robot.dof_mask, robot.home
+    return Problem(*of_robot, robot.m, J.shape[1], is_open)

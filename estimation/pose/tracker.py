@@ -15,7 +15,6 @@ from ...models.files import as_robot
 from ...models.robot import Robot
 from .estimate import PoseEstimate
 from .from_lengths import SIGMA, checked_lengths, checked_sigma, one_pose, pose_from_lengths
-from .machine import load
 
 __all__ = ["PoseTracker"]
 
@@ -49,7 +48,6 @@ class PoseTracker(Displayed):
         self.robot, self.searches = as_robot(robot), 0
         self.sigma = checked_sigma(sigma, self.robot.m)
         self.pose = None if start is None else finite_array("start", start, (6,)).copy()
-        load()  # now, not amid a stream
 
     def update(self, lengths: ArrayLike, carrier_pose: ArrayLike | None = None) -> PoseEstimate:
         """Return the estimate of the next lengths, (m,) [m], with carriers at `carrier_pose`, (c, 6), or at home.

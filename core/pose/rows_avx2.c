@@ -1,0 +1,6 @@
+/* Forward kinematics of rows for processors with AVX2. */
+#include "numbers/avx2.h"
+
+#ifdef TOWLINE_X86
+#include "pose/rows_in_lanes.h"
+#endif

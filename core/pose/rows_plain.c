@@ -1,0 +1,6 @@
+/* Forward kinematics of rows for every processor of its kind. */
+#include "numbers/plain.h"
+
+#ifndef TOWLINE_NO_LANES
+#include "pose/rows_in_lanes.h"
+#endif

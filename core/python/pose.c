@@ -1,0 +1,63 @@
+/* Forward kinematics for Python: poses from lengths, and their covariances. */
+#include "pose/pose.h"
+
+#include "python/arrays.h"
+#include "python/extension.h"
+
+/* Return whether carriers fit so many rows of a robot, and set how many numbers lie between those of two. */
+static int carriers_fit(const towline_robot *robot, Py_ssize_t size, Py_ssize_t rows, ptrdiff_t *per) {
+    const Py_ssize_t one = 6 * robot->carriers;
+    *per = size == one ? 0 : one;
+    return size == one || size == rows * one;
+}
+
+PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, CARRIERS, LENGTHS, WEIGHTS, FREE, DAMPING, POSES, ERRORS, STEPS, ALL };
+    arrays given;
+    if (!take(&given, arguments, count, ALL, POSES)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    int fits = robot != NULL;
+    if (fits) {
+        const Py_ssize_t m = robot->cables, rows = given.size[STEPS];
+        ptrdiff_t per;
+        fits = carriers_fit(robot, given.size[CARRIERS], rows, &per) && given.size[LENGTHS] == rows * m &&
+               given.size[WEIGHTS] == m && given.size[FREE] == 6 && given.size[DAMPING] == 1 &&
+               given.size[POSES] == 6 * rows && given.size[ERRORS] == rows * m;
+        if (fits) {
+            const towline_lengths measured = {given.of[CARRIERS], per,           given.of[LENGTHS], given.of[WEIGHTS],
+                                              given.of[FREE],     *given.of[DAMPING]};
+            const towline_poses results = {given.of[POSES], given.of[ERRORS], given.of[STEPS]};
+            Py_BEGIN_ALLOW_THREADS;
+            towline_pose_from_lengths(robot, rows, measured, results);
+            Py_END_ALLOW_THREADS;
+        }
+    }
+    return done(&given, fits);
+}
+
+PyObject *towline_py_pose_covariance(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, CARRIERS, WEIGHTS, POSES, COVARIANCES, ALL };
+    arrays given;
+    if (!take(&given, arguments, count, ALL, COVARIANCES)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    int fits = robot && given.size[POSES] % 6 == 0;
+    if (fits) {
+        const Py_ssize_t rows = given.size[POSES] / 6;
+        ptrdiff_t per;
+        fits = carriers_fit(robot, given.size[CARRIERS], rows, &per) && given.size[WEIGHTS] == robot->cables &&
+               given.size[COVARIANCES] == 36 * rows;
+        if (fits) {
+            const towline_lengths measured = {given.of[CARRIERS], per, NULL, given.of[WEIGHTS], robot->freedom, 0};
+            Py_BEGIN_ALLOW_THREADS;
+            towline_pose_covariance(robot, rows, measured, given.of[POSES], given.of[COVARIANCES]);
+            Py_END_ALLOW_THREADS;
+        }
+    }
+    return done(&given, fits);
+}
