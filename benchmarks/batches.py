@@ -15,8 +15,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..base import processors
 from ..estimation.pose import machine as code
-from ..models import Dynamics, Robot, batch, load, points, pose_from_lengths
+from ..models import Dynamics, Robot, load, points, pose_from_lengths
 from ..workspace import (
     Condition,
     Lengths,
@@ -47,11 +48,10 @@ def measure(robot: Robot, count: int, runs: int) -> Iterator[tuple[str, float, s
     poses = robot.home + 0.1 * robot.length * rng.uniform(-1, 1, (count, 6)) * robot.dof_mask
     near = poses + rng.normal(0, 1e-3, poses.shape)
     for name in ("wrench_matrix", "cable_lengths"):
-        function = dynamics.functions[name]
-        batch.compiled(function)
-        mapped, home = function.map(count), np.tile(robot.carrier_home, (1, count))
-        both = {"pose": poses, "carrier_pose": robot.carrier_home}
-        seconds = timed(lambda function=function, both=both: batch.call(function, both, threads=1), runs)[1]
+        mapped, home = dynamics.functions[name].map(count), np.tile(robot.carrier_home, (1, count))
+        method = getattr(dynamics, name)
+        with processors.at_most(1):
+            seconds = timed(lambda method=method: method(poses), runs)[1]
         by_map = timed(lambda mapped=mapped, home=home: mapped(poses.T, home).full(), min(runs, 3))[1]
         yield name, seconds / count, f"map {by_map / seconds:.1f}"
     lengths = dynamics.cable_lengths(poses) + rng.normal(0, 1e-3, (count, robot.m))

@@ -6,10 +6,25 @@ without the extension.
 
 from typing import Any
 
-__all__ = ["CABLES", "MOST_CABLES", "MOST_CARRIERS", "ROWS", "lines", "required_wrench", "solve_packed", "solve_rows"]
+__all__ = [
+    "CABLES",
+    "MOST_CABLES",
+    "MOST_CARRIERS",
+    "ROWS",
+    "columns_by_geometry",
+    "ends",
+    "finite",
+    "lines",
+    "required_wrench",
+    "solve_packed",
+    "solve_rows",
+    "wrench_by_axes",
+    "wrench_by_pose",
+]
 
 try:
-    from ._core import CABLES, MOST_CABLES, MOST_CARRIERS, ROWS, lines, required_wrench, solve_packed, solve_rows
+    from ._core import CABLES, MOST_CABLES, MOST_CARRIERS, ROWS, solve_packed, solve_rows
+    from ._core import columns_by_geometry, ends, finite, lines, required_wrench, wrench_by_axes, wrench_by_pose
 except ImportError:
     ROWS = CABLES = 0
     UNSURE = 6  # of `codes`: the core has found neither tensions nor a proof

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..base.inputs import required
 from ..models import Robot
-from ..models.batch import compiled
 from ..models.dynamics import dynamics_of
 from ..solvers import compiled as solver_kernels
 from ..solvers import solve_batch
@@ -35,11 +34,11 @@ ONLY_EXACT = 0.01  # of the force scale
 
 
 def load_kernels(robot: Robot) -> None:
-    """Load the compiled code for millions of places of a robot, or compile it if this machine has not done so yet.
+    """Load the solver's compiled code for millions of places, or compile it if this machine has not done so yet.
 
-    It is never needed: without it, code that takes about ten times as long per place runs until compiling pays.
+    It is never needed: without it, code that takes longer per place runs until compiling pays.
     """
-    compiled(dynamics_of(robot).functions["wrench_matrix"])
+    required("robot", robot, Robot)
     solver_kernels.load()
 
 

@@ -6,6 +6,7 @@
 /* These need `num`. */
 #include "mechanics/lines.h"
 #include "mechanics/rigid_body.h"
+#include "mechanics/turning.h"
 
 void towline_lines_at(const towline_robot *robot, const double *pose, const double *carriers, towline_lines want) {
     const lines each = {want.lengths, want.A, want.J, want.anchors, want.sensitivity};
@@ -59,3 +60,48 @@ void towline_required_wrench_of_rows(const towline_robot *robot, ptrdiff_t rows,
 }
 
 #endif
+
+/* Whether so many rows are computed in lanes; one alone takes less time without. */
+static int in_lanes(ptrdiff_t rows) {
+#ifdef TOWLINE_NO_LANES
+    (void)rows;
+    return 0;
+#else
+    return rows > 1;
+#endif
+}
+
+void towline_ends_of_rows(const towline_robot *robot, towline_places at, double *anchors, double *attachments) {
+    const int m = robot->cables;
+    if (in_lanes(at.rows)) {
+        BEST_FORM(ends_of_rows, robot, at, anchors, attachments);
+        return;
+    }
+    for (ptrdiff_t row = 0; row < at.rows; row++) {
+        ends_at(robot, at.poses + 6 * row, at.carriers + at.carriers_per * row, anchors + 3 * m * row,
+                attachments + 3 * m * row);
+    }
+}
+
+void towline_columns_by_geometry(const towline_robot *robot, towline_places at, double *S) {
+    if (in_lanes(at.rows)) {
+        BEST_FORM(columns_by_geometry, robot, at, S);
+        return;
+    }
+    for (ptrdiff_t row = 0; row < at.rows; row++) {
+        columns_by_geometry(robot, at.poses + 6 * row, at.carriers + at.carriers_per * row,
+                            S + 42 * robot->cables * row);
+    }
+}
+
+void towline_wrench_by_pose(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
+                            double *D) {
+    if (in_lanes(at.rows)) {
+        BEST_FORM(wrench_by_pose, robot, at, tensions, by_axes, D);
+        return;
+    }
+    for (ptrdiff_t row = 0; row < at.rows; row++) {
+        wrench_by_pose(robot, at.poses + 6 * row, at.carriers + at.carriers_per * row, tensions + robot->cables * row,
+                       by_axes, D + 36 * row);
+    }
+}

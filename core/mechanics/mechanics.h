@@ -34,4 +34,24 @@ void towline_lines_of_rows(const towline_robot *robot, ptrdiff_t rows, const dou
 void towline_required_wrench_of_rows(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion,
                                      ptrdiff_t wind_per, double *w);
 
+/* Poses (6) of the platform and (c, 6) of the carriers at many rows; `carriers_per` as above. */
+typedef struct {
+    ptrdiff_t rows;
+    const double *poses, *carriers;
+    ptrdiff_t carriers_per;
+} towline_places;
+
+/* Anchors and attachments of the cables in {G}, (m, 3) each [m]. */
+void towline_ends_of_rows(const towline_robot *robot, towline_places at, double *anchors, double *attachments);
+
+/* S (m, 6, 7): the column of A of each cable with respect to its anchor (3), attachment (3) and radius. */
+void towline_columns_by_geometry(const towline_robot *robot, towline_places at, double *S);
+
+/*
+ * D (6, 6): the wrench A t at constant tensions t (m) with respect to the pose or, `by_axes`, to displacements of the CoM
+ * and turns about it, along and about the axes of {G}; then -D is the stiffness at constant tensions.
+ */
+void towline_wrench_by_pose(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
+                            double *D);
+
 #endif

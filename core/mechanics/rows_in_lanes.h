@@ -4,6 +4,7 @@
 #include "mechanics/lines.h"
 #include "mechanics/rigid_body.h"
 #include "mechanics/rows.h"
+#include "mechanics/turning.h"
 
 enum { CABLES = TOWLINE_MOST_CABLES, CARRIERS = TOWLINE_MOST_CARRIERS };
 
@@ -42,5 +43,45 @@ void FORM(required_wrench_of_rows)(const towline_robot *robot, ptrdiff_t rows, t
         }
         required_wrench(robot, pose, velocity, acceleration, motion.wind ? wind : NULL, wrench);
         scatter(w, wrench, first, rows, 6);
+    }
+}
+
+/* The poses of eight rows; those of carriers that all rows have in one place stay as they are. */
+INLINE void gather_places(const towline_robot *robot, towline_places at, ptrdiff_t first, num *pose, num *carrier) {
+    gather(pose, at.poses, 6, first, at.rows, 6);
+    if (first == 0 || at.carriers_per) {
+        gather(carrier, at.carriers, at.carriers_per, first, at.rows, 6 * robot->carriers);
+    }
+}
+
+void FORM(ends_of_rows)(const towline_robot *robot, towline_places at, double *anchors, double *attachments) {
+    const int m = robot->cables;
+    num pose[6], carrier[6 * CARRIERS], starts[3 * CABLES], ends[3 * CABLES];
+    for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
+        gather_places(robot, at, first, pose, carrier);
+        ends_at(robot, pose, carrier, starts, ends);
+        scatter(anchors, starts, first, at.rows, 3 * m);
+        scatter(attachments, ends, first, at.rows, 3 * m);
+    }
+}
+
+void FORM(columns_by_geometry)(const towline_robot *robot, towline_places at, double *S) {
+    num pose[6], carrier[6 * CARRIERS], changes[42 * CABLES];
+    for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
+        gather_places(robot, at, first, pose, carrier);
+        columns_by_geometry(robot, pose, carrier, changes);
+        scatter(S, changes, first, at.rows, 42 * robot->cables);
+    }
+}
+
+void FORM(wrench_by_pose)(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
+                          double *D) {
+    const int m = robot->cables;
+    num pose[6], carrier[6 * CARRIERS], tension[CABLES], derivative[36];
+    for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
+        gather_places(robot, at, first, pose, carrier);
+        gather(tension, tensions, m, first, at.rows, m);
+        wrench_by_pose(robot, pose, carrier, tension, by_axes, derivative);
+        scatter(D, derivative, first, at.rows, 36);
     }
 }

@@ -14,12 +14,25 @@ static PyMethodDef functions[] = {
     {"solve_rows", (PyCFunction)(void (*)(void))towline_py_solve_rows, METH_FASTCALL,
      "solve_rows(n, m, rho, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, residual, "
      "status)\n--\n\nSolve the rows of a batch whose status is UNSURE; return how many of all are optimal."},
+    {"finite", towline_py_finite, METH_O,
+     "finite(array)\n--\n\nReturn whether all numbers of an array of float64 in C order are finite."},
     {"lines", (PyCFunction)(void (*)(void))towline_py_lines, METH_FASTCALL,
      "lines(robot, poses, carriers, lengths, A, J, anchors, sensitivity)\n--\n\n"
      "Compute the lines of the cables at each pose, of those results that are not None; carriers has as many rows or one."},
     {"required_wrench", (PyCFunction)(void (*)(void))towline_py_required_wrench, METH_FASTCALL,
      "required_wrench(robot, poses, velocities, accelerations, wind, w)\n--\n\n"
      "Compute the wrench that each motion needs; wind has as many rows, or one, or is None."},
+    {"ends", (PyCFunction)(void (*)(void))towline_py_ends, METH_FASTCALL,
+     "ends(robot, poses, carriers, anchors, attachments)\n--\n\nCompute where the cables end at each pose."},
+    {"columns_by_geometry", (PyCFunction)(void (*)(void))towline_py_columns_by_geometry, METH_FASTCALL,
+     "columns_by_geometry(robot, poses, carriers, S)\n--\n\n"
+     "Compute the columns of the wrench matrix with respect to anchors, attachments and radii, (m, 6, 7) a row."},
+    {"wrench_by_pose", (PyCFunction)(void (*)(void))towline_py_wrench_by_pose, METH_FASTCALL,
+     "wrench_by_pose(robot, poses, carriers, tensions, D)\n--\n\n"
+     "Compute the wrench of constant tensions with respect to the pose, (6, 6) a row."},
+    {"wrench_by_axes", (PyCFunction)(void (*)(void))towline_py_wrench_by_axes, METH_FASTCALL,
+     "wrench_by_axes(robot, poses, carriers, tensions, D)\n--\n\n"
+     "The same with respect to displacements of the CoM and turns about it, along and about the axes of {G}."},
     {NULL, NULL, 0, NULL},
 };
 
