@@ -1,6 +1,6 @@
 """Build the C core as an extension, and the description that a package index shows.
 
-The extension is optional: without a compiler towline is installed without it. The description is README.md, whose links
+core/packaging/compiler.py finds the compiler. The description is README.md, whose links
 lead to files of the repository; an index has none of these, so there they lead to the repository as of this version.
 
 An editable installation gets a folder that has the package under its name, because the repository's root is the package
@@ -53,7 +53,18 @@ def main() -> None:
     from pathlib import Path
 
     from setuptools import Extension, setup
+    from setuptools.command.build_ext import build_ext
     from setuptools.command.editable_wheel import editable_wheel
+
+    sys.path.insert(0, str(Path(CORE, "packaging").resolve()))
+    import compiler
+
+    class Build(build_ext):
+        """The build of the core by the machine's compiler or that of the package ziglang."""
+
+        def run(self) -> None:
+            compiler.choose()
+            super().run()
 
     class Editable(editable_wheel):
         """An editable installation by a path, or by setuptools' import hook where there can be no link."""
@@ -68,18 +79,17 @@ def main() -> None:
     core = Extension(
         "towline.core._core",
         sorted(str(path) for path in Path(CORE).glob("*/*.c")),
-        depends=sorted(str(path) for path in Path(CORE).glob("*/*.h")),
+        depends=sorted(str(path) for path in Path(CORE).rglob("*.h")),
         include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
         extra_compile_args=[] if sys.platform == "win32" else FLAGS,
         py_limited_api=True,
-        optional=True,
     )
     # Named as the script, this file is no module of the package, whichever program runs it.
     setup(
         script_name="setup.py",
         ext_modules=[core],
-        cmdclass={"editable_wheel": Editable},
+        cmdclass={"build_ext": Build, "editable_wheel": Editable},
         options={"bdist_wheel": {"py_limited_api": "cp311"}},
         long_description=with_addresses(readme, project["urls"]["Repository"], project["version"]),
         long_description_content_type="text/markdown",

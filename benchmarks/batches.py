@@ -26,7 +26,6 @@ from ..workspace import (
     StaticEquilibrium,
     WrenchClosure,
     WrenchFeasible,
-    load_kernels,
 )
 from .harness import head, machine, row, timed
 
@@ -62,7 +61,6 @@ def measure(robot: Robot, count: int, runs: int) -> Iterator[tuple[str, float, s
     few = lengths[:10_000]
     search = timed(lambda: pose_from_lengths(robot, few), runs)[1] / len(few)
     yield "pose from lengths, no start", search, "-"
-    load_kernels(robot)
     corners = np.vstack([robot.home_anchors, robot.home[:3]])
     poses[:, :3] = rng.uniform(corners.min(axis=0), corners.max(axis=0), (count, 3))
     places = Places.at_home(robot, poses)

@@ -111,8 +111,8 @@ class Dynamics(Displayed):
     def wrench_jacobian(self, pose: Array, tensions: Array, carrier_pose: Array | None = None) -> Array:
         """Return the derivative of A t with respect to the pose at constant tensions, (..., 6, 6).
 
-        Arguments as in `wrench_matrix`; `tensions` are (..., m) [N]. For displacements of the CoM and turns about it see
-        `stiffness`.
+        Arguments as in `wrench_matrix`; `tensions` are (..., m) [N]. For displacements of the CoM and turns about it
+        see `stiffness`.
         """
         if numeric := self._numeric(pose, tensions, carrier_pose):
             return numeric.wrench_jacobian(pose, tensions, carrier_pose)

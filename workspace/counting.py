@@ -16,14 +16,10 @@ import numpy as np
 
 from ..base import processors
 from ..base.display import Displayed
-from ..solvers import compiled
 from .condition import Condition
 from .counts import Counts
 from .domain import Domain
-from .feasibility import load_kernels
 from .sampling import Sampler
-
-WORTH_KERNELS = 500_000  # samples of a run: the first kernels on a machine take a minute, saving 20 us a sample
 
 
 @dataclass(frozen=True)
@@ -45,11 +41,6 @@ class Counter(Displayed):
     sampler: Sampler | None
     keep: str
     samples: int
-
-    def prepare(self) -> None:
-        """Compile the kernels of a large run once, before its processes start: each would compile them for itself."""
-        if self.samples >= WORTH_KERNELS:
-            compiled.keep()
 
     def chunk(self, counts: Counts, units: np.ndarray, known: bytes | None, keep: bool) -> bytes:
         """Add the points of a chunk (n, d) to counts; return which of them are accepted, one bit a sample.
@@ -95,7 +86,7 @@ def count(
     -------
     The counts, and of each chunk which samples are accepted, one bit a sample.
     """
-    counter = shared.counter()
+    counter = shared.counter
     counts, flags = Counts(counter.domain), []
     with processors.at_most(1):
         for offset, bits in enumerate(known):
@@ -112,21 +103,14 @@ class Shared:
     """A counter for all jobs of a run: pickled once for those of other processes, and not at all for this one's."""
 
     def __init__(self, counter: Counter) -> None:
-        self._counter, self._ready = counter, False
+        self.counter = counter
 
     @cached_property
     def _packed(self) -> bytes:
-        return pickle.dumps(self._counter)
+        return pickle.dumps(self.counter)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpacked, (self._packed,)
-
-    def counter(self) -> Counter:
-        """Return it, with the kernels loaded for a large run; the bits do not depend on it."""
-        if not self._ready and self._counter.samples >= WORTH_KERNELS:
-            load_kernels(self._counter.domain.robot)
-        self._ready = True
-        return self._counter
 
 
 @lru_cache(maxsize=2)

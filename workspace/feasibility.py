@@ -13,14 +13,12 @@ import numpy as np
 from ..base.inputs import required
 from ..models import Robot
 from ..models.dynamics import dynamics_of
-from ..solvers import compiled as solver_kernels
 from ..solvers import solve_batch
 from .places import Places, check_places
 from .robust_limits import Tightened
 
 __all__ = [
     "feasible",
-    "load_kernels",
     "rest_wrench",
     "scaled",
     "shortfall",
@@ -31,15 +29,6 @@ __all__ = [
 
 PLACES_AT_ONCE = 8192
 ONLY_EXACT = 0.01  # of the force scale
-
-
-def load_kernels(robot: Robot) -> None:
-    """Load the solver's compiled code for millions of places, or compile it if this machine has not done so yet.
-
-    It is never needed: without it, code that takes longer per place runs until compiling pays.
-    """
-    required("robot", robot, Robot)
-    solver_kernels.load()
 
 
 def rest_wrench(robot: Robot) -> np.ndarray:

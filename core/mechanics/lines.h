@@ -141,7 +141,7 @@ INLINE void length_by_geometry(const line *run, const attitude *platform, const 
 INLINE void lines_at(const towline_robot *robot, const num *pose, const num *carriers, lines want) {
     const int m = robot->cables, measured = want.lengths || want.sensitivity;
     attitudes at = attitudes_of(pose, carriers);
-    num com[3], axes[3][3];
+    num com[3], axes[3][3] = {{number(0)}}; /* else compilers warn: they do not see that J alone reads the axes */
     turn_constant(at.platform.R, robot->com, com);
     if (want.J) {
         turning_axes(&at.platform, axes);

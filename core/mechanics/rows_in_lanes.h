@@ -1,6 +1,4 @@
-/* The mechanics of many rows, some at a time; included by rows_plain.c and its like. */
-#include "numbers/lanes.h"
-/* These need `num`. */
+/* The mechanics of many rows, some at a time; included by rows_plain.c and its like after `num`. */
 #include "mechanics/lines.h"
 #include "mechanics/rigid_body.h"
 #include "mechanics/rows.h"
@@ -8,8 +6,15 @@
 
 enum { CABLES = TOWLINE_MOST_CABLES, CARRIERS = TOWLINE_MOST_CARRIERS };
 
-void FORM(lines_of_rows)(const towline_robot *robot, ptrdiff_t rows, const double *poses, const double *carriers,
-                         ptrdiff_t carriers_per, towline_lines want) {
+/* The poses of the next rows; those of carriers that all rows have in one place stay as they are. */
+INLINE void gather_places(const towline_robot *robot, towline_places at, ptrdiff_t first, num *pose, num *carrier) {
+    gather(pose, at.poses, 6, first, at.rows, 6);
+    if (first == 0 || at.carriers_per) {
+        gather(carrier, at.carriers, at.carriers_per, first, at.rows, 6 * robot->carriers);
+    }
+}
+
+void FORM(lines_of_rows)(const towline_robot *robot, towline_places at, towline_lines want) {
     const int m = robot->cables;
     num pose[6], carrier[6 * CARRIERS];
     num lengths[CABLES], A[6 * CABLES], J[6 * CABLES], anchors[3 * CABLES], sensitivity[7 * CABLES];
@@ -17,17 +22,14 @@ void FORM(lines_of_rows)(const towline_robot *robot, ptrdiff_t rows, const doubl
         want.lengths ? lengths : NULL,         want.A ? A : NULL, want.J ? J : NULL, want.anchors ? anchors : NULL,
         want.sensitivity ? sensitivity : NULL,
     };
-    for (ptrdiff_t first = 0; first < rows; first += LANES) {
-        gather(pose, poses, 6, first, rows, 6);
-        if (first == 0 || carriers_per) {
-            gather(carrier, carriers, carriers_per, first, rows, 6 * robot->carriers);
-        }
+    for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
+        gather_places(robot, at, first, pose, carrier);
         lines_at(robot, pose, carrier, each);
-        scatter(want.lengths, lengths, first, rows, m);
-        scatter(want.A, A, first, rows, 6 * m);
-        scatter(want.J, J, first, rows, 6 * m);
-        scatter(want.anchors, anchors, first, rows, 3 * m);
-        scatter(want.sensitivity, sensitivity, first, rows, 7 * m);
+        scatter(want.lengths, lengths, first, at.rows, m);
+        scatter(want.A, A, first, at.rows, 6 * m);
+        scatter(want.J, J, first, at.rows, 6 * m);
+        scatter(want.anchors, anchors, first, at.rows, 3 * m);
+        scatter(want.sensitivity, sensitivity, first, at.rows, 7 * m);
     }
 }
 
@@ -46,14 +48,6 @@ void FORM(required_wrench_of_rows)(const towline_robot *robot, ptrdiff_t rows, t
     }
 }
 
-/* The poses of eight rows; those of carriers that all rows have in one place stay as they are. */
-INLINE void gather_places(const towline_robot *robot, towline_places at, ptrdiff_t first, num *pose, num *carrier) {
-    gather(pose, at.poses, 6, first, at.rows, 6);
-    if (first == 0 || at.carriers_per) {
-        gather(carrier, at.carriers, at.carriers_per, first, at.rows, 6 * robot->carriers);
-    }
-}
-
 void FORM(ends_of_rows)(const towline_robot *robot, towline_places at, double *anchors, double *attachments) {
     const int m = robot->cables;
     num pose[6], carrier[6 * CARRIERS], starts[3 * CABLES], ends[3 * CABLES];
@@ -65,7 +59,7 @@ void FORM(ends_of_rows)(const towline_robot *robot, towline_places at, double *a
     }
 }
 
-void FORM(columns_by_geometry)(const towline_robot *robot, towline_places at, double *S) {
+void FORM(columns_by_geometry_of_rows)(const towline_robot *robot, towline_places at, double *S) {
     num pose[6], carrier[6 * CARRIERS], changes[42 * CABLES];
     for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
         gather_places(robot, at, first, pose, carrier);
@@ -74,8 +68,8 @@ void FORM(columns_by_geometry)(const towline_robot *robot, towline_places at, do
     }
 }
 
-void FORM(wrench_by_pose)(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
-                          double *D) {
+void FORM(wrench_by_pose_of_rows)(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
+                                  double *D) {
     const int m = robot->cables;
     num pose[6], carrier[6 * CARRIERS], tension[CABLES], derivative[36];
     for (ptrdiff_t first = 0; first < at.rows; first += LANES) {

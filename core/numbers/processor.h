@@ -17,10 +17,8 @@
 /* The best form for this processor: 0 plain, 1 AVX2, 2 AVX-512. */
 int towline_processor(void);
 
-/* Call the best form of a function; without lanes there is none to call. */
-#ifdef TOWLINE_NO_LANES
-#define BEST_FORM(name, ...) (void)0
-#elif defined(TOWLINE_X86)
+/* Call the best form of a function. */
+#ifdef TOWLINE_X86
 #define BEST_FORM(name, ...)                                                                                           \
     switch (towline_processor()) {                                                                                     \
         case 2: name##_avx512(__VA_ARGS__); break;                                                                     \

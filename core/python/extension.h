@@ -11,6 +11,10 @@ PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py
 /* finite.c */
 PyObject *towline_py_finite(PyObject *module, PyObject *array);
 
+/* available_wrench.c */
+PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
 /* mechanics.c */
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
@@ -18,5 +22,16 @@ PyObject *towline_py_ends(PyObject *module, PyObject *const *arguments, Py_ssize
 PyObject *towline_py_columns_by_geometry(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_wrench_by_pose(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_wrench_by_axes(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
+/* horizon.c */
+PyObject *towline_py_horizon_size(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+
+/* plant.c */
+PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
 #endif

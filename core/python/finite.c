@@ -7,7 +7,8 @@
 
 PyObject *towline_py_finite(PyObject *module, PyObject *array) {
     (void)module;
-    const uint64_t exponent = (uint64_t)0x7ff << 52; /* all of its bits are set in infinities and in what is no number */
+    const uint64_t exponent = (uint64_t)0x7ff
+                              << 52; /* all of its bits are set in infinities and in what is no number */
     Py_buffer view;
     if (PyObject_GetBuffer(array, &view, PyBUF_SIMPLE) < 0) {
         return NULL;
