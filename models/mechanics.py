@@ -58,6 +58,16 @@ class Mechanics:
         self._run(core.ends, [poses, carriers, anchors, attachments], batch)
         return anchors, attachments
 
+    def columns_by_geometry(self, pose: Array, carrier_pose: Array | None) -> np.ndarray:
+        """Return how each column of A changes with its cable's ends and pulley, (..., m, 6, 7) [1/m].
+
+        By the anchor in its carrier's frame (3), the attachment in the platform's (3) and the radius of the pulley.
+        """
+        batch, poses, carriers = self._placed(pose, carrier_pose)
+        result = np.empty((*batch, self._m, 6, 7))
+        self._run(core.columns_by_geometry, [poses, carriers, result], batch)
+        return result
+
     def wrench_jacobian(self, pose: Array, tensions: Array, carrier_pose: Array | None) -> np.ndarray:
         """Return the derivative of A t with respect to the pose, (..., 6, 6)."""
         return self._of_tensions(core.wrench_by_pose, pose, tensions, carrier_pose)

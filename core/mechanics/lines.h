@@ -134,7 +134,11 @@ INLINE void length_by_geometry(const line *run, const attitude *platform, const 
     for (int i = 3; i < 6; i++) {
         row[i] = -row[i];
     }
-    row[6] = run->wrap - sine; /* both ends of the wrapped arc move with the radius */
+    /*
+     * The arc about a centre at rest becomes longer by the wrap, and the centre moves across the axis, which takes the
+     * sine. Where the cable leaves the sheave may vary freely, since the length is stationary there.
+     */
+    row[6] = run->wrap - sine;
 }
 
 /* The lines at a pose (6) of the platform and poses (c, 6) of the carriers. */

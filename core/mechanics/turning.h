@@ -28,7 +28,7 @@ INLINE turning turning_of_straight(const line *run) {
  *
  *     T = n n' / straight + sin(wrap) / distance f f'        by the radius: (1 - cos(wrap)) / straight n
  *
- * The straight part turns about the sheave, and the sheave about its axis.
+ * The straight part turns about the sheave, and the sheave about its axis. Source: derived here.
  */
 INLINE turning turning_over_sheave(double r, const placed_cable *cable) {
     const num *k = cable->axis, *pull = cable->run.pull;
