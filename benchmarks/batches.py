@@ -15,7 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..models import Dynamics, Robot, batch, load, points, pose_from_lengths
+from ..base import processors
+from ..models import Dynamics, Robot, load, points, pose_from_lengths
 from ..workspace import (
     Condition,
     Lengths,
@@ -24,7 +25,6 @@ from ..workspace import (
     StaticEquilibrium,
     WrenchClosure,
     WrenchFeasible,
-    load_kernels,
 )
 from .harness import head, machine, row, timed
 
@@ -46,11 +46,10 @@ def measure(robot: Robot, count: int, runs: int) -> Iterator[tuple[str, float, s
     poses = robot.home + 0.1 * robot.length * rng.uniform(-1, 1, (count, 6)) * robot.dof_mask
     near = poses + rng.normal(0, 1e-3, poses.shape)
     for name in ("wrench_matrix", "cable_lengths"):
-        function = dynamics.functions[name]
-        batch.compiled(function)
-        mapped, home = function.map(count), np.tile(robot.carrier_home, (1, count))
-        both = {"pose": poses, "carrier_pose": robot.carrier_home}
-        seconds = timed(lambda function=function, both=both: batch.call(function, both, threads=1), runs)[1]
+        mapped, home = dynamics.functions[name].map(count), np.tile(robot.carrier_home, (1, count))
+        method = getattr(dynamics, name)
+        with processors.at_most(1):
+            seconds = timed(lambda method=method: method(poses), runs)[1]
         by_map = timed(lambda mapped=mapped, home=home: mapped(poses.T, home).full(), min(runs, 3))[1]
         yield name, seconds / count, f"map {by_map / seconds:.1f}"
     lengths = dynamics.cable_lengths(poses) + rng.normal(0, 1e-3, (count, robot.m))
@@ -61,7 +60,6 @@ def measure(robot: Robot, count: int, runs: int) -> Iterator[tuple[str, float, s
     few = lengths[:10_000]
     search = timed(lambda: pose_from_lengths(robot, few), runs)[1] / len(few)
     yield "pose from lengths, no start", search, "-"
-    load_kernels(robot)
     corners = np.vstack([robot.home_anchors, robot.home[:3]])
     poses[:, :3] = rng.uniform(corners.min(axis=0), corners.max(axis=0), (count, 3))
     places = Places.at_home(robot, poses)

@@ -10,6 +10,7 @@ from ._core import (
     MOST_CARRIERS,
     PROCESSOR,
     ROWS,
+    columns_by_geometry,
     control_aim,
     control_carriers,
     control_coordinates,
@@ -18,7 +19,9 @@ from ._core import (
     control_stages,
     control_take,
     control_thrusts,
+    ends,
     facets,
+    finite,
     full_rank,
     horizon_places,
     horizon_relative_to,
@@ -33,6 +36,8 @@ from ._core import (
     solve_packed,
     solve_rows,
     winch_lengths,
+    wrench_by_axes,
+    wrench_by_pose,
 )
 
 __all__ = [
@@ -41,6 +46,7 @@ __all__ = [
     "MOST_CARRIERS",
     "PROCESSOR",
     "ROWS",
+    "columns_by_geometry",
     "control_aim",
     "control_carriers",
     "control_coordinates",
@@ -49,7 +55,9 @@ __all__ = [
     "control_stages",
     "control_take",
     "control_thrusts",
+    "ends",
     "facets",
+    "finite",
     "full_rank",
     "horizon_places",
     "horizon_relative_to",
@@ -64,4 +72,6 @@ __all__ = [
     "solve_packed",
     "solve_rows",
     "winch_lengths",
+    "wrench_by_axes",
+    "wrench_by_pose",
 ]

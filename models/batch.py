@@ -1,41 +1,35 @@
 """Call a CasADi Function with NumPy arrays that have leading batch dimensions, or with symbols.
 
-One row goes through CasADi's buffers, a few rows through `Function.map`, many through a kernel of the same instructions
-(`tape`, `kernel`), about ten times as fast as the map. Compiling costs what some 10^6 rows of the map cost, and a load
-from the disk a third of that, so a Function gets its kernel once its calls have had `ROWS_WORTH_A_KERNEL` rows in all.
+One row goes through CasADi's buffers, more rows through `Function.map`.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 
-from ..base import processors
 from ..base.errors import InputError, SolverError
 from ..base.inputs import leading, shown
-from ..base.machine_code.kernel import Kernel, compile_kernel
-from .tape import dense, translate
+from ..core import finite
+from .tape import dense
 
-ROWS_WORTH_A_KERNEL = 200_000
-ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
-ELEMENTS_OF_ONE_THREAD = 4096  # BLAS begins to share at 10 000
 ROWS_OF_MAP = 64  # to make a map of n costs as much as to evaluate it, so one of this size is kept
+SYMBOLIC = (ca.SX, ca.MX)
+
+_FLOAT = np.dtype(np.float64)
 
 
 def is_symbolic(value: Any) -> bool:
     """Return whether `value` is a CasADi expression."""
-    return isinstance(value, ca.SX | ca.MX)
+    return isinstance(value, SYMBOLIC)
 
 
-def call(
-    function: ca.Function, arguments: dict[str, Any], threads: int | None = None, matrices: tuple[str, ...] = ()
-) -> dict[str, Any]:
+def call(function: ca.Function, arguments: dict[str, Any], matrices: tuple[str, ...] = ()) -> dict[str, Any]:
     """Evaluate `function` on named arguments; the outputs, in order, have the common leading dimensions of the inputs.
 
     Parameters
@@ -45,9 +39,6 @@ def call(
     arguments
         Arrays of shape (..., *shape of the input), where a column (n, 1) counts as (n,); they broadcast as in NumPy.
         If one is a CasADi expression all are taken as they are and the outputs are expressions too.
-    threads
-        How many threads share the rows of a kernel; default: as many as there are processors, at most one for each
-        50 000 rows. The result does not depend on it.
     matrices
         Outputs that are matrices also when they happen to have one column, as the wrench matrix of one cable.
 
@@ -61,9 +52,7 @@ def call(
     if any(is_symbolic(value) for value in arguments.values()):
         outputs = function(**_as_symbols(function, arguments))
         return {name: outputs[name] for name in function.name_out()}  # CasADi's are in the order of the alphabet
-    if threads is not None and (not isinstance(threads, int) or threads < 1):
-        raise InputError(f"threads must be a whole number from 1, or None, got {shown(threads)}")
-    outputs = _evaluator(function)(arguments, threads)
+    outputs = _evaluator(function)(arguments)
     for name in matrices:
         if name in outputs and function.size_out(name)[1] == 1:
             outputs[name] = outputs[name][..., None]
@@ -72,19 +61,19 @@ def call(
 
 def as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     """Return `value` as floats whose last dimensions are `core`, or raise InputError unless all are finite."""
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiubO":
-            raise TypeError
-        array = given.astype(float, copy=False)
-    except Exception:  # whatever the array interface of another library raises
-        raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
+    if type(value) is np.ndarray and value.dtype is _FLOAT:
+        array = value
+    else:
+        try:
+            given = np.asarray(value)
+            if given.dtype.kind not in "fiubO":
+                raise TypeError
+            array = given.astype(float, copy=False)
+        except Exception:  # whatever the array interface of another library raises
+            raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
         raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")
-    # A sum is finite, unless an element is not finite or near the largest float. That of squares is the quickest of few
-    # elements; of many, BLAS would share it among threads.
-    total = np.vdot(array, array) if array.size < ELEMENTS_OF_ONE_THREAD else array.sum()
-    if not math.isfinite(total) and not np.isfinite(array).all():
+    if not finite(array if array.flags.c_contiguous else np.ascontiguousarray(array)):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name} must be finite numbers, got {array[index]} at index {index}")
     return array
@@ -103,23 +92,6 @@ def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
     return list(checked.values())
 
 
-def compiled(function: ca.Function) -> Kernel:
-    """Make the kernel of `function` now, so that `call` uses it from now on, and return it.
-
-    Returns
-    -------
-    Kernel
-        `kernel(start, stop, *inputs, *outputs)` computes the rows start to stop of outputs (N, r, c) that it is given,
-        from inputs (N, r, c), all of float64.
-
-    Raises
-    ------
-    InputError
-        If it has an operation that no kernel has; `call` uses `Function.map` then.
-    """
-    return _evaluator(function).kernel()
-
-
 class _Evaluator:
     """The data that the numeric calls of one Function share."""
 
@@ -130,12 +102,9 @@ class _Evaluator:
         self.outputs: dict[str, tuple[int, int]] = {name: function.size_out(name) for name in function.name_out()}
         self._cores = {name: _core(size) for name, size in self.inputs.items()}
         self._defaults = {name: float(function.default_in(i)) for i, name in enumerate(self.inputs)}
-        self._kernel: Kernel | None = None
-        self._has_none = False
-        self._rows_so_far = 0
         self._own = threading.local()  # a buffer serves one thread at a time
 
-    def __call__(self, arguments: dict[str, Any], threads: int | None) -> dict[str, np.ndarray]:
+    def __call__(self, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
         arrays = self._arrays(arguments)
         if all(array.shape == core for array, core in zip(arrays.values(), self._cores.values(), strict=True)):
             return self._single(arrays)
@@ -143,26 +112,8 @@ class _Evaluator:
         count = math.prod(batch)
         rows = [_rows(arrays[name], batch, size) for name, size in self.inputs.items()]
         outputs = {name: np.empty((count, *size)) for name, size in self.outputs.items()}
-        kernel = self._kernel_if_worth(count)
-        if kernel is None:
-            self._map(count, rows, list(outputs.values()))
-        else:
-            _run(kernel, count, [*rows, *outputs.values()], threads)
+        self._map(count, rows, list(outputs.values()))
         return {name: value.reshape(batch + _core(self.outputs[name])) for name, value in outputs.items()}
-
-    def kernel(self) -> Kernel:
-        if self._kernel is None:
-            self._kernel = compile_kernel(translate(self._function), len(self.inputs), len(self.outputs))
-        return self._kernel
-
-    def _kernel_if_worth(self, count: int) -> Kernel | None:
-        self._rows_so_far += count
-        if self._kernel is None and not self._has_none and self._rows_so_far >= ROWS_WORTH_A_KERNEL:
-            try:
-                return self.kernel()
-            except InputError:
-                self._has_none = True
-        return self._kernel
 
     def _arrays(self, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
         """Return all inputs in their order, as arrays of shape (..., *core) with finite values."""
@@ -244,18 +195,6 @@ def _evaluator(function: ca.Function) -> _Evaluator:
     if evaluator is None:
         evaluator = _evaluators[function] = _Evaluator(function)
     return evaluator
-
-
-def _run(kernel: Kernel, count: int, arrays: list[np.ndarray], threads: int | None) -> None:
-    if threads is None:
-        threads = min(processors.available(), count // ROWS_WORTH_A_THREAD)
-    threads = max(1, min(threads, count))
-    if threads == 1:
-        kernel(0, count, *arrays)
-        return
-    edges = [count * i // threads for i in range(threads + 1)]
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda start, stop: kernel(start, stop, *arrays), edges[:-1], edges[1:]))
 
 
 def _core(size: tuple[int, int]) -> tuple[int, ...]:

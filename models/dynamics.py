@@ -1,4 +1,4 @@
-"""`Dynamics`: a robot's kinematics and dynamics as CasADi Functions, called with arrays or with symbols."""
+"""`Dynamics`: a robot's kinematics and dynamics, called with arrays or with symbols."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from numpy.typing import ArrayLike
 from ..base.display import Displayed
 from ..base.errors import InputError
 from ..base.inputs import flag, required
-from . import elasticity, points
+from . import elasticity
 from .arrays import Array, one_array, several_arrays
-from .batch import arrays, call, is_symbolic
+from .batch import SYMBOLIC, arrays, call, is_symbolic
 from .files import as_robot
+from .mechanics import Mechanics
 from .motion import Motion
+from .record import fits
 from .relative_dynamics import RelativeDynamics
 from .robot import Robot
 from .world_functions import WorldFunctions
@@ -40,6 +42,8 @@ class Dynamics(Displayed):
 
     Everything is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Arguments may have
     leading batch dimensions, which broadcast, and give arrays. If `pose` is a CasADi SX or MX, the result is one too.
+
+    Arrays are evaluated by the numeric core where it has the quantity and room for the robot, else by CasADi.
 
     Parameters
     ----------
@@ -79,6 +83,8 @@ class Dynamics(Displayed):
         carrier_pose
             The same of each carrier, (..., c, 6); default: at home.
         """
+        if numeric := self._numeric(pose, carrier_pose):
+            return numeric.wrench_matrix(pose, carrier_pose)
         return self._call("wrench_matrix", pose=pose, carrier_pose=carrier_pose)["A"]
 
     @one_array
@@ -87,7 +93,30 @@ class Dynamics(Displayed):
 
         Over a pulley it is the length of the cable from the anchor around the sheave to the attachment.
         """
+        if numeric := self._numeric(pose, carrier_pose):
+            return numeric.cable_lengths(pose, carrier_pose)
         return self._call("cable_lengths", pose=pose, carrier_pose=carrier_pose)["lengths"]
+
+    @one_array
+    def length_jacobian(self, pose: Array, carrier_pose: Array | None = None) -> Array:
+        """Return the derivative of the cable lengths with respect to the pose, (..., m, 6) [-, m].
+
+        Arguments as in `wrench_matrix`.
+        """
+        if numeric := self._numeric(pose, carrier_pose):
+            return numeric.length_jacobian(pose, carrier_pose)
+        return self._call("length_jacobian", pose=pose, carrier_pose=carrier_pose)["J"]
+
+    @one_array
+    def wrench_jacobian(self, pose: Array, tensions: Array, carrier_pose: Array | None = None) -> Array:
+        """Return the derivative of A t with respect to the pose at constant tensions, (..., 6, 6).
+
+        Arguments as in `wrench_matrix`; `tensions` are (..., m) [N]. For displacements of the CoM and turns about it
+        see `stiffness`.
+        """
+        if numeric := self._numeric(pose, tensions, carrier_pose):
+            return numeric.wrench_jacobian(pose, tensions, carrier_pose)
+        return self._call("wrench_jacobian", pose=pose, tensions=tensions, carrier_pose=carrier_pose)["D"]
 
     @several_arrays
     def points(self, pose: Array, carrier_pose: Array | None = None) -> tuple[Array, Array]:
@@ -95,16 +124,10 @@ class Dynamics(Displayed):
 
         Arguments as in `wrench_matrix`.
         """
-        carriers = self.robot.carrier_home if carrier_pose is None else carrier_pose
-        if is_symbolic(pose) or is_symbolic(carriers):
-            result = self._call("points", pose=pose, carrier_pose=carriers)
-            return result["anchors"], result["attachments"]
-        pose, carriers = arrays({"pose": (pose, (6,)), "carrier_pose": (carriers, (len(self.robot.carriers), 6))})
-        both = points.anchors(self.robot, carriers), points.attachments(self.robot, pose)
-        if both[0].shape == both[1].shape:
-            return both
-        shape = np.broadcast_shapes(both[0].shape, both[1].shape)
-        return np.broadcast_to(both[0], shape).copy(), np.broadcast_to(both[1], shape).copy()
+        if numeric := self._numeric(pose, carrier_pose):
+            return numeric.points(pose, carrier_pose)
+        result = self._call("points", pose=pose, carrier_pose=carrier_pose)
+        return result["anchors"], result["attachments"]
 
     @one_array
     def exits(self, pose: Array, carrier_pose: Array | None = None) -> Array:
@@ -148,6 +171,8 @@ class Dynamics(Displayed):
             If an argument has a wrong shape or value, or wind is given and the robot's file has no `platform.aero`.
         """
         motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
+        if (wind is None or self.robot.platform.aero) and (numeric := self._numeric(*motion, wind)):
+            return numeric.required_wrench(motion, wind)
         return self._in_wind("required_wrench", wind, **motion.arguments(self.robot.carrier_home))["w"]
 
     @one_array
@@ -271,6 +296,8 @@ class Dynamics(Displayed):
                         f"cables[{index}].stiffness must be E A > 0 [N] for every cable, got none in robot "
                         f"{self.robot.name!r}; elastic=False needs no stiffness"
                     )
+        if numeric := self._numeric(pose, tensions, carrier_pose):
+            return numeric.stiffness(pose, tensions, carrier_pose, elastic)
         name = "stiffness" if elastic else "tension_stiffness"
         return self._call(name, pose=pose, tensions=tensions, carrier_pose=carrier_pose)["K"]
 
@@ -322,11 +349,23 @@ class Dynamics(Displayed):
         """
         return RelativeDynamics(self.robot)
 
+    @cached_property
+    def _core(self) -> Mechanics | None:
+        """Return the mechanics by the numeric core; None if it has no room for the robot."""
+        return Mechanics(self.robot) if fits(self.robot) else None
+
+    def _numeric(self, *arguments: Array) -> Mechanics | None:
+        """Return what evaluates such arguments without CasADi, or None."""
+        for argument in arguments:
+            if isinstance(argument, SYMBOLIC):
+                return None
+        return self._core
+
     def _call(self, name: str, **arguments: Array) -> dict[str, Array]:
         """Evaluate one of the functions, with its carriers at home if `carrier_pose` is None."""
         if "carrier_pose" in arguments and arguments["carrier_pose"] is None:
             arguments["carrier_pose"] = self.robot.carrier_home
-        return call(self._functions.function(name), arguments, matrices=("A", "B"))
+        return call(self._functions.function(name), arguments, matrices=("A", "B", "J"))
 
     def _in_wind(self, name: str, wind: Array | None, **arguments: Array) -> dict[str, Array]:
         """Evaluate one of the functions that exist without and with wind."""

@@ -61,8 +61,10 @@ RECORD = np.dtype(
 
 
 def fits(robot: Robot) -> bool:
-    """Return whether the core has room for all cables and carriers of a robot."""
-    return robot.m <= MOST_CABLES and len(robot.carriers) <= MOST_CARRIERS
+    """Return whether the core has room for all cables, carriers and actuators of a robot."""
+    return all(count <= most for _, most, count in _counts(robot)) and all(
+        len(carrier.actuators) <= MOST_ACTUATORS for carrier in robot.carriers
+    )
 
 
 def record_of(robot: Robot) -> np.ndarray:
@@ -81,7 +83,7 @@ def record_of(robot: Robot) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _record_of(robot: Any) -> np.ndarray:
-    for name, most, count in (("cables", MOST_CABLES, robot.m), ("carriers", MOST_CARRIERS, len(robot.carriers))):
+    for name, most, count in _counts(robot):
         if count > most:
             raise InputError(f"robot {robot.name!r} must have at most {most} {name}, got {count}")
     record = np.zeros((), RECORD)
@@ -99,6 +101,10 @@ def _record_of(robot: Any) -> np.ndarray:
     _write_cables(record["cable"][: robot.m], robot)
     record.flags.writeable = False
     return record
+
+
+def _counts(robot: Robot) -> tuple[tuple[str, int, int], ...]:
+    return ("cables", MOST_CABLES, robot.m), ("carriers", MOST_CARRIERS, len(robot.carriers))
 
 
 def _write_platform(body: np.ndarray, robot: Robot) -> None:

@@ -1,4 +1,4 @@
-"""A CasADi Function's instruction tape as the Python source of a loop that Numba can compile.
+"""A CasADi Function's instruction tape as straight-line source of another language.
 
 An SX Function is a straight list of scalar instructions on a work vector: load an input's element, compute, store an
 output's element. The source has one local variable for each distinct value on the tape (two instructions that do the
@@ -15,56 +15,6 @@ import casadi as ca
 
 from ..base.errors import InputError
 
-LONGEST = 15_000  # instructions; compiling takes about 1 ms for each, and more beyond
-
-_OPERATIONS = {
-    "ADD": "{0} + {1}",
-    "SUB": "{0} - {1}",
-    "MUL": "{0} * {1}",
-    "DIV": "{0} / {1}",
-    "NEG": "-{0}",
-    "INV": "1.0 / {0}",
-    "SQ": "{0} * {0}",
-    "TWICE": "2.0 * {0}",
-    "SQRT": "math.sqrt({0})",
-    "POW": "math.pow({0}, {1})",
-    "CONSTPOW": "math.pow({0}, {1})",
-    "HYPOT": "math.hypot({0}, {1})",
-    "EXP": "math.exp({0})",
-    "EXPM1": "math.expm1({0})",
-    "LOG": "math.log({0})",
-    "LOG1P": "math.log1p({0})",
-    "SIN": "math.sin({0})",
-    "COS": "math.cos({0})",
-    "TAN": "math.tan({0})",
-    "ASIN": "math.asin({0})",
-    "ACOS": "math.acos({0})",
-    "ATAN": "math.atan({0})",
-    "ATAN2": "math.atan2({0}, {1})",
-    "SINH": "math.sinh({0})",
-    "COSH": "math.cosh({0})",
-    "TANH": "math.tanh({0})",
-    "ASINH": "math.asinh({0})",
-    "ACOSH": "math.acosh({0})",
-    "ATANH": "math.atanh({0})",
-    "ERF": "math.erf({0})",
-    "FABS": "math.fabs({0})",
-    "SIGN": "(-1.0 if {0} < 0.0 else (1.0 if {0} > 0.0 else {0}))",
-    "COPYSIGN": "math.copysign({0}, {1})",
-    "FMOD": "np.fmod({0}, {1})",
-    "FLOOR": "np.floor({0})",
-    "CEIL": "np.ceil({0})",
-    "FMIN": "np.fmin({0}, {1})",
-    "FMAX": "np.fmax({0}, {1})",
-    "LT": "(1.0 if {0} < {1} else 0.0)",
-    "LE": "(1.0 if {0} <= {1} else 0.0)",
-    "EQ": "(1.0 if {0} == {1} else 0.0)",
-    "NE": "(1.0 if {0} != {1} else 0.0)",
-    "NOT": "(1.0 if {0} == 0.0 else 0.0)",
-    "AND": "(1.0 if {0} != 0.0 and {1} != 0.0 else 0.0)",
-    "OR": "(1.0 if {0} != 0.0 or {1} != 0.0 else 0.0)",
-    "IF_ELSE_ZERO": "({1} if {0} != 0.0 else 0.0)",
-}
 _NAMES = {getattr(ca, name): name.removeprefix("OP_") for name in dir(ca) if name.startswith("OP_")}
 
 
@@ -78,38 +28,6 @@ def dense(function: ca.Function) -> ca.Function:
     inputs = [kind.sym(name, *function.size_in(name)) for name in function.name_in()]
     outputs = [ca.densify(value) for value in function.call(inputs)]
     return ca.Function(function.name(), inputs, outputs, function.name_in(), function.name_out())
-
-
-def translate(function: ca.Function) -> str:
-    """Return Python source of `kernel(start, stop, x0, x1, ..., y0, y1, ...)`, for rows start to stop of a batch.
-
-    Parameters
-    ----------
-    function
-        A Function with dense inputs and outputs, as from `dense`. An MX Function is expanded first.
-
-    Returns
-    -------
-    str
-        xi and yi are inputs and outputs, (N, rows, columns) each. It needs `math` and `np` as globals.
-
-    Raises
-    ------
-    InputError
-        If an MX Function cannot be expanded, the tape has an operation that is not known here, or is too long.
-    """
-    tape = scalar(function)
-    if tape.n_instructions() > LONGEST:
-        raise InputError(
-            f"{function.name()} must have at most {LONGEST} instructions for a kernel, got {tape.n_instructions()}"
-        )
-    variables, stores = straight_line(tape, _OPERATIONS, "x{0}[k, {1}, {2}]".format, _literal)
-    arguments = [f"x{i}" for i in range(tape.n_in())] + [f"y{i}" for i in range(tape.n_out())]
-    lines = [f"def kernel(start, stop, {', '.join(arguments)}):", "    for k in range(start, stop):"]
-    lines += [f"        {variable} = {expression}" for expression, variable in variables.items()]
-    # Row by row, as they lie in memory; the tape stores column by column.
-    lines += [f"        y{i}[k, {row}, {column}] = {value}" for (i, row, column), value in sorted(stores.items())]
-    return "\n".join([*lines, "        pass", ""])  # for a Function without outputs
 
 
 def scalar(function: ca.Function) -> ca.Function:
@@ -176,8 +94,3 @@ def straight_line(
             raise InputError(f"{tape.name()} must have only the operations {', '.join(operations)}, got {operation}")
         work[outputs[0]] = variables.setdefault(expression, f"v{len(variables)}")
     return variables, stores
-
-
-def _literal(value: float) -> str:
-    text = repr(value)
-    return {"inf": "math.inf", "-inf": "-math.inf", "nan": "math.nan"}.get(text, text)

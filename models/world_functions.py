@@ -122,6 +122,12 @@ class WorldFunctions(Mapping[str, ca.Function]):
         attachments = kinematics.transform(self._symbols["pose"], self._robot.attachments)
         return {"anchors": self._anchors.T, "attachments": attachments.T}
 
+    def _length_jacobian(self) -> dict[str, Matrix]:
+        return {"J": ca.densify(ca.jacobian(self._exit.lengths, self._symbols["pose"]))}
+
+    def _wrench_jacobian(self) -> dict[str, Matrix]:
+        return {"D": ca.densify(ca.jacobian(self._pull, self._symbols["pose"]))}
+
     def _stiffness(self) -> dict[str, Matrix]:
         K = elasticity.cable_stiffness(self._robot, self._A, self._exit.lengths, self._symbols["tensions"])
         return {"K": self._K_t + K}
@@ -132,6 +138,8 @@ _PLACE, _MOTION, _STATE = "pose carrier_pose", " ".join(Motion._fields), "pose v
 _DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]]] = {
     "wrench_matrix": (_PLACE, lambda of: {"A": of._A}),  # (6, m)
     "cable_lengths": (_PLACE, lambda of: {"lengths": of._exit.lengths}),  # (m, 1)
+    "length_jacobian": (_PLACE, WorldFunctions._length_jacobian),  # (m, 6)
+    "wrench_jacobian": ("pose tensions carrier_pose", WorldFunctions._wrench_jacobian),  # (6, 6)
     "points": (_PLACE, WorldFunctions._points),  # (m, 3) each
     "exits": (_PLACE, lambda of: {"exits": of._exit.points.T}),  # (m, 3)
     "required_wrench": (_MOTION, lambda of: {"w": of._w}),  # (6, 1)

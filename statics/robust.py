@@ -88,13 +88,14 @@ class Spread:
     """
 
     def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):
-        from ..models.sensitivity import derivatives, wrench_matrices
+        from ..models.dynamics import dynamics_of
+        from ..models.sensitivity import derivatives
 
         uncertainty = uncertainty_of(robot)
         pose, carrier_pose = _places(robot, pose, carrier_pose)
         rows = np.flatnonzero(robot.dof_mask) if rows is None else _indices("rows", rows, 6)
         scale = robot.wrench_scale[rows]
-        A = wrench_matrices(robot, pose, carrier_pose)[:, rows] * scale[:, None]
+        A = dynamics_of(robot).wrench_matrix(pose, carrier_pose)[:, rows] * scale[:, None]
         D, self._cables = derivatives(robot, pose, carrier_pose, uncertainty.parameters)
         self._D = D[:, rows] * scale[:, None]  # (n, rows, p)
         self._inverse = _inverse(A)  # (n, m, rows)
@@ -281,7 +282,7 @@ def share_of_robots(
     InputError
         If an argument has a wrong type or shape, or the robot has no uncertainty.
     """
-    from ..models.sensitivity import wrench_matrices
+    from ..models.dynamics import Dynamics
     from ..solvers import solve_batch
 
     poses, carriers = _places(robot, pose, carrier_pose)
@@ -290,7 +291,7 @@ def share_of_robots(
     w = finite_array("wrench", wrench, (len(poses), 6))[:, rows] * scale
     holds = np.zeros(whole_number("count", count, 1, 1_000_000), dtype=bool)
     for index, one in enumerate(robot.drawn(count, seed)):
-        A = wrench_matrices(one, poses, carriers)[:, rows] * scale[:, None]
+        A = Dynamics(one).wrench_matrix(poses, carriers)[:, rows] * scale[:, None]
         holds[index] = solve_batch(A, w, robot.t_min, robot.t_max).feasible.all()
     return RobotShare(holds)
 

@@ -14,11 +14,10 @@ from scipy.spatial.transform import Rotation
 from towline.control import ComputedTorque, Reference, State
 from towline.core._core import sense
 from towline.estimation.calibration.geometry import runs
+from towline.estimation.calibration.parameters import Parameters
 from towline.export.step.mechanics import mechanics
 from towline.models import Dynamics, Robot, load, points, pose_from_lengths, rotation
-from towline.models.batch import compiled
 from towline.models.part import inertia_matrix
-from towline.models.sensitivity import wrench_matrices
 from towline.ocp.tasks.scenario import _pose_in
 from towline.plant import Plant, layout
 
@@ -167,10 +166,9 @@ def test_lengths(case):
     dynamics = Dynamics(robot)
     same(dynamics.cable_lengths(pose, carriers), truth.lengths)
     same([dynamics.cable_lengths(*each) for each in zip(pose[::20], carriers[::20], strict=True)], truth.lengths[::20])
-    ends = np.einsum("nij,mj->mni", truth.R, robot.attachments) + pose[:, :3]
     if (carriers == robot.carrier_home).all():  # calibration knows no other
-        axes = np.einsum("mij,mj->mi", matrices(robot.carrier_home[robot.carrier_of_cable, 3:]), robot.pulley_axes)
-        same(runs(robot.home_anchors, axes, robot.pulley_radii, ends).lengths.T, truth.lengths)
+        parameters = Parameters(robot, ())
+        same(runs(robot, parameters.table(parameters.first), pose[:, :3], truth.R).lengths.T, truth.lengths)
 
 
 def test_the_pose_of_lengths_is_where_they_were_measured(case):
@@ -185,7 +183,6 @@ def test_the_wrench_matrix(case):
     dynamics = Dynamics(robot)
     same(dynamics.wrench_matrix(pose, carriers), truth.A)
     same([dynamics.wrench_matrix(*each) for each in zip(pose[::20], carriers[::20], strict=True)], truth.A[::20])
-    same(wrench_matrices(robot, pose, carriers), truth.A)
 
 
 def test_the_required_wrench(case):
@@ -194,20 +191,6 @@ def test_the_required_wrench(case):
     same(dynamics.required_wrench(*platform, carriers), truth.w)
     some = zip(*platform[:, ::20], carriers[::20], strict=True)
     same([dynamics.required_wrench(*each) for each in some], truth.w[::20])
-
-
-def test_machine_code_of_batches(case):
-    robot, platform, carriers, truth = case
-    functions = Dynamics(robot).functions
-    given = dict(zip(("pose", "velocity", "acceleration"), platform, strict=True)) | {"carrier_pose": carriers}
-    expected = {"wrench_matrix": truth.A, "cable_lengths": truth.lengths, "required_wrench": truth.w}
-    for name, value in expected.items():
-        function = functions[name]
-        still = {part: np.zeros((COUNT, *function.size_in(part))) for part in function.name_in() if part not in given}
-        inputs = [(given | still)[part].reshape(COUNT, *function.size_in(part)) for part in function.name_in()]
-        out = np.empty((COUNT, *function.size_out(0)))
-        compiled(function)(0, COUNT, *map(np.ascontiguousarray, inputs), out)
-        same(out.reshape(value.shape), value)
 
 
 def test_the_wrench_relative_to_a_carrier(case):

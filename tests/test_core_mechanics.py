@@ -1,14 +1,24 @@
 """The mechanics of the core are those of the CasADi model, in lanes as for one pose, at every attitude."""
 
+import shutil
+import subprocess
+from pathlib import Path
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from towline import Dynamics, available, load
+from towline.base.errors import InputError
 from towline.core import _core
+from towline.models import mechanics
 from towline.models.record import RECORD, record_of
 
+CORE = Path(__file__).parent.parent / "core"
+SOURCES = [*map(str, sorted((CORE / "mechanics").glob("*.c"))), str(CORE / "numbers" / "processor.c")]
+WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-psabi", f"-I{CORE}"]
+SAME_BITS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
 LEVEL = np.pi / 2
 COUNT = 203  # no multiple of eight
 
@@ -55,6 +65,7 @@ def test_lines_and_wrenches_are_those_of_the_symbolic_model(robot):
     wind = rng.normal(scale=5.0, size=(COUNT, 3)) if robot.platform.aero else None
     w = np.empty((COUNT, 6))
     _core.required_wrench(record_of(robot), pose, velocity, acceleration, wind, w)
+    required = Dynamics(robot)._functions.function("required_wrench" if wind is None else "required_wrench_in_wind")
     weight, size = robot.force_scale, max(1.0, np.abs(lengths).max())
     for row in range(COUNT):
         given = (pose[row], carriers[row])
@@ -66,9 +77,8 @@ def test_lines_and_wrenches_are_those_of_the_symbolic_model(robot):
         owners = carriers[row, robot.carrier_of_cable]
         at = owners[:, :3] + Rotation.from_euler("ZYX", owners[:, 5:2:-1]).apply(robot.anchors)
         np.testing.assert_allclose(anchors[row], at, rtol=0, atol=1e-14 * size)
-        expected = Dynamics(robot).required_wrench(
-            pose[row], velocity[row], acceleration[row], carriers[row], wind=None if wind is None else wind[row]
-        )
+        motion = {"pose": pose[row], "velocity": velocity[row], "acceleration": acceleration[row]}
+        expected = required(**motion, **({} if wind is None else {"wind": wind[row]}))["w"].full()[:, 0]
         np.testing.assert_allclose(w[row], expected, rtol=1e-14, atol=2e-14 * max(weight, np.abs(expected).max()))
 
 
@@ -105,6 +115,178 @@ def test_sensitivities_are_slopes_of_the_lengths(robot):
             _core.lines(record, pose, carriers, lengths, None, None, None, None)
             found.append(lengths)
         np.testing.assert_allclose(exact[..., column], (found[0] - found[1]) / (2 * h), atol=1e-5)
+
+
+def symbolic(robot, name, pose, carriers, *others):
+    """A method of `Dynamics` by CasADi, row by row: (N, r, c) for each of its outputs."""
+    function = Dynamics(robot)._functions.function(name)
+    rows = [function.call([pose[k], *(other[k] for other in others), carriers[k]]) for k in range(len(pose))]
+    return [np.array([row[i].full() for row in rows]) for i in range(function.n_out())]
+
+
+def test_points_and_derivatives_of_wrenches_are_those_of_the_symbolic_model(robot):
+    rng = np.random.default_rng(5)
+    pose, _, _, carriers = motions(robot, rng)
+    pose, carriers, dynamics = pose[::3], carriers[::3], Dynamics(robot)
+    tensions = rng.uniform(0, robot.force_scale, (len(pose), robot.m))
+    size = np.abs(dynamics.cable_lengths(pose, carriers)).max()
+    for got, want in zip(dynamics.points(pose, carriers), symbolic(robot, "points", pose, carriers), strict=True):
+        np.testing.assert_allclose(got, want, rtol=0, atol=1e-14 * size)
+    for name, got in {
+        "wrench_jacobian": dynamics.wrench_jacobian(pose, tensions, carriers),
+        "tension_stiffness": dynamics.stiffness(pose, tensions, carriers, elastic=False),
+    }.items():
+        (want,) = symbolic(robot, name, pose, carriers, tensions)
+        np.testing.assert_allclose(got, want, rtol=0, atol=1e-13 * np.abs(want).max())
+    if all(cable.stiffness for cable in robot.cables):
+        (want,) = symbolic(robot, "stiffness", pose, carriers, tensions)
+        got = dynamics.stiffness(pose, tensions, carriers)
+        np.testing.assert_allclose(got, want, rtol=0, atol=1e-13 * np.abs(want).max())
+
+
+def test_columns_by_geometry_are_slopes_of_the_wrench_matrix(robot):
+    """Central differences of the record's anchors, attachments and radii."""
+    pose, _, _, carriers = motions(robot, np.random.default_rng(6))
+    pose, carriers, h = pose[:40], carriers[:40], 1e-5
+    exact = mechanics.Mechanics(robot).columns_by_geometry(pose, carriers)
+    for column in range(7):
+        name, axis = ("anchor", "attachment", "radius")[column // 3], column % 3
+        if name == "radius" and not robot.pulley_radii.all():
+            continue
+        found = []
+        for sign in (1, -1):
+            record = record_of(robot).copy()
+            record["cable"][name].reshape(len(record["cable"]), -1)[: robot.m, axis] += sign * h
+            A = np.empty((len(pose), 6, robot.m))
+            _core.lines(record, pose, carriers, None, A, None, None, None)
+            found.append(A)
+        slope = (found[0] - found[1]).swapaxes(1, 2) / (2 * h)
+        np.testing.assert_allclose(exact[..., column], slope, atol=1e-6 * max(1, np.abs(slope).max()))
+
+
+def test_derivatives_of_rows_in_lanes_have_the_bits_of_one_pose(robot):
+    rng = np.random.default_rng(7)
+    pose, _, _, carriers = motions(robot, rng)
+    tensions, numeric = rng.normal(size=(COUNT, robot.m)), mechanics.Mechanics(robot)
+
+    def results(rows):
+        some, at, pulls = pose[rows], carriers[rows], tensions[rows]
+        yield from numeric.points(some, at)
+        yield numeric.columns_by_geometry(some, at)
+        yield numeric.wrench_jacobian(some, pulls, at)
+        yield numeric.stiffness(some, pulls, at, False)
+
+    together = list(results(slice(None)))
+    for row in range(0, COUNT, 20):
+        for one, all_rows in zip(results(row), together, strict=True):
+            np.testing.assert_array_equal(one, all_rows[row])
+
+
+def test_results_do_not_depend_on_threads(monkeypatch):
+    robot = load("wang-flying")
+    rng = np.random.default_rng(8)
+    pose, velocity, acceleration, carriers = motions(robot, rng)
+    numeric, wind = Dynamics(robot), [1.0, 2.0, 0.5]
+
+    def results():
+        yield numeric.wrench_matrix(pose, carriers)
+        yield numeric.cable_lengths(pose)
+        yield numeric.required_wrench(pose, velocity, acceleration, wind=wind)
+        yield numeric.wrench_matrix(pose[:0], carriers[:1])
+
+    alone = list(results())
+    monkeypatch.setattr(mechanics, "ROWS_WORTH_A_THREAD", 20)
+    monkeypatch.setattr(mechanics.processors, "available", lambda: 7)
+    for one, many in zip(alone, results(), strict=True):
+        np.testing.assert_array_equal(one, many)
+
+
+def test_a_robot_beyond_the_core_is_casadis():
+    """Of 40 cables, as five copies of each of eight: the columns of the wrench matrix are those of the eight."""
+    robot = load("cogiro")
+    data = robot.model_dump(mode="json")
+    large = type(robot).model_validate(data | {"cables": data["cables"] * 5})
+    pose, tensions = robot.home + 0.1 * np.arange(6), np.arange(40.0)
+    dynamics, few = Dynamics(large), Dynamics(robot)
+    np.testing.assert_allclose(dynamics.wrench_matrix(pose), np.tile(few.wrench_matrix(pose), 5), atol=1e-14)
+    np.testing.assert_allclose(dynamics.length_jacobian(pose), np.tile(few.length_jacobian(pose), (5, 1)), atol=1e-13)
+    together = few.wrench_jacobian(pose, tensions.reshape(5, 8).sum(axis=0))
+    np.testing.assert_allclose(dynamics.wrench_jacobian(pose, tensions), together, atol=1e-12)
+    with pytest.raises(InputError, match="must have at most 32 cables, got 40"):
+        record_of(large)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_none_are_found_at_any_address(number):
+    values = np.random.default_rng(9).normal(size=20)
+    assert _core.finite(values)
+    assert _core.finite(values[:0])
+    assert _core.finite(np.array([1.7e308, -1.7e308, 5e-324, -0.0]))
+    for place in range(20):
+        wrong = values.copy()
+        wrong[place] = number
+        assert not _core.finite(wrong)
+        moved = np.frombuffer(b"x" + wrong.tobytes(), dtype="i1")[1:]
+        assert not _core.finite(moved)
+
+
+@pytest.mark.parametrize("lanes", [[], ["-DTOWLINE_NO_LANES"]])
+@pytest.mark.parametrize("name", ["caroca-pulleys", "wang-ctmrts-6"])
+def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path, lanes, name):
+    """Of all results at poses of which some have a number that is none, infinite or huge, with lanes and without."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("there is no C compiler: no command cc")
+    program, driver = tmp_path / "mechanics", str(Path(__file__).parent / "core_mechanics.c")
+    watch = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    command = [compiler, *WARNINGS, *SAME_BITS, *watch, *lanes, driver, *SOURCES, "-lm", "-o", program]
+    subprocess.run(command, check=True)
+    robot, rng = load(name), np.random.default_rng(11)
+    pose, velocity, acceleration, carriers = motions(robot, rng)
+    tensions = rng.normal(size=(COUNT, robot.m))
+    for array in (pose, velocity, carriers.reshape(COUNT, -1), tensions):
+        array[rng.integers(COUNT, size=12), rng.integers(6, size=12) % array.shape[1]] = rng.choice(
+            [np.nan, np.inf, -np.inf, 1e300, -1e300], 12
+        )
+    for rows in (COUNT, 1):
+        given = [array[:rows] for array in (pose, velocity, acceleration, carriers, tensions)]
+        sent = record_of(robot).tobytes() + b"".join(array.tobytes() for array in given)
+        done = subprocess.run([program, str(rows)], input=sent, capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr.decode()
+        record, (m, c) = record_of(robot), (robot.m, given[3])
+        of_lines = [np.empty((rows, size * m)) for size in (1, 6, 6, 3, 7)]
+        ends, S, D, w = (
+            np.empty((2, rows, m, 3)),
+            np.empty((rows, 42 * m)),
+            np.empty((2, rows, 36)),
+            np.empty((rows, 6)),
+        )
+        _core.lines(record, given[0], c, *of_lines)
+        _core.ends(record, given[0], c, *ends)
+        _core.columns_by_geometry(record, given[0], c, S)
+        _core.wrench_by_pose(record, given[0], c, given[4], D[0])
+        _core.wrench_by_axes(record, given[0], c, given[4], D[1])
+        _core.required_wrench(record, *given[:3], None, w)
+        expected = np.concatenate([array.ravel() for array in (*of_lines, ends, S, D, w)])
+        np.testing.assert_array_equal(np.frombuffer(done.stdout), expected)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e308, 1e-308, 0.0])
+def test_any_numbers_give_results(number):
+    """A record, poses, tensions of any numbers: what is not meant by them is nan, in the rows where they are."""
+    robot = load("caroca-pulleys")
+    rng = np.random.default_rng(10)
+    pose, _, _, carriers = motions(robot, rng)
+    pose[3, rng.integers(6)] = carriers[50, 0, 1] = number
+    tensions = rng.normal(size=(COUNT, robot.m))
+    tensions[90, 2] = number
+    A, D = np.empty((COUNT, 6, robot.m)), np.empty((COUNT, 6, 6))
+    record = record_of(robot)
+    _core.lines(record, pose, carriers, None, A, None, None, None)
+    _core.wrench_by_pose(record, pose, carriers, tensions, D)
+    untouched = np.delete(np.arange(COUNT), [3, 50, 90])
+    assert np.isfinite(A[untouched]).all()
+    assert np.isfinite(D[untouched]).all()
 
 
 @pytest.mark.parametrize(

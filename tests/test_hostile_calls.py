@@ -82,7 +82,6 @@ NOT_CALLED = {
     "TensionSolution",
     "Timing",
     "evaluate",  # of a condition: `holds` checks the arguments and calls it
-    "load_kernels",  # compiles for half a minute
     "serve",  # a context: the tests of the viewer enter it
 }
 

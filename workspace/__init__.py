@@ -9,7 +9,6 @@ from .boundary_mesh import boundary
 from .condition import AllOf, AnyOf, Condition, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
 from .dataset import save
-from .feasibility import load_kernels
 from .first_look import hints
 from .places import Places
 from .region import Region
@@ -25,7 +24,6 @@ __all__ = [
     "boundary",
     "condition_from",
     "hints",
-    "load_kernels",
     "sample",
     "save",
 ]

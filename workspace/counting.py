@@ -19,10 +19,7 @@ from ..base.display import Displayed
 from .condition import Condition
 from .counts import Counts
 from .domain import Domain
-from .feasibility import load_kernels
 from .sampling import Sampler
-
-WORTH_KERNELS = 500_000  # samples of a run: the first kernels on a machine take a minute, saving 20 us a sample
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,7 @@ def count(
     -------
     The counts, and of each chunk which samples are accepted, one bit a sample.
     """
-    counter = shared.counter()
+    counter = shared.counter
     counts, flags = Counts(counter.domain), []
     with processors.at_most(1):
         for offset, bits in enumerate(known):
@@ -106,21 +103,14 @@ class Shared:
     """A counter for all jobs of a run: pickled once for those of other processes, and not at all for this one's."""
 
     def __init__(self, counter: Counter) -> None:
-        self._counter, self._ready = counter, False
+        self.counter = counter
 
     @cached_property
     def _packed(self) -> bytes:
-        return pickle.dumps(self._counter)
+        return pickle.dumps(self.counter)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpacked, (self._packed,)
-
-    def counter(self) -> Counter:
-        """Return it, with the kernels loaded for a large run; the bits do not depend on it."""
-        if not self._ready and self._counter.samples >= WORTH_KERNELS:
-            load_kernels(self._counter.domain.robot)
-        self._ready = True
-        return self._counter
 
 
 @lru_cache(maxsize=2)

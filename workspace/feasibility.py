@@ -12,7 +12,6 @@ import numpy as np
 
 from ..base.inputs import required
 from ..models import Robot
-from ..models.batch import compiled
 from ..models.dynamics import dynamics_of
 from ..solvers import solve_batch
 from .places import Places, check_places
@@ -20,7 +19,6 @@ from .robust_limits import Tightened
 
 __all__ = [
     "feasible",
-    "load_kernels",
     "rest_wrench",
     "scaled",
     "shortfall",
@@ -31,14 +29,6 @@ __all__ = [
 
 PLACES_AT_ONCE = 8192
 ONLY_EXACT = 0.01  # of the force scale
-
-
-def load_kernels(robot: Robot) -> None:
-    """Load the compiled code for millions of places of a robot, or compile it if this machine has not done so yet.
-
-    It is never needed: without it, code that takes about ten times as long per place runs until compiling pays.
-    """
-    compiled(dynamics_of(robot).functions["wrench_matrix"])
 
 
 def rest_wrench(robot: Robot) -> np.ndarray:

@@ -34,19 +34,6 @@ _compiled: dict[str, Kernel] = {}
 _compiling = threading.Lock()
 
 
-def compile_kernel(source: str, n_in: int, n_out: int) -> Kernel:
-    """Compile `kernel(start, stop, *inputs, *outputs)`, or take it from memory or from the disk.
-
-    Parameters
-    ----------
-    source
-        From `tape.translate`.
-    n_in, n_out
-        How many inputs (N, r, c) of float64 in any layout, also read-only, and outputs in C order it has.
-    """
-    return compile_function(source, "kernel", _signature(n_in, n_out))
-
-
 def compile_function(source: str, name: str, signature: str, known: Mapping[str, Any] | None = None) -> Kernel:
     """Compile the function `name` of a source, in which decorators mark those that it calls, or take it from the disk.
 
@@ -102,11 +89,6 @@ def cache_folder() -> Path:
     if place := os.environ.get("TOWLINE_CACHE"):
         return Path(place)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "towline"
-
-
-def _signature(n_in: int, n_out: int) -> str:
-    arrays = [GIVEN.format(3)] * n_in + [RESULT.format(3)] * n_out
-    return f"void(intp, intp, {', '.join(arrays)})"
 
 
 def _compile(source: str, name: str, signature: str, known: Mapping[str, Any], file: Path | None = None) -> Kernel:

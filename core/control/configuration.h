@@ -66,7 +66,7 @@ INLINE void run_cables(const towline_robot *robot, const double *positions, ptrd
             found = straight_line(d);
         } else {
             turn_constant(carrier->R, cable->axis, axis);
-            found = line_over_sheave(cable->radius, d, axis);
+            found = line_over_sheave(cable->radius, d, axis, 1);
         }
         const int runs = found.length > SHORTEST && dot(found.pull, found.pull) > 0.5; /* not of nan */
         run->length = runs ? found.length : 0;

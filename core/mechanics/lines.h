@@ -33,9 +33,10 @@ INLINE line straight_line(const num *d) {
  * A cable that comes up a swivel axis k at the anchor, runs over a sheave and then straight to a point d from there.
  *
  * models/cables/pulley.py has the derivation: with e the direction across the axis, the sheave's centre is at r e, and
- * `straight` is the length of the free part, in the direction sine e + cosine k.
+ * `straight` is the length of the free part, in the direction sine e + cosine k. Only if `measured` are wrap and length
+ * those of the cable; they take half of the time.
  */
-INLINE line line_over_sheave(double r, const num *d, const num *k) {
+INLINE line line_over_sheave(double r, const num *d, const num *k, int measured) {
     const num up = dot(d, k);
     const num across[3] = {d[0] - up * k[0], d[1] - up * k[1], d[2] - up * k[2]};
     const num distance = square_root(dot(across, across)), out = distance - r;
@@ -47,9 +48,59 @@ INLINE line line_over_sheave(double r, const num *d, const num *k) {
     for (int i = 0; i < 3; i++) {
         run.pull[i] = -(along * across[i] + cosine * k[i]);
     }
-    run.wrap = 3.14159265358979323846 - angle_of(straight, number(r)) - angle_of(up, out);
-    run.length = r * run.wrap + straight;
+    run.wrap = number(0), run.length = straight;
+    if (measured) {
+        run.wrap = 3.14159265358979323846 - angle_of(straight, number(r)) - angle_of(up, out);
+        run.length += r * run.wrap;
+    }
     return run;
+}
+
+/* The attitudes that the cables of a robot have in common. */
+typedef struct {
+    attitude platform, carrier;
+    int owner; /* the carrier whose attitude that is */
+} attitudes;
+
+INLINE attitudes attitudes_of(const num *pose, const num *carriers) {
+    attitudes at;
+    at.platform = attitude_of(pose + 3);
+    at.carrier = attitude_of(carriers + 3);
+    at.owner = 0;
+    return at;
+}
+
+/* Where a cable is, in {G}, and how it runs. */
+typedef struct {
+    num anchor[3];
+    num arm[3];  /* the attachment less the origin of the platform's frame */
+    num span[3]; /* from the anchor to the attachment */
+    num axis[3]; /* of its pulley, if it has one */
+    line run;
+} placed_cable;
+
+/* The attitude of the cable's carrier is kept in `at` for the next cable; for `measured` see `line_over_sheave`. */
+INLINE placed_cable place_cable(const towline_cable *cable, const num *pose, const num *carriers, int measured,
+                                attitudes *at) {
+    const num *origin = carriers + 6 * cable->carrier;
+    placed_cable here;
+    if (cable->carrier != at->owner) {
+        at->owner = cable->carrier;
+        at->carrier = attitude_of(origin + 3);
+    }
+    turn_constant(at->platform.R, cable->attachment, here.arm);
+    turn_constant(at->carrier.R, cable->anchor, here.anchor);
+    for (int j = 0; j < 3; j++) {
+        here.anchor[j] += origin[j];
+        here.span[j] = pose[j] + here.arm[j] - here.anchor[j];
+    }
+    if (cable->radius == 0) {
+        here.run = straight_line(here.span);
+    } else {
+        turn_constant(at->carrier.R, cable->axis, here.axis);
+        here.run = line_over_sheave(cable->radius, here.span, here.axis, measured);
+    }
+    return here;
 }
 
 /* Columns of R P, the axes in {G} about which roll, pitch and yaw turn. */
@@ -83,61 +134,56 @@ INLINE void length_by_geometry(const line *run, const attitude *platform, const 
     for (int i = 3; i < 6; i++) {
         row[i] = -row[i];
     }
-    row[6] = run->wrap - sine; /* both ends of the wrapped arc move with the radius */
+    /*
+     * The arc about a centre at rest becomes longer by the wrap, and the centre moves across the axis, which takes the
+     * sine. Where the cable leaves the sheave may vary freely, since the length is stationary there.
+     */
+    row[6] = run->wrap - sine;
 }
 
 /* The lines at a pose (6) of the platform and poses (c, 6) of the carriers. */
 INLINE void lines_at(const towline_robot *robot, const num *pose, const num *carriers, lines want) {
-    const int m = robot->cables;
-    const attitude platform = attitude_of(pose + 3);
-    attitude carrier = attitude_of(carriers + 3);
-    int placed = 0; /* the carrier whose attitude that is */
-    num com[3], axes[3][3];
-    turn_constant(platform.R, robot->com, com);
+    const int m = robot->cables, measured = want.lengths || want.sensitivity;
+    attitudes at = attitudes_of(pose, carriers);
+    num com[3], axes[3][3] = {{number(0)}}; /* else compilers warn: they do not see that J alone reads the axes */
+    turn_constant(at.platform.R, robot->com, com);
     if (want.J) {
-        turning_axes(&platform, axes);
+        turning_axes(&at.platform, axes);
     }
     for (int i = 0; i < m; i++) {
-        const towline_cable *cable = &robot->cable[i];
-        const num *origin = carriers + 6 * cable->carrier;
-        num anchor[3], attachment[3], axis[3], d[3];
-        if (cable->carrier != placed) {
-            placed = cable->carrier;
-            carrier = attitude_of(origin + 3);
-        }
-        turn_constant(platform.R, cable->attachment, attachment);
-        turn_constant(carrier.R, cable->anchor, anchor);
-        for (int j = 0; j < 3; j++) {
-            anchor[j] += origin[j];
-            d[j] = pose[j] + attachment[j] - anchor[j];
-        }
-        line run;
-        if (cable->radius == 0) {
-            run = straight_line(d);
-        } else {
-            turn_constant(carrier.R, cable->axis, axis);
-            run = line_over_sheave(cable->radius, d, axis);
-        }
+        const placed_cable here = place_cable(&robot->cable[i], pose, carriers, measured, &at);
         if (want.lengths) {
-            want.lengths[i] = run.length;
+            want.lengths[i] = here.run.length;
         }
         if (want.A) {
-            const num arm[3] = {attachment[0] - com[0], attachment[1] - com[1], attachment[2] - com[2]};
+            const num arm[3] = {here.arm[0] - com[0], here.arm[1] - com[1], here.arm[2] - com[2]};
             num moment[3];
-            cross(arm, run.pull, moment);
+            cross(arm, here.run.pull, moment);
             for (int j = 0; j < 3; j++) {
-                want.A[j * m + i] = run.pull[j];
+                want.A[j * m + i] = here.run.pull[j];
                 want.A[(3 + j) * m + i] = moment[j];
             }
         }
         for (int j = 0; want.anchors && j < 3; j++) {
-            want.anchors[3 * i + j] = anchor[j];
+            want.anchors[3 * i + j] = here.anchor[j];
         }
         if (want.J) {
-            length_by_pose(&run, attachment, (const num(*)[3])axes, want.J + 6 * i);
+            length_by_pose(&here.run, here.arm, (const num(*)[3])axes, want.J + 6 * i);
         }
         if (want.sensitivity) {
-            length_by_geometry(&run, &platform, &carrier, want.sensitivity + 7 * i);
+            length_by_geometry(&here.run, &at.platform, &at.carrier, want.sensitivity + 7 * i);
+        }
+    }
+}
+
+/* Where the cables end, in {G}: anchors and attachments, (m, 3) each. */
+INLINE void ends_at(const towline_robot *robot, const num *pose, const num *carriers, num *anchors, num *attachments) {
+    attitudes at = attitudes_of(pose, carriers);
+    for (int i = 0; i < robot->cables; i++) {
+        const placed_cable here = place_cable(&robot->cable[i], pose, carriers, 0, &at);
+        for (int j = 0; j < 3; j++) {
+            anchors[3 * i + j] = here.anchor[j];
+            attachments[3 * i + j] = pose[j] + here.arm[j];
         }
     }
 }

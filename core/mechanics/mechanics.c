@@ -1,61 +1,51 @@
-/* The mechanics for one pose, and the choice of the form for many rows that fits the processor. */
+/* The mechanics of rows by the form that fits the processor; a single row takes less time without lanes. */
 #include "mechanics/mechanics.h"
 
 #include "mechanics/rows.h"
 #include "numbers/one.h"
-/* These need `num`. */
-#include "mechanics/lines.h"
-#include "mechanics/rigid_body.h"
 
-void towline_lines_at(const towline_robot *robot, const double *pose, const double *carriers, towline_lines want) {
-    const lines each = {want.lengths, want.A, want.J, want.anchors, want.sensitivity};
-    lines_at(robot, pose, carriers, each);
-}
+#define FORM(name) name##_one
+/* This needs `num`. */
+#include "mechanics/rows_in_lanes.h"
 
-void towline_required_wrench(const towline_robot *robot, towline_motion_of_platform motion, double *w) {
-    required_wrench(robot, motion.pose, motion.velocity, motion.acceleration, motion.wind, w);
-}
-
-#ifdef TOWLINE_NO_LANES
-
-void towline_lines_of_rows(const towline_robot *robot, ptrdiff_t rows, const double *poses, const double *carriers,
-                           ptrdiff_t carriers_per, towline_lines want) {
-    const int m = robot->cables;
-    for (ptrdiff_t row = 0; row < rows; row++) {
-        const towline_lines here = {
-            want.lengths ? want.lengths + row * m : NULL,
-            want.A ? want.A + row * 6 * m : NULL,
-            want.J ? want.J + row * 6 * m : NULL,
-            want.anchors ? want.anchors + row * 3 * m : NULL,
-            want.sensitivity ? want.sensitivity + row * 7 * m : NULL,
-        };
-        towline_lines_at(robot, poses + 6 * row, carriers + carriers_per * row, here);
+void towline_lines_of_rows(const towline_robot *robot, towline_places at, towline_lines want) {
+    if (at.rows == 1) {
+        lines_of_rows_one(robot, at, want);
+        return;
     }
+    BEST_FORM(lines_of_rows, robot, at, want);
 }
 
-void towline_required_wrench_of_rows(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion,
-                                     ptrdiff_t wind_per, double *w) {
-    for (ptrdiff_t row = 0; row < rows; row++) {
-        const towline_motion_of_platform here = {
-            motion.pose + 6 * row,
-            motion.velocity + 6 * row,
-            motion.acceleration + 6 * row,
-            motion.wind ? motion.wind + wind_per * row : NULL,
-        };
-        towline_required_wrench(robot, here, w + 6 * row);
+void towline_required_wrench(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion,
+                             ptrdiff_t wind_per, double *w) {
+    if (rows == 1) {
+        required_wrench_of_rows_one(robot, rows, motion, wind_per, w);
+        return;
     }
-}
-
-#else
-
-void towline_lines_of_rows(const towline_robot *robot, ptrdiff_t rows, const double *poses, const double *carriers,
-                           ptrdiff_t carriers_per, towline_lines want) {
-    BEST_FORM(lines_of_rows, robot, rows, poses, carriers, carriers_per, want);
-}
-
-void towline_required_wrench_of_rows(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion,
-                                     ptrdiff_t wind_per, double *w) {
     BEST_FORM(required_wrench_of_rows, robot, rows, motion, wind_per, w);
 }
 
-#endif
+void towline_ends(const towline_robot *robot, towline_places at, double *anchors, double *attachments) {
+    if (at.rows == 1) {
+        ends_of_rows_one(robot, at, anchors, attachments);
+        return;
+    }
+    BEST_FORM(ends_of_rows, robot, at, anchors, attachments);
+}
+
+void towline_columns_by_geometry(const towline_robot *robot, towline_places at, double *S) {
+    if (at.rows == 1) {
+        columns_by_geometry_of_rows_one(robot, at, S);
+        return;
+    }
+    BEST_FORM(columns_by_geometry_of_rows, robot, at, S);
+}
+
+void towline_wrench_by_pose(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
+                            double *D) {
+    if (at.rows == 1) {
+        wrench_by_pose_of_rows_one(robot, at, tensions, by_axes, D);
+        return;
+    }
+    BEST_FORM(wrench_by_pose_of_rows, robot, at, tensions, by_axes, D);
+}

@@ -1,10 +1,20 @@
-/* A robot's mechanics: lines of the cables and required wrench, for one pose and for many. */
+/* A robot's mechanics: lines of the cables and required wrench, at many poses. */
 #ifndef TOWLINE_MECHANICS_H
 #define TOWLINE_MECHANICS_H
 
 #include <stddef.h>
 
 #include "robot.h"
+
+/*
+ * Poses (6) of the platform and (c, 6) of the carriers at many rows. `carriers_per` is how many numbers there are from
+ * the carriers of one row to those of the next: 6 times their number, or 0 if all rows have them in one place.
+ */
+typedef struct {
+    ptrdiff_t rows;
+    const double *poses, *carriers;
+    ptrdiff_t carriers_per;
+} towline_places;
 
 /* What is wanted at each row; each may be NULL. */
 typedef struct {
@@ -15,23 +25,29 @@ typedef struct {
     double *sensitivity; /* (m, 7), of the lengths with respect to anchor (3), attachment (3) and radius */
 } towline_lines;
 
-/* The motion of a row: pose, velocity and acceleration (6) of the platform, velocity of the air (3) or NULL. */
+/* The motion of each row: pose, velocity and acceleration (6) of the platform, velocity of the air (3) or NULL. */
 typedef struct {
     const double *pose, *velocity, *acceleration, *wind;
 } towline_motion_of_platform;
 
-void towline_lines_at(const towline_robot *robot, const double *pose, const double *carriers, towline_lines want);
+/* A row has the same bits whether it is computed alone or with others. */
+void towline_lines_of_rows(const towline_robot *robot, towline_places at, towline_lines want);
 
-void towline_required_wrench(const towline_robot *robot, towline_motion_of_platform motion, double *w);
+/* w (6); `wind_per` is 3, or 0 if all rows have the wind in one place. */
+void towline_required_wrench(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion,
+                             ptrdiff_t wind_per, double *w);
+
+/* Anchors and attachments of the cables in {G}, (m, 3) each [m]. */
+void towline_ends(const towline_robot *robot, towline_places at, double *anchors, double *attachments);
+
+/* S (m, 6, 7): the column of A of each cable with respect to its anchor (3), attachment (3) and radius. */
+void towline_columns_by_geometry(const towline_robot *robot, towline_places at, double *S);
 
 /*
- * The same for many rows, with the same bits. `carriers_per` is how many numbers there are from the carriers of one row
- * to those of the next: 6 times their number, or 0 if all rows have them in one place; `wind_per` is 3 or 0.
+ * D (6, 6): the wrench A t at constant tensions t (m) with respect to the pose or, `by_axes`, to displacements of the CoM
+ * and turns about it, along and about the axes of {G}; then -D is the stiffness at constant tensions.
  */
-void towline_lines_of_rows(const towline_robot *robot, ptrdiff_t rows, const double *poses, const double *carriers,
-                           ptrdiff_t carriers_per, towline_lines want);
-
-void towline_required_wrench_of_rows(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion,
-                                     ptrdiff_t wind_per, double *w);
+void towline_wrench_by_pose(const towline_robot *robot, towline_places at, const double *tensions, int by_axes,
+                            double *D);
 
 #endif

@@ -1,22 +1,22 @@
-/* The mechanics of rows in lanes, a form for each kind of processor. */
+/* The mechanics of rows, a form for one at a time and one in lanes for each kind of processor. */
 #ifndef TOWLINE_MECHANICS_ROWS_H
 #define TOWLINE_MECHANICS_ROWS_H
 
 #include "mechanics/mechanics.h"
 #include "numbers/processor.h"
 
-#define LINES_OF_ROWS(form)                                                                                            \
-    void lines_of_rows_##form(const towline_robot *robot, ptrdiff_t rows, const double *poses, const double *carriers, \
-                              ptrdiff_t carriers_per, towline_lines want)
-#define REQUIRED_WRENCH_OF_ROWS(form)                                                                                  \
+#define MECHANICS_OF_ROWS(form)                                                                                        \
+    void lines_of_rows_##form(const towline_robot *robot, towline_places at, towline_lines want);                      \
     void required_wrench_of_rows_##form(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion, \
-                                        ptrdiff_t wind_per, double *w)
+                                        ptrdiff_t wind_per, double *w);                                                \
+    void ends_of_rows_##form(const towline_robot *robot, towline_places at, double *anchors, double *attachments);     \
+    void columns_by_geometry_of_rows_##form(const towline_robot *robot, towline_places at, double *S);                 \
+    void wrench_by_pose_of_rows_##form(const towline_robot *robot, towline_places at, const double *tensions,          \
+                                       int by_axes, double *D);
 
-LINES_OF_ROWS(plain);
-LINES_OF_ROWS(avx2);
-LINES_OF_ROWS(avx512);
-REQUIRED_WRENCH_OF_ROWS(plain);
-REQUIRED_WRENCH_OF_ROWS(avx2);
-REQUIRED_WRENCH_OF_ROWS(avx512);
+MECHANICS_OF_ROWS(one)
+MECHANICS_OF_ROWS(plain)
+MECHANICS_OF_ROWS(avx2)
+MECHANICS_OF_ROWS(avx512)
 
 #endif

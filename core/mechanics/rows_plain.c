@@ -1,6 +1,10 @@
-/* The mechanics of rows for every processor of its kind. */
+/* The mechanics of rows for every processor of its kind; without vectors one row after another. */
 #include "numbers/plain.h"
 
-#ifndef TOWLINE_NO_LANES
-#include "mechanics/rows_in_lanes.h"
+#ifdef TOWLINE_NO_LANES
+#include "numbers/one.h"
+#else
+#include "numbers/lanes.h"
 #endif
+/* This needs `num`. */
+#include "mechanics/rows_in_lanes.h"

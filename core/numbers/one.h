@@ -33,7 +33,7 @@ INLINE num larger(num x, num y) { return x > y ? x : y; }
 
 INLINE int any(mask chosen) { return chosen; }
 
-/* The numbers of rows in lanes, of which there is one, see lanes.h. */
+/* These read and write the numbers of a row, as those of lanes.h do. */
 INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, ptrdiff_t rows, int size) {
     (void)rows;
     memcpy(to, from + first * per, (size_t)size * sizeof *to);

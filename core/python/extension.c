@@ -15,6 +15,8 @@ static PyMethodDef functions[] = {
     {"solve_rows", (PyCFunction)(void (*)(void))towline_py_solve_rows, METH_FASTCALL,
      "solve_rows(n, m, rho, in_lanes, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, "
      "residual, status)\n--\n\nSolve the rows of a batch whose status is UNSURE; return how many of all are optimal."},
+    {"finite", towline_py_finite, METH_O,
+     "finite(array)\n--\n\nReturn whether all numbers of an array of float64 in C order are finite."},
     {"facets", (PyCFunction)(void (*)(void))towline_py_facets, METH_FASTCALL,
      "facets(A, low, high, normals, least, most)\n--\n\n"
      "Compute normals orthogonal to n - 1 columns, and the least and the most that tensions give along them."},
@@ -34,6 +36,17 @@ static PyMethodDef functions[] = {
     {"pose_covariance", (PyCFunction)(void (*)(void))towline_py_pose_covariance, METH_FASTCALL,
      "pose_covariance(robot, carriers, weights, poses, covariances)\n--\n\n"
      "Compute how the noise of the lengths spreads each pose; carriers has as many rows or one."},
+    {"ends", (PyCFunction)(void (*)(void))towline_py_ends, METH_FASTCALL,
+     "ends(robot, poses, carriers, anchors, attachments)\n--\n\nCompute where the cables end at each pose."},
+    {"columns_by_geometry", (PyCFunction)(void (*)(void))towline_py_columns_by_geometry, METH_FASTCALL,
+     "columns_by_geometry(robot, poses, carriers, S)\n--\n\n"
+     "Compute the columns of the wrench matrix with respect to anchors, attachments and radii, (m, 6, 7) a row."},
+    {"wrench_by_pose", (PyCFunction)(void (*)(void))towline_py_wrench_by_pose, METH_FASTCALL,
+     "wrench_by_pose(robot, poses, carriers, tensions, D)\n--\n\n"
+     "Compute the wrench of constant tensions with respect to the pose, (6, 6) a row."},
+    {"wrench_by_axes", (PyCFunction)(void (*)(void))towline_py_wrench_by_axes, METH_FASTCALL,
+     "wrench_by_axes(robot, poses, carriers, tensions, D)\n--\n\n"
+     "The same with respect to displacements of the CoM and turns about it, along and about the axes of {G}."},
     {"horizon_size", (PyCFunction)(void (*)(void))towline_py_horizon_size, METH_FASTCALL,
      "horizon_size(N, n, m, p)\n--\n\n"
      "Return how many numbers of memory a horizon of N stages, n states, m controls and p soft rows needs."},

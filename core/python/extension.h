@@ -8,6 +8,9 @@
 PyObject *towline_py_solve_packed(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
+/* finite.c */
+PyObject *towline_py_finite(PyObject *module, PyObject *array);
+
 /* available_wrench.c */
 PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
@@ -15,6 +18,10 @@ PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_
 /* mechanics.c */
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_ends(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_columns_by_geometry(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_wrench_by_pose(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_wrench_by_axes(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 
 /* pose.c */
 PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count);

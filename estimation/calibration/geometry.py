@@ -1,14 +1,4 @@
-"""Lengths of cables and their derivatives for many poses at once, in NumPy alone.
-
-With B the attachment and A the anchor in {G}, t the unit vector along which the cable arrives at B, and theta the angle
-of the sheave that it touches,
-
-    dl/dB = t        dl/dA = -t  (the swivel axis keeps its direction)        dl/dr = theta - sin(theta)
-
-The last follows from the first two: the centre M = A + r e moves by e dr, which changes the length by -(t . e) dr =
--sin(theta) dr, and an arc of angle theta about a centre at rest becomes longer by theta dr; where the cable leaves the
-sheave may vary freely, since the length is stationary there. `models.cables.pulley` has the angles.
-"""
+"""Lengths of cables and their derivatives, by the numeric core, of a robot whose numbers vary."""
 
 from __future__ import annotations
 
@@ -16,50 +6,49 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...models.cables.sheaves import sheaves
+from ...core import lines
+from ...models import points
+from ...models.record import record_of
+from ...models.robot import Robot
 
 __all__ = ["Runs", "runs"]
 
 
 class Runs(NamedTuple):
-    """Lengths and directions of m cables at N samples.
+    """Lengths and directions of m cables at N samples; nan where no cable is tangent to its sheave.
 
     Attributes
     ----------
     lengths
         From the anchor over the pulley to the attachment [m], (m, N).
     directions
-        T, along the cable towards the attachment, (m, N, 3).
-    d_radius
-        Derivative of the length by the radius of the pulley [-], (m, N); 0 for a point anchor.
+        In {G}, along the cable towards the attachment, (m, N, 3).
+    by_geometry
+        Derivatives of the length by the anchor in its carrier's frame (3), the attachment in the platform's (3) and the
+        radius of the pulley, (m, N, 7) [-].
     """
 
     lengths: np.ndarray
     directions: np.ndarray
-    d_radius: np.ndarray
+    by_geometry: np.ndarray
 
 
-def runs(anchors: np.ndarray, axes: np.ndarray, radii: np.ndarray, attachments: np.ndarray) -> Runs:
-    """Return how cables run from anchors (m, 3) over pulleys to attachments (m, N, 3), all in {G} [m].
+def runs(robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> Runs:
+    """Return how the cables run with the carriers at home and the platform at positions (N, 3) and rotations (N, 3, 3).
 
     Parameters
     ----------
-    axes
-        Swivel axes in {G}, of unit length, (m, 3).
-    radii
-        Of the pulleys [m], (m,); 0: a point anchor.
-
-    Lengths are nan where no cable is tangent to its sheave, as none is to a radius below 0.
+    table
+        `Parameters.table`: anchors, attachments and, as the last of its columns, radii, which replace those of the
+        robot, (m, 9). No cable is tangent to a radius below 0.
     """
-    offset = attachments - anchors[:, None]
-    lengths = np.sqrt(np.einsum("mni,mni->mn", offset, offset))
-    lengths[radii < 0] = np.nan
-    d_radius = np.zeros_like(lengths)
-    over = np.flatnonzero(radii > 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        directions = offset / lengths[..., None]
-        if over.size:
-            run = sheaves(offset[over], axes[over, None], radii[over, None])
-            lengths[over] = radii[over, None] * run.wrap + run.straight
-            directions[over], d_radius[over] = run.along, run.wrap - np.sin(run.wrap)
-    return Runs(lengths, directions, d_radius)
+    record, m, count = record_of(robot).copy(), robot.m, len(position)
+    cables = record["cable"][:m]
+    cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+    poses = np.concatenate([position, points.angles(rotation)], axis=1)
+    lengths, A, by_geometry = np.empty((count, m)), np.empty((count, 6, m)), np.empty((count, m, 7))
+    lines(record, poses, robot.carrier_home, lengths, A, None, None, by_geometry)
+    lengths[:, table[:, 8] < 0] = np.nan
+    # Cables first, in this order also in memory, as the fit goes through them.
+    directions = np.negative(A[:, :3].transpose(2, 0, 1), order="C")
+    return Runs(lengths.T.copy(), directions, by_geometry.swapaxes(0, 1).copy())

@@ -205,13 +205,10 @@ class Model(Displayed):
     def _evaluate(self, state: State, derive: bool) -> tuple[Residuals, Derivatives | None]:
         robot, parameters = self.robot, self.parameters
         table, m = parameters.table(state.x), robot.m
-        turned, placed = parameters.carriers
-        anchors = placed + np.einsum("mij,mj->mi", turned, table[:, :3])
-        axes = np.einsum("mij,mj->mi", turned, robot.pulley_axes)
         base_position, base_rotation, velocity, rate = self._base(state.x[parameters.clock])
         position, rotation = base_position + state.shift, state.turn @ base_rotation
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
-        run = runs(anchors, axes, table[:, 8], position + arms)
+        run = runs(robot, table, position, rotation)
         slip = self._slips(state.x)
         scale0 = parameters.table(parameters.first)[:, 7:8]
         size_is_open = bool(np.isinf(self.pose_sigmas).any())
@@ -231,13 +228,13 @@ class Model(Displayed):
         if not derive:
             return residuals, None
         gain = weights * ratio
-        along = (gain * self._stretch)[..., None] * run.directions  # by the attachment in {G}
+        by_length = (gain * self._stretch)[..., None]
+        along = by_length * run.directions  # by the attachment in {G}
         cables = np.empty((m, len(position), OF_CABLE))
-        cables[..., :3] = -np.matmul(along, turned)
-        cables[..., 3:6] = np.einsum("mni,nij->mnj", along, rotation)
+        cables[..., :6] = by_length * run.by_geometry[..., :6]
         cables[..., 6] = -gain
         cables[..., 7] = -gain * (excess / scale if size_is_open else self.measurements.lengths.T)
-        cables[..., 8] = gain * self._stretch * run.d_radius
+        cables[..., 8] = by_length[..., 0] * run.by_geometry[..., 6]
         by_pose = np.concatenate([along, np.cross(arms, along)], axis=2)
         others = np.zeros((m, len(position), 1 + len(parameters.slips)))
         if velocity is not None and rate is not None:

@@ -184,17 +184,12 @@ def _left(robot: Robot, parameters: Parameters, reading: _Reading, y: np.ndarray
 
     An offset is taken away, and with enough samples displacements of anchor and attachment.
     """
-    turned, placed = parameters.carriers
-    table = parameters.table(parameters.first)
-    anchors = placed + np.einsum("mij,mj->mi", turned, table[:, :3])
-    axes = np.einsum("mij,mj->mi", turned, robot.pulley_axes)
-    arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(reading.rotation, 1, 2))[:, :, 0]
-    run = runs(anchors, axes, table[:, 8], reading.position + arms)
+    run = runs(robot, parameters.table(parameters.first), reading.position, reading.rotation)
     explained = [np.ones((*run.lengths.shape, 1))]
     if len(y) >= FEWEST[0]:
         explained.append(run.directions)
     if len(y) >= FEWEST[1]:
-        explained.append(np.einsum("mni,nij->mnj", run.directions, reading.rotation))
+        explained.append(run.by_geometry[..., 3:6])
     Q = np.linalg.qr(np.concatenate(explained, axis=2))[0]  # (m, N, c)
     differences = run.lengths[:, None] - reading.factor * y.T[columns]
     left = differences - np.matmul(np.matmul(differences, Q), np.swapaxes(Q, 1, 2))

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from ...base.errors import InputError
 from ...base.inputs import number
-from ...models.batch import compiled
 from ..nlp.rows import Mesh
 from ..nlp.solver import Progress, Solver
-from ..nlp.waiting import wait_for
 from ..plan import Plan
 from ..tasks.deviation import Deviation
 from ..tasks.initial import check_ends
@@ -86,18 +83,8 @@ class Replanner:
         scenario, mesh = search.scenario, Mesh(search.scenario.task.steps, RESERVE * search.scenario.robot.force_scale)
         if guess is None or scenario.scheme.smooth:
             return None
-        if mesh not in self._solvers:
-            wait_for(lambda: _load_kernels(scenario))
         outcome = search.solve_again(mesh, guess)
         return search.best() if outcome.success and search.audit(outcome).passed else None
-
-
-def _load_kernels(scenario: Scenario) -> None:
-    """Compile what an audit evaluates most, so that no later call waits for that."""
-    wrench = "required_wrench" if scenario.wind is None else "required_wrench_in_wind"
-    for name in ("wrench_matrix", "cable_lengths", wrench):
-        with suppress(InputError):  # of operations that no kernel has
-            compiled(scenario.dynamics.functions[name])
 
 
 def _check(scenario: Scenario) -> None:

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...models import Robot
-from ...workspace import Condition, ExistsPlacement, ForceBalance, Places, load_kernels
+from ...workspace import Condition, ExistsPlacement, ForceBalance, Places
 from ...workspace.region import reach_boxes
 from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
@@ -88,7 +88,6 @@ def loops(
     the robot-ends have the printed x and y and any of the printed heights, which all boxes contain, however wide.
     """
     system, condition = robot("wang-ctmrts", drive), condition or ForceBalance()
-    load_kernels(system)
     condition.holds(system, Places.at_home(system, system.home))
     start = time.perf_counter()
     places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]), widths)

@@ -11,15 +11,12 @@ the drive keeps the cables' lengths, the position is unknown too, and l_i(x, the
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
-import casadi as ca
 import numpy as np
 
 from ...base.errors import InputError
 from ...models import Robot
-from ...models.batch import call
 from ...models.dynamics import dynamics_of
 from ..condition import Condition
 from ..feasibility import feasible, rest_wrench
@@ -81,15 +78,12 @@ class EquilibriumPosture(Condition):
 
 def _solve(robot: Robot, pose: np.ndarray, tensions: np.ndarray, carriers: np.ndarray) -> None:
     """Change pose (n, 6) and tensions (n, m) in place to those of a balance, or to nan."""
-    key: Any = robot  # frozen, so it has a hash, which type checkers do not know
-    function = _balance_function(key)
+    wrench = rest_wrench(robot)
     unknown = slice(3 if robot.fixed_lengths is None else 0, 6)
     turned = 3 - unknown.start
     left = np.arange(len(pose))
     for _ in range(STEPS):
-        arguments = {"pose": pose[left], "tensions": tensions[left], "carrier_pose": carriers[left]}
-        result = call(function, arguments, threads=1)
-        error, jacobian = result["error"], result["jacobian"]
+        error, jacobian = _balance(robot, wrench, pose[left], tensions[left], carriers[left])
         good = np.isfinite(error).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
         open_ = good & ~(np.abs(error).max(axis=1) <= SOLVED)
         lost = left[~good]
@@ -123,27 +117,21 @@ def _one(J: np.ndarray, error: np.ndarray) -> np.ndarray:
         return np.full(J.shape[1], np.nan)
 
 
-@lru_cache(maxsize=16)
-def _balance_function(robot: Any) -> ca.Function:
-    """Return a Function of the residual, in units of weight and length, and its Jacobian.
+def _balance(
+    robot: Robot, wrench: np.ndarray, pose: np.ndarray, tensions: np.ndarray, carriers: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return residuals (n, k), in units of weight and length, and their Jacobians (n, k, k or more).
 
     The Jacobian is for (position where lengths are fixed, attitude, tensions in units of the weight).
     """
-    dynamics = dynamics_of(robot)
-    pose, tensions = ca.SX.sym("pose", 6), ca.SX.sym("tensions", robot.m)
-    carriers = ca.SX.sym("carrier_pose", len(robot.carriers), 6)
-    A = dynamics.wrench_matrix(pose, carriers)
-    scale = ca.DM(robot.wrench_scale) / robot.weight
-    error = scale * (A @ tensions - ca.DM(rest_wrench(robot)))
-    first = 3
-    if robot.fixed_lengths is not None:
-        stretch = (dynamics.cable_lengths(pose, carriers) - ca.DM(robot.fixed_lengths)) / robot.length
-        error, first = ca.vertcat(error, stretch), 0
-    jacobian = ca.horzcat(ca.jacobian(error, pose)[:, first:], ca.jacobian(error, tensions) * robot.weight)
-    return ca.Function(
-        "balance",
-        [pose, tensions, carriers],
-        [error, ca.densify(jacobian)],
-        ["pose", "tensions", "carrier_pose"],
-        ["error", "jacobian"],
-    )
+    dynamics, scale = dynamics_of(robot), robot.wrench_scale / robot.weight
+    A = dynamics.wrench_matrix(pose, carriers) * scale[:, None]
+    error = np.einsum("nij,nj->ni", A, tensions) - scale * wrench
+    by_pose = dynamics.wrench_jacobian(pose, tensions, carriers) * scale[:, None]
+    if robot.fixed_lengths is None:
+        return error, np.concatenate([by_pose[:, :, 3:], robot.weight * A], axis=2)
+    stretch = (dynamics.cable_lengths(pose, carriers) - robot.fixed_lengths) / robot.length
+    of_lengths = dynamics.length_jacobian(pose, carriers) / robot.length
+    lower = np.concatenate([of_lengths, np.zeros((len(pose), robot.m, robot.m))], axis=2)
+    upper = np.concatenate([by_pose, robot.weight * A], axis=2)
+    return np.concatenate([error, stretch], axis=1), np.concatenate([upper, lower], axis=1)
