@@ -429,10 +429,10 @@ def test_each_file_spoiled_alone(tmp_path):
     y = np.empty((1, 1, 1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TOWLINE_CACHE", str(tmp_path))
-        kernel._from_disk(*how, {})
+        kernel._from_disk(*how)
         for file in [file for file in folder.rglob("*") if file.is_file()]:
             spoil(file, "flipped")
-            kernel._from_disk(*how, {})(0, 1, np.full((1, 1, 1), 2.0), y)
+            kernel._from_disk(*how)(0, 1, np.full((1, 1, 1), 2.0), y)
             assert y.item() == 13.0
             assert kernel._is_intact(folder, source)
 

@@ -1,1 +1,1 @@
-"""Functions of numbers compiled to machine code, and arithmetic on vectors."""
+"""Functions of numbers compiled to machine code."""

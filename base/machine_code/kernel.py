@@ -14,7 +14,7 @@ import math
 import os
 import platform
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ def compile_kernel(source: str, n_in: int, n_out: int) -> Kernel:
     return compile_function(source, "kernel", _signature(n_in, n_out))
 
 
-def compile_function(source: str, name: str, signature: str, known: Mapping[str, Any] | None = None) -> Kernel:
+def compile_function(source: str, name: str, signature: str) -> Kernel:
     """Compile the function `name` of a source, in which decorators mark those that it calls, or take it from the disk.
 
     Parameters
@@ -59,13 +59,10 @@ def compile_function(source: str, name: str, signature: str, known: Mapping[str,
         The function that is returned.
     signature
         Its types in Numba's notation.
-    known
-        More names that the source uses, as those of instructions; what they mean must follow from the source.
     """
     with _compiling:
         if source not in _compiled:
-            known = known or {}
-            _compiled[source] = _from_disk(source, name, signature, known) or _compile(source, name, signature, known)
+            _compiled[source] = _from_disk(source, name, signature) or _compile(source, name, signature)
         return _compiled[source]
 
 
@@ -109,7 +106,7 @@ def _signature(n_in: int, n_out: int) -> str:
     return f"void(intp, intp, {', '.join(arrays)})"
 
 
-def _compile(source: str, name: str, signature: str, known: Mapping[str, Any], file: Path | None = None) -> Kernel:
+def _compile(source: str, name: str, signature: str, file: Path | None = None) -> Kernel:
     """Compile the function, by Numba's cache beside `file` if one is given."""
     import numba
 
@@ -117,13 +114,13 @@ def _compile(source: str, name: str, signature: str, known: Mapping[str, Any], f
     # Parts are called by compiled code alone, and allocate nothing, so that they count no references to arrays.
     part = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False, **options}
     # When Numba loads a function it imports the module named in it.
-    space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np, **known}
+    space: dict[str, Any] = {"__name__": __name__, "math": math, "np": np}
     space |= {"part": numba.njit(**part), "inlined": numba.njit(forceinline=True, **part)}
     exec(compile(source, str(file or "<kernel>"), "exec"), space)
     return numba.njit(signature, cache=file is not None, **options)(space[name])
 
 
-def _from_disk(source: str, name: str, signature: str, known: Mapping[str, Any]) -> Kernel | None:
+def _from_disk(source: str, name: str, signature: str) -> Kernel | None:
     """Compile with the cache on the disk; None where there is none or it is broken beyond repair."""
     try:
         folder = cache_folder() / _key(source)
@@ -134,7 +131,7 @@ def _from_disk(source: str, name: str, signature: str, known: Mapping[str, Any])
             with whole_file(file) as place:
                 place.write_text(source, encoding="utf-8")
                 os.utime(place, (_LONG_AGO, _LONG_AGO))
-        kernel = _compile(source, name, signature, known, file)
+        kernel = _compile(source, name, signature, file)
         if not seal.exists():
             with whole_file(seal) as place:
                 place.write_text(_hash_of(folder))
