@@ -1,1 +1,0 @@
-"""Functions of numbers compiled to machine code, and arithmetic on vectors."""
