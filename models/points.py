@@ -1,7 +1,7 @@
 """Where the points of a robot are, for many poses at once, in NumPy alone.
 
-`kinematics` has the same for CasADi expressions. A few operations a row are done here in a fraction of the time of a
-CasADi Function, and a robot is checked without importing CasADi.
+`kinematics` has the same for CasADi expressions, and the numeric core for a robot's record. A robot is checked at home,
+and its record filled, with what is here, so that it can use neither.
 """
 
 from __future__ import annotations
