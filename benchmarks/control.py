@@ -29,7 +29,7 @@ __all__ = ["Error", "Report", "Step", "markdown", "run"]
 
 Progress = Callable[[str, int, int], None]
 
-TIMED = ("casadi", "daqp", "osqp", "clarabel", "numpy", "numba")
+TIMED = ("casadi", "daqp", "osqp", "clarabel", "numpy")
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ class Row:
 def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:
     """Measure contenders at the programs of one flight, alternating every few; `TOWLINE` and `REFERENCE` among them."""
     solvers = {each.name: each.prepare(programs[0]) for each in contenders}
-    for solver in solvers.values():  # imports and machine code belong to no program
+    for solver in solvers.values():  # imports belong to no program
         solver.solve(solver.arrange(programs[0]))
     count = len(programs)
     spent: dict[str, dict[int, list[float]]] = {name: {} for name in solvers}  # [us] by turn

@@ -19,7 +19,7 @@ T = TypeVar("T")
 Times = float | Sequence[float]  # of a turn
 
 
-def machine(packages: tuple[str, ...] = ("casadi", "numpy", "numba")) -> str:
+def machine(packages: tuple[str, ...] = ("casadi", "numpy")) -> str:
     """Return processor, cores and versions in one line; packages that are not installed are left out."""
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     models = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]

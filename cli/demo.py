@@ -9,7 +9,7 @@ import typer
 
 from ..base.inputs import one_of
 from .options import FormatOption, JsonOption, print_json, print_written
-from .watching import COMPILING, watching
+from .watching import watching
 
 
 def demo(
@@ -28,8 +28,7 @@ def demo(
     one_of("--format", form, FORMATS)
     with watching("planning the circle with a quadrotor that may move", quiet=as_json) as progress:
         result = flying_circle.run(folder, progress, form)
-    # Reports and files of the plans come first: they can be read while the first flight on a machine compiles, and
-    # Ctrl-C loses none of them.
+    # Reports and files of the plans come before the flight: Ctrl-C loses none of them.
     if not as_json:
         typer.echo("A circle of radius 1 m at a height of 99 m, under a quadrotor that hovers at 100 m:\n")
         typer.echo(result.hovering.report())
@@ -37,7 +36,7 @@ def demo(
         typer.echo(result.free.report())
         print_written([*result.pictures, *result.files])
         typer.echo(f"\nThis plan, flown in wind of {flying_circle.WIND} m/s with gusts of {flying_circle.GUSTS} m/s:\n")
-    with watching(f"flying the circle in wind {COMPILING}", quiet=as_json):
+    with watching("flying the circle in wind", quiet=as_json):
         flight, flown = flying_circle.fly(folder, result.free, form)
     passed = result.as_expected and flight.passed
     if as_json:

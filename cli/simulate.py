@@ -31,7 +31,7 @@ from .options import (
 from .outputs import check_outputs
 from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
 from .stopping import add_to_message
-from .watching import COMPILING, counting, watching
+from .watching import counting, watching
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -190,7 +190,7 @@ def _once(
 ) -> bool:
     """Simulate once, save, draw and print; return whether the run passed."""
     figures, form = drawn
-    with watching(f"flying {plan} {COMPILING}", quiet=as_json) as watch:
+    with watching(f"flying {plan}", quiet=as_json) as watch:
         flight = run()
         written = {"file": flight.save(target)}
         watch.now("drawing")

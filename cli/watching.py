@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-COMPILING = "(the first flight on a machine compiles machine code, which takes a minute)"
-
 
 @contextmanager
 def progress_bar(what: str, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:

@@ -358,4 +358,4 @@ def test_help_starts_at_once():
     loaded = set(
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     )
-    assert not loaded & {"casadi", "numba", "xarray", "matplotlib", "scipy", "qpsolvers", "osqp", "viser", "pandas"}
+    assert not loaded & {"casadi", "xarray", "matplotlib", "scipy", "qpsolvers", "osqp", "viser", "pandas"}

@@ -190,7 +190,7 @@ def imported_by(statement):
 
 def test_importing_is_cheap():
     """What costs 0.3 s and more alone is imported where it is used."""
-    heavy = {"xarray", "qpsolvers", "osqp", "matplotlib.pyplot", "scipy.optimize", "numba"}
+    heavy = {"xarray", "qpsolvers", "osqp", "matplotlib.pyplot", "scipy.optimize"}
     for statement in ("import towline", "import towline.models", "import towline.solvers", "import towline.cli.main"):
         assert not heavy & imported_by(statement), statement
     assert "casadi" not in imported_by("import towline.cli.main")

@@ -10,7 +10,7 @@ name: circle
 path: {kind: circle, centre: [0, 0, -1], radius: 0.5, rate: 0.6}
 base: {kind: free, acceleration_max: 3, ends: periodic}
 """
-HEAVY = {"xarray", "pandas", "dask", "distributed", "numba", "matplotlib.pyplot", "scipy", "rich", "viser", "osqp"}
+HEAVY = {"xarray", "pandas", "dask", "distributed", "matplotlib.pyplot", "scipy", "rich", "viser", "osqp"}
 NOT_LOADED = {
     "towline --help": HEAVY | {"numpy", "casadi", "pydantic", "ruamel"},
     "towline robots": HEAVY | {"numpy", "casadi", "ruamel"},  # Typer reads arguments with pydantic

@@ -103,6 +103,7 @@ def test_wheels_are_built_for_all_platforms():
         "linux-x86_64": "ubuntu",
         "linux-aarch64": "ubuntu-arm",
         "macos-arm64": "macos",
+        "macos-x86_64": "macos-intel",
         "windows-x86_64": "windows",
     }
 
