@@ -1,4 +1,4 @@
-"""`Trajectory`: the reference of a flight over time, from a plan, its file, a timing, a path or a pose."""
+"""`Trajectory`: the reference of a flight over time, from a plan, its file, a path or a pose."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Trajectory", "read_trajectory"]
 
-ACCEPTED = "a plan, the NetCDF file of one, a timing, a path or a pose (6,)"
+ACCEPTED = "a plan, the NetCDF file of one, a path or a pose (6,)"
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -64,8 +64,6 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
         from ..ocp import Task
 
         return _of_path(robot, validate({"path": reference}, Task, "reference").path, duration)
-    if callable(getattr(reference, "motion", None)) and hasattr(reference, "bottlenecks"):
-        return _of_timing(reference)
     if callable(getattr(reference, "at", None)):
         return _of_path(robot, reference, duration)
     try:
@@ -109,18 +107,6 @@ def _of_path(robot: Robot, path: Any, duration: float | None) -> Trajectory:
     return Trajectory(lasting, at)
 
 
-def _of_timing(timing: Any) -> Trajectory:
-    lasting = timing.duration
-    if lasting is None:
-        raise InputError("reference must be a feasible timing, got an infeasible one")
-
-    def at(times: np.ndarray) -> tuple[Motion, Motion]:
-        platform, carriers = timing.motion(np.minimum(times, lasting))
-        return _resting(platform, times, lasting), _resting(carriers, times, lasting)
-
-    return Trajectory(lasting, at)
-
-
 def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
     """Return a motion that rests after its end."""
     pose, velocity, acceleration = (np.array(part) for part in motion)
@@ -131,6 +117,8 @@ def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
 def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes."""
     needed = (*_PARTS, *(f"carrier_{part}" for part in _PARTS), "time")
+    if why := dataset.attrs.get("no_reference"):
+        raise InputError(f"reference must be a plan whose motion a robot can follow, got {why}")
     missing = [name for name in needed if name not in dataset]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")

@@ -56,6 +56,8 @@ def trajectory(plan: PlanData) -> Contents:
         "task": to_yaml(task.in_file()),
         "report": json.dumps(plan.to_dict()),
     }
+    if plan.law is not None and not plan.feasible:
+        attributes["no_reference"] = "one of time_along without a feasible time law"
     coordinates |= dimensions(robot, audit.times[rows])
     return Contents(variables, coordinates, attributes)
 
