@@ -5,8 +5,8 @@ BIN := .venv/bin
 export PYTHONDONTWRITEBYTECODE :=
 # Modules are compiled when they are first imported; most never are.
 INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --constraint constraints.txt --editable
-# What the extension is built from, where there is a C compiler.
-CORE := setup.py $(wildcard solvers/core/*.[ch])
+# What the extension is built from.
+CORE := setup.py $(wildcard core/*.h core/*/*.[ch] core/packaging/*.py)
 
 .PHONY: demo test setup lint types kernels unit docs lowest newest errata pictures clean
 
@@ -68,7 +68,7 @@ pictures: .venv/core.stamp
 	cd build && ../$(BIN)/towline workspace cogiro --samples 20000 --figure ../docs/pictures/cogiro-workspace.png
 
 clean:
-	rm -rf .venv .editable towline-demo build site *.egg-info solvers/core/*.so
+	rm -rf .venv .editable towline-demo build site *.egg-info core/*.so
 
 .venv/venv.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'

@@ -44,7 +44,7 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 # Reached as attributes. The last two are short names that stay.
 _PACKAGES = {
-    *("base", "control", "estimation", "export", "figures", "models", "ocp", "plant", "simulation", "solvers"),
+    *("base", "control", "core", "estimation", "export", "figures", "models", "ocp", "plant", "simulation", "solvers"),
     *("benchmarks", "cli", "statics", "studies", "viewer", "workspace", "calibration", "errors"),
 }
 

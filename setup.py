@@ -1,6 +1,6 @@
 """Build the C core as an extension, and the description that a package index shows.
 
-The extension is optional: without a compiler towline is installed without it. The description is README.md, whose links
+core/packaging/compiler.py finds the compiler. The description is README.md, whose links
 lead to files of the repository; an index has none of these, so there they lead to the repository as of this version.
 
 An editable installation gets a folder that has the package under its name, because the repository's root is the package
@@ -10,20 +10,11 @@ whatever its folder is called: type checkers and editors then find it as Python 
 import os
 import re
 
-CORE = "solvers/core/"
-SOURCES = (
-    "certificate",
-    "dual_active_set",
-    "extension",
-    "proof",
-    "reduction",
-    "slabs",
-    "standard_form",
-    "towline_core",
-)
+CORE = "core"
+# The same bits on every processor: no multiplication and addition in one. A root is one instruction if it need not set
+# errno nor trap.
+FLAGS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi", "-g0"]
 EDITABLE = ".editable"
-HEADERS = ("internal.h", "tolerances.h", "towline_core.h", "towline_types.h")
-
 
 # Where a link or a picture of Markdown or HTML leads: a path, neither an address nor a place on the same page.
 PATH = re.compile(r'(?P<before>\]\(|<img src=")(?P<path>(?!#|[a-z]+:)[^)"\s]+)')
@@ -62,7 +53,18 @@ def main() -> None:
     from pathlib import Path
 
     from setuptools import Extension, setup
+    from setuptools.command.build_ext import build_ext
     from setuptools.command.editable_wheel import editable_wheel
+
+    sys.path.insert(0, str(Path(CORE, "packaging").resolve()))
+    import compiler
+
+    class Build(build_ext):
+        """The build of the core by the machine's compiler or that of the package ziglang."""
+
+        def run(self) -> None:
+            compiler.choose()
+            super().run()
 
     class Editable(editable_wheel):
         """An editable installation by a path, or by setuptools' import hook where there can be no link."""
@@ -75,21 +77,19 @@ def main() -> None:
     project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
     readme = Path("README.md").read_text(encoding="utf-8")
     core = Extension(
-        "towline.solvers.core._core",
-        [f"{CORE}{name}.c" for name in SOURCES],
-        depends=[CORE + name for name in HEADERS],
-        include_dirs=[CORE],
+        "towline.core._core",
+        sorted(str(path) for path in Path(CORE).glob("*/*.c")),
+        depends=sorted(str(path) for path in Path(CORE).rglob("*.h")),
+        include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
-        # The same bits on every processor: no multiplication and addition in one.
-        extra_compile_args=[] if sys.platform == "win32" else ["-O3", "-ffp-contract=off", "-g0"],
+        extra_compile_args=[] if sys.platform == "win32" else FLAGS,
         py_limited_api=True,
-        optional=True,
     )
     # Named as the script, this file is no module of the package, whichever program runs it.
     setup(
         script_name="setup.py",
         ext_modules=[core],
-        cmdclass={"editable_wheel": Editable},
+        cmdclass={"build_ext": Build, "editable_wheel": Editable},
         options={"bdist_wheel": {"py_limited_api": "cp311"}},
         long_description=with_addresses(readme, project["urls"]["Repository"], project["version"]),
         long_description_content_type="text/markdown",

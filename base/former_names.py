@@ -24,6 +24,7 @@ NOW = {
     "models.plant": "plant",
     "models.statics": "statics.equilibria",
     "robust": "statics.robust",
+    "solvers.core": "core",
 }
 # Where each name is now, and its new name if it was renamed: the old one goes with the next release.
 MOVED = {

@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solvers import TensionProblem, compiled, core, methods, solve, solve_batch
+from .. import core
+from ..solvers import TensionProblem, compiled, methods, solve, solve_batch
 from .tension_tasks import KINDS, STIFFNESS, Task
 
 __all__ = ["REFERENCE", "Contender", "contenders"]
@@ -81,8 +82,7 @@ def contenders() -> list[Contender]:
     entries = [Contender(REFERENCE, required, _daqp)]
     for name in methods():
         entries.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
-    if core.CABLES:
-        entries.append(Contender("towline core alone", "its own, 1e-9", _towline_core))
+    entries.append(Contender("towline core alone", "its own, 1e-9", _towline_core))
     entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
     entries.append(
         Contender("towline solve_batch, rho", "its own, 3e-14", _towline_soft_batch, batch=True, kinds=("soft",))

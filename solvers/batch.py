@@ -14,8 +14,8 @@ from ..base.display import Displayed, Fact
 from ..base.errors import InputError
 from ..base.inputs import leading, number, real_array, shown, whole_number
 from ..base.text import quantity
+from ..core import CABLES, ROWS, solve_rows
 from . import compiled
-from .core import CABLES, ROWS, solve_rows
 from .kernels.codes import INACCURATE, INVALID, OPTIMAL, UNSURE
 from .problem import TensionProblem
 from .solution import TensionSolution

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core import CABLES, ROWS, solve_rows
 from .batch import solve_batch
-from .core import CABLES, ROWS, solve_rows
 from .kernels.codes import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 from .problem import TensionProblem
 from .solve import solve

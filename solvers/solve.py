@@ -8,9 +8,9 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.inputs import shown
+from ..core import CABLES, ROWS, solve_packed
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
-from .core import CABLES, ROWS, solve_packed
 from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR, UNSURE
 from .methods import METHODS
 from .methods.active_set import ActiveSet

@@ -12,17 +12,17 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from towline import Dynamics, load
+from towline import core as extension
 from towline.base import tolerances
 from towline.solvers import TensionProblem, certify, solve
-from towline.solvers import core as extension
 from towline.solvers.kernels import codes
 from towline.solvers.status import STATUSES
 
 from .references import linear_program_status, optimality_error, support_value
 from .soak.exactness import awkward_problem
 
-CORE = Path(__file__).parent.parent / "solvers" / "core"
-SOURCES = sorted(set(CORE.glob("*.c")) - {CORE / "extension.c"})
+CORE = Path(__file__).parent.parent / "core" / "distribution"
+SOURCES = sorted(CORE.glob("*.c"))
 FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wdouble-promotion", "-O2"]
 OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID = range(5)
 SHAPES = [(1, 3), (2, 4), (3, 3), (3, 7), (6, 3), (6, 6), (6, 7), (6, 8), (6, 10), (6, 12), (6, 16)]
@@ -295,7 +295,7 @@ def test_the_example_of_the_docs(tmp_path):
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("there is no C compiler: no command cc")
-    page = (CORE.parent.parent / "docs" / "howto" / "c-code.md").read_text()
+    page = (CORE.parents[1] / "docs" / "howto" / "c-code.md").read_text()
     (tmp_path / "distribute.c").write_text(page.split('```c title="distribute.c"\n')[1].split("```")[0])
     command = [compiler, "-O2", f"-I{CORE}", "distribute.c", *map(str, SOURCES), "-lm", "-o", "distribute"]
     subprocess.run(command, check=True, cwd=tmp_path)

@@ -5,8 +5,8 @@ import shutil
 import numpy as np
 import pytest
 
+from towline.core import CABLES
 from towline.solvers import TensionProblem, capacity_margin, certify, solve, solve_batch
-from towline.solvers.core import CABLES
 
 from .references import linear_program_status
 from .soak.exact_judge import DOUBLE, Judge

@@ -10,7 +10,7 @@ ROOT = Path(__file__).parent.parent
 
 # From the ground up: a file may import files of its own room and of rooms on lower floors.
 FLOORS = [
-    {"base"},
+    {"base", "core"},
     {"models", "solvers", "figures"},
     {"statics", "plant"},
     {"workspace", "estimation", "control", "ocp"},

@@ -84,6 +84,34 @@ def test_ends_of_the_tube(frame, coordinate):
         assert audit(free, late).passed
 
 
+class Rising(Deviation):
+    """A deviation t^4 (T - t)^4 of x, a polynomial beyond those of any scheme, with an acceleration at the start."""
+
+    def evaluate(self, times):
+        u, slope = times * (LASTS - times), LASTS - 2 * times
+        size, pushed = SNAP / (24 * LASTS**4), self.a[0, 0] / (2 * LASTS**3)
+        parts = np.zeros((3, len(times), self.q.shape[1]))
+        parts[0, :, 0] = size * u**4 + pushed * times**2 * (LASTS - times) ** 3
+        parts[1, :, 0] = 4 * size * u**3 * slope  # the ends are judged by positions
+        parts[2, :, 0] = size * (12 * (u * slope) ** 2 - 8 * u**3)
+        return *parts, None
+
+
+SNAP = 5e6  # [m/s^4]
+
+
+def test_rest_at_an_end_whatever_the_snap():
+    """A motion whose jerk grows at once is at rest at its ends: differences there have no error that is seen."""
+    scenario, none = on_the_path({"path": RIGHT, "tube": {"position": "free", "ends": "rest"}})
+    rising = Rising(none.nodes, none.q, none.v, none.a, none.tensions)
+    assert "tube.ends" not in found(scenario, rising)
+    pushed = np.zeros_like(none.a)
+    pushed[0, 0] = 2e-3
+    (excess,) = found(scenario, replace(rising, a=pushed))["tube.ends"]
+    assert (excess.time, excess.unit) == (0, "m/s^2")
+    assert excess.value == pytest.approx(2e-3, rel=0.02)
+
+
 def test_exact_waypoints():
     tube = {"position": 0.05, "attitude": 0.1, "ends": "free", "waypoints": "exact"}
     scenario, none = on_the_path({"path": POINTS, "tube": tube})

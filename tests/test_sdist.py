@@ -25,7 +25,7 @@ LEFT_BEHIND = (
     "notebooks/.ipynb_checkpoints/01_quickstart.ipynb",
     "shared/notes.md",
     "site/index.html",
-    "solvers/core/_core.abi3.so",
+    "core/_core.abi3.so",
     "tests/__pycache__/test_sdist.cpython-311.pyc",
     "towline-demo/circle-free.nc",
 )
@@ -98,7 +98,7 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     assert len(robots) > 20
     step = {name for name in tracked if name.startswith("export/step/template/")}
     data = {f"towline/{name}" for name in robots | step | {"py.typed", "ocp/tasks/task.schema.json"}}
-    core = re.compile(r"towline/solvers/core/(\w+\.[ch]|_core\.pyi|_core(\.abi3\.so|\.pyd))")
+    core = re.compile(r"towline/core/((\w+/)?\w+\.[ch]|_core\.pyi|_core(\.abi3\.so|\.pyd))")
     assert {name for name in files - modules if not core.fullmatch(name)} == data
 
 

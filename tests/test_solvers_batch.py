@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from towline.base.errors import InputError, SolverError
+from towline.core import CABLES
 from towline.solvers import Status, TensionProblem, certify, solve, solve_batch
-from towline.solvers.core import CABLES
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible
 from .references import linear_program_status, optimum_by_enumeration, support_value

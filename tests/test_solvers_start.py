@@ -7,8 +7,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from towline.core import CABLES
 from towline.solvers import TensionProblem, compiled, solve, solve_batch
-from towline.solvers.core import CABLES
 
 from .problems import ZOO
 from .soak.exactness import awkward_problem

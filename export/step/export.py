@@ -23,7 +23,7 @@ from .mechanics import mechanics, moving_carriers
 __all__ = ["export_step"]
 
 _TEMPLATE = Path(__file__).parent / "template"
-_CORE = Path(__file__).parents[2] / "solvers" / "core"
+_CORE = Path(__file__).parents[2] / "core" / "distribution"
 # In the order in which each finds what it needs above it.
 _SECTIONS = (
     "towline_core.h",

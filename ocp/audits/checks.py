@@ -34,8 +34,11 @@ STILL_TOLERANCE = 1e-6  # [m/s, m/s^2, rad], of carriers that keep their place o
 LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 DURATION_TOLERANCE = 1e-7  # relative
 JUMP_TOLERANCE = 1e-6  # [m, rad]; ten times that of speeds [m/s, rad/s]: programs meet their equations to 1e-8
-STEP = 1e-5  # [s], of differences
-CURVED_STEP = 1e-4  # [s], of second differences: rounding divides by its square
+END_STEP = 1e-4  # [s], of differences at the ends: rounding divides by its square
+# First and second derivative at the first of six points a step apart: exact for the polynomials of fifth degree that
+# motions are between nodes.
+FIRST = np.array([-137.0, 300.0, -300.0, 200.0, -75.0, 12.0]) / 60.0
+SECOND = np.array([45.0, -154.0, 214.0, -156.0, 61.0, -10.0]) / 12.0
 
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
@@ -170,10 +173,9 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
     ends = [(0.0, 1.0)] if scenario.task.initial is None else []
     ends += [(scenario.duration, -1.0)] if scenario.task.final is None or scenario.task.final.pose is None else []
     for end, inwards in ends:
-        steps = inwards * np.array([0.0, STEP, 2 * STEP, *(CURVED_STEP * np.arange(1, 4))])
-        at, near, far, *further = _off_path(audited, end + steps)
-        speed = (-3 * at + 4 * near - far) / (2 * inwards * STEP)
-        acceleration = np.array([2.0, -5.0, 4.0, -1.0]) @ np.stack([at, *further]) / CURVED_STEP**2
+        step = _end_step(audited, 0 if inwards > 0 else -1)
+        places = _off_path(audited, end + inwards * step * np.arange(len(FIRST)))
+        at, speed, acceleration = places[0], FIRST @ places / (inwards * step), SECOND @ places / step**2
         # The motion itself rests, in the frame of its path; without freedom it moves as the path does.
         if word == "rest" and scenario.platform_free:
             of_path = scenario.path.at(np.array([end]), scenario.duration)
@@ -189,6 +191,14 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
                     why = "off its path at an end" if word == "exact" or not per else "an end at which it should rest"
                     exceeded.append(Excess("tube.ends", "platform", end, off, 0.0, unit + per, "exactly", why))
     return exceeded
+
+
+def _end_step(audited: AuditedMotion, end: int) -> float:
+    """Return the step of the differences at the start (0) or the end (-1): all are inside one interval of the nodes."""
+    if audited.deviation is None:
+        return END_STEP
+    interval = float(np.diff(audited.deviation.nodes)[end])
+    return max(min(END_STEP, interval / (len(FIRST) - 1)), END_STEP / 2)
 
 
 def _waypoints(audited: AuditedMotion) -> list[Excess]:

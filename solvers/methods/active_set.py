@@ -6,9 +6,8 @@ from .daqp import Daqp
 class ActiveSet(Daqp):
     """Weighted least squares to t_ref inside the limits, by a dual active-set method in the null space.
 
-    `solve` runs the C core, `towline.solvers.core`, if towline was installed where there is a C compiler. Without it,
-    and where it is not sure, the daqp package proposes and `solve` judges, as with the other methods: some 0.2 ms a
-    call.
+    `solve` runs the C core, `towline.core`. Where that is not sure, and for problems larger than those it has room for,
+    the daqp package proposes and `solve` judges, as with the other methods: some 0.2 ms a call.
     """
 
     name = "active-set"

@@ -36,8 +36,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towline.base.errors import InputError, SolverError
+from towline.core import CABLES
 from towline.solvers import TensionProblem, compiled, solve, solve_batch
-from towline.solvers.core import CABLES
 from towline.solvers.status import STATUSES
 
 from .exact_judge import DOUBLE, FLOAT, Judge

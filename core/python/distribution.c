@@ -1,22 +1,10 @@
-/*
- * The Python module `towline.solvers.core._core`: functions on the memory of arrays. It keeps to Python's
- * limited API of 3.11, so that one wheel serves this version and all later ones.
- */
-#include <Python.h>
+/* Tension distribution for Python: one problem, and the rows of a batch. */
+#include "python/extension.h"
+
 #include <math.h>
 
-#include "towline_core.h"
-
-enum { DOUBLE = (int)sizeof(double) };
-
-/* Return the numbers of an array, which the caller releases, or NULL with an exception. */
-static double *numbers_of(PyObject *array, Py_buffer *view, int writable, Py_ssize_t *size) {
-    if (PyObject_GetBuffer(array, view, writable ? PyBUF_WRITABLE : PyBUF_SIMPLE) < 0) {
-        return NULL;
-    }
-    *size = view->len / DOUBLE;
-    return view->buf;
-}
+#include "distribution/towline_core.h"
+#include "python/arrays.h"
 
 /* Solve a problem of A, w, t_min, t_max, t_ref, weights and length, one after another; return the status. */
 static int solve(const double *data, Py_ssize_t size, double *t, Py_ssize_t m, double *direction, Py_ssize_t n) {
@@ -40,7 +28,7 @@ static int solve(const double *data, Py_ssize_t size, double *t, Py_ssize_t m, d
     return (int)status;
 }
 
-static PyObject *solve_packed(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+PyObject *towline_py_solve_packed(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     Py_buffer given, tensions, proof;
     Py_ssize_t size, m, n = 0;
@@ -121,7 +109,7 @@ static Py_ssize_t solve_batch(double *const *array, Py_ssize_t rows, int n, int 
     return optimal;
 }
 
-static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     Py_buffer views[ARRAYS];
     double *array[ARRAYS];
@@ -168,28 +156,4 @@ static PyObject *solve_rows(PyObject *module, PyObject *const *arguments, Py_ssi
         return NULL;
     }
     return PyLong_FromSsize_t(optimal);
-}
-
-static PyMethodDef functions[] = {
-    {"solve_packed", (PyCFunction)(void (*)(void))solve_packed, METH_FASTCALL,
-     "solve_packed(packed, tensions, direction=None)\n--\n\n"
-     "Solve a packed problem; return its status and fill tensions (m,) if optimal, direction (n,) if out of reach."},
-    {"solve_rows", (PyCFunction)(void (*)(void))solve_rows, METH_FASTCALL,
-     "solve_rows(n, m, rho, A, w, t_min, t_max, t_ref, weights, length, per, tensions, direction, info, residual, "
-     "status)\n--\n\nSolve the rows of a batch whose status is UNSURE; return how many of all are optimal."},
-    {NULL, NULL, 0, NULL},
-};
-
-static struct PyModuleDef definition = {
-    PyModuleDef_HEAD_INIT, "_core", "The C core of towline's solvers.", 0, functions, NULL, NULL, NULL, NULL,
-};
-
-PyMODINIT_FUNC PyInit__core(void) {
-    PyObject *module = PyModule_Create(&definition);
-    if (module && (PyModule_AddIntConstant(module, "CABLES", TOWLINE_CABLES) < 0 ||
-                   PyModule_AddIntConstant(module, "ROWS", TOWLINE_ROWS) < 0)) {
-        Py_DECREF(module);
-        return NULL;
-    }
-    return module;
 }

@@ -1,0 +1,11 @@
+/* Include this first in a file whose functions serve processors with AVX2. */
+#include "numbers/processor.h"
+
+#ifdef __clang__ /* makes instructions of vectors after inlining, GCC before */
+#define FORM(name) __attribute__((target("avx2"))) name##_avx2
+#elif defined(TOWLINE_X86)
+#pragma GCC target("avx2")
+#define FORM(name) name##_avx2
+#endif
+
+#define VECTOR_BYTES 32

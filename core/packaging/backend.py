@@ -1,0 +1,42 @@
+"""The build backend: that of setuptools, which asks for a C compiler from the package index where there is none.
+
+The core needs a compiler. Where the machine has none, the package ziglang is one (`compiler.py`); it is large, so it is
+asked for only there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import compiler
+from setuptools import build_meta
+
+__all__ = [
+    "build_editable",
+    "build_sdist",
+    "build_wheel",
+    "get_requires_for_build_editable",
+    "get_requires_for_build_sdist",
+    "get_requires_for_build_wheel",
+    "prepare_metadata_for_build_editable",
+    "prepare_metadata_for_build_wheel",
+]
+
+build_editable = build_meta.build_editable
+build_sdist = build_meta.build_sdist
+build_wheel = build_meta.build_wheel
+get_requires_for_build_sdist = build_meta.get_requires_for_build_sdist
+prepare_metadata_for_build_editable = build_meta.prepare_metadata_for_build_editable
+prepare_metadata_for_build_wheel = build_meta.prepare_metadata_for_build_wheel
+
+
+def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
+    """Return what a wheel is built with, a compiler among it if the machine has none."""
+    wanted = compiler.required()  # first: what follows runs setup.py, in this process
+    return wanted + build_meta.get_requires_for_build_wheel(config_settings)
+
+
+def get_requires_for_build_editable(config_settings: Any = None) -> list[str]:
+    """Return the same for an editable installation."""
+    wanted = compiler.required()
+    return wanted + build_meta.get_requires_for_build_editable(config_settings)
