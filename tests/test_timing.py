@@ -323,7 +323,7 @@ def test_a_leg_of_a_millimetre_is_timed_too():
     timings = [time_along("cogiro", along({"kind": "waypoints", "points": points, "blend": b})) for b in (None, 0)]
     assert all(timing.feasible for timing in timings)
     assert timings[0].duration < timings[1].duration  # which rests at both
-    # A law on an eighth of the grid misses the bends, by what instants 1 ms apart do not see: they last 0.1 ms.
+    # A law on an eighth of the grid misses the bends, by more than 1 N for some 0.1 % of the time. The audit finds it.
     law, robot = timings[0].scenario.path, load("cogiro")
     fewer = {"s": (*law.s[:-1:8], 1.0), "speeds": (*law.speeds[:-1:8], 0.0)}
     coarse = TimedPath.model_validate(law.model_dump() | fewer)
@@ -331,8 +331,8 @@ def test_a_leg_of_a_millimetre_is_timed_too():
     times = np.linspace(0, coarse.natural_duration, 200_001)
     motion, dynamics = coarse.at(times, times[-1]), Dynamics(robot)
     A, w = dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion)
-    exact = solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length)
-    assert 0 < (~exact.feasible).sum() < 100
+    wider = solve_batch(A, w, robot.t_min - 1, robot.t_max + 1, length=robot.length)
+    assert 0 < np.mean(~wider.feasible) < 2e-3
     assert not found.feasible
     assert found.audit.violation.max() > 1
 
