@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..base.inputs import file_path, number, real_array, shown
 from ..base.netcdf import check_units, load_netcdf
+from ..figures.outlines import outlines_from
 from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
@@ -39,11 +40,14 @@ class Trajectory(NamedTuple):
         each.
     tensions
         Returns the planned tensions at times, (n, m) [N]; None if none are planned.
+    keep_out
+        For each region that a plan keeps out of, the lines that outline it, (n, 3) each in {G} [m].
     """
 
     duration: float | None
     at: Callable[[np.ndarray], tuple[Motion, Motion]]
     tensions: Callable[[np.ndarray], np.ndarray] | None = None
+    keep_out: Sequence[Sequence[np.ndarray]] = ()
 
 
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
@@ -144,15 +148,24 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
+    keep_out = _outlines(dataset)
     planned = _array(dataset, "tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
-        return Trajectory(float(nodes[-1]), at)
+        return Trajectory(float(nodes[-1]), at, keep_out=keep_out)
 
     def tensions(times: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
-    return Trajectory(float(nodes[-1]), at, tensions)
+    return Trajectory(float(nodes[-1]), at, tensions, keep_out)
+
+
+def _outlines(dataset: xr.Dataset) -> list[list[np.ndarray]]:
+    """Return the outlines of the regions to keep out of, which a film of the run draws."""
+    if "keep_out" not in dataset:
+        return []
+    points = _array(dataset, "keep_out", (*dataset["keep_out"].shape[:1], 3), gaps=True)
+    return outlines_from(points, _array(dataset, "keep_out_region", (len(points),)))
 
 
 def _array(

@@ -12,11 +12,11 @@ import xarray as xr
 from ..base.errors import InputError
 from ..base.inputs import printable
 from ..base.netcdf import check_units
+from ..figures.outlines import outlines_from
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
 from ..ocp.audits.by_phase import certified
-from ..ocp.reports.scene import outline
 from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
@@ -42,12 +42,16 @@ class Replay:
 
     Attributes
     ----------
+    dataset
+        The contents of the file.
     robot, title, times
         Times of the saved instants (n,) [s].
     tensions
         (n, m) [N], nan where there are none.
     reference
         Origin of the platform's frame (n, 3) in {G} [m] where a flight should have it; None for a plan.
+    obstacles
+        Lines (k, 3) in {G} [m] that outline each of the regions to keep out of.
 
     Raises
     ------
@@ -59,14 +63,14 @@ class Replay:
         for name in (*NEEDED, "time"):
             if name not in dataset.variables:
                 raise InputError(f"{where} must be a plan saved by `towline plan`, got one without {name!r}")
+        self.dataset = dataset
         self._flown = "reference_pose" in dataset.variables
         for name in ("robot",) if self._flown else ("robot", "task"):
             if not isinstance(dataset.attrs.get(name), str):
                 raise InputError(f"{where} must be a plan saved by `towline plan`, got one without its {name}")
         self.robot = parse_yaml(dataset.attrs["robot"], Robot, f"{where}, robot")
         self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
-        what, status = "flight" if self._task is None else self._task.name, dataset.attrs.get("status", "a plan")
-        self.title = f"{self.robot.name}, {printable(what, LONGEST)}: {printable(str(status), LONGEST)}"
+        self.title = printable(str(dataset.attrs.get("title", self.robot.name)), LONGEST)
         self.geometry = Geometry(self.robot)
         self.times = _array(dataset, "time", (-1,), where, largest=FARTHEST)
         n, c = len(self.times), len(self.robot.carriers)
@@ -82,6 +86,7 @@ class Replay:
         self._words = _answers(dataset) if self._flown else None
         self._cut = _array(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
         self._events = _events(dataset) if self._flown else []
+        self.obstacles = _outlines(dataset, where)
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
         self._points = self.geometry(self._pose, self._carriers)
@@ -111,13 +116,6 @@ class Replay:
         """Return the origins of the carriers' frames that move, (n, 3) each in {G} [m]."""
         paths = np.moveaxis(self._carriers[:, :, :3], 1, 0)
         return [path for path in paths if np.ptp(path, axis=0).max() > 1e-9]
-
-    @property
-    def obstacles(self) -> list[list[np.ndarray]]:
-        """Return lines (k, 3) in {G} [m] that outline each of the regions to keep out of."""
-        if self._task is None:
-            return []
-        return [outline(place) for place in self._task.limits.keep_out if place.frame == "world"]
 
     def index_at(self, time: float) -> int:
         """Return the index of the instant nearest to `time` [s]."""
@@ -198,6 +196,13 @@ def _events(dataset: xr.Dataset) -> list[tuple[float, str]]:
     except (ValueError, KeyError, TypeError):
         return []
     return [(at, f"{at:.4g} s: {printable(what, LONGEST)}") for at, what in found]
+
+
+def _outlines(dataset: xr.Dataset, where: str) -> list[list[np.ndarray]]:
+    if "keep_out" not in dataset.variables:
+        return []
+    points = _array(dataset, "keep_out", (-1, 3), where, gaps=True)
+    return outlines_from(points, _array(dataset, "keep_out_region", (len(points),), where))
 
 
 def _array(
