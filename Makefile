@@ -27,14 +27,10 @@ lint: .venv/dev.stamp
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
-# The machine code of solvers, plant and controllers, once; otherwise each of the tests' processes compiles it or computes without.
+# The machine code of controllers, once; otherwise each of the tests' processes compiles it or computes without.
 kernels: .venv/dev.stamp
-	$(BIN)/python -c "from towline.solvers import compiled; compiled.keep()"
-	$(BIN)/python -c "from towline.solvers.stages import machine; machine.solve_stages()"
-	$(BIN)/python -c "from towline.plant import machine; machine.run_rows()"
 	$(BIN)/python -c "from towline.estimation.pose import machine; machine.load()"
 	$(BIN)/python -c "from towline.control import machine; machine.mechanics(); machine.thrusts(); machine.stages()"
-	$(BIN)/python -c "from towline.simulation import machine; machine.sense_rows()"
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has
 # one thread: two workers with two each would wait for one another.

@@ -3,6 +3,7 @@
 __all__ = [
     "AT_LIMIT",
     "CANCELLED",
+    "DECISIVE",
     "DOUBTFUL",
     "FEASIBILITY",
     "NEGLIGIBLE",
@@ -10,6 +11,7 @@ __all__ = [
     "ORTHOGONAL",
     "RANK",
     "ROUNDING",
+    "SLACK",
     "WEIGHTS_APART",
 ]
 
@@ -50,3 +52,9 @@ ORTHOGONAL = 1e-13
 
 # The heaviest weight of a problem, relative to the lightest: beyond it least squares have no digits left.
 WEIGHTS_APART = 1e14
+
+# How far a tension may pass a limit before it is moved back, relative to the size of the tensions.
+SLACK = 1e-12
+
+# Relative change of the cost if the limits move by the slack: above it rounding chose the tensions.
+DECISIVE = 1e-5

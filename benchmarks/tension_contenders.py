@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import core
-from ..solvers import TensionProblem, compiled, methods, solve, solve_batch
+from ..core import solve_packed
+from ..solvers import TensionProblem, methods, solve, solve_batch
 from .tension_tasks import KINDS, STIFFNESS, Task
 
 __all__ = ["REFERENCE", "Contender", "contenders"]
@@ -136,7 +136,6 @@ def _towline(method: str) -> Callable[[Task], Single]:
 
 
 def _towline_batch(task: Task) -> Batch:
-    compiled.load()
     A, w, t_min, t_max, weights = (
         _over_and_over(np.array([getattr(problem, name) for problem in task.problems]))
         for name in ("A", "w", "t_min", "t_max", "weights")
@@ -150,7 +149,6 @@ def _towline_batch(task: Task) -> Batch:
 
 
 def _towline_soft_batch(task: Task) -> Batch:
-    compiled.load()
     m = task.m
     A, w, t_min, t_max = (
         _over_and_over(np.array([values(problem) for problem in task.problems]))
@@ -170,7 +168,7 @@ def _towline_core(task: Task) -> Single:
 
     def run(i: int) -> Array | None:
         tensions = np.empty(size)
-        return tensions if core.solve_packed(packed[i], tensions) == 0 else None
+        return tensions if solve_packed(packed[i], tensions) == 0 else None
 
     return run
 

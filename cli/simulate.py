@@ -217,11 +217,8 @@ def _often(
     from ..figures import flight as figure
     from ..figures import style
     from ..simulation.flights import report, save, summary
-    from ..simulation.machine import prepare
 
     figures, form = drawn
-    with watching(f"flying {plan} {COMPILING}", quiet=as_json):
-        prepare()
     with counting(f"flying {plan}", "passed", quiet=as_json) as show:
         flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "flights")))
     add_to_message("")

@@ -115,18 +115,18 @@ class Freed:
         """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
         del platform
         chosen, coordinate = self.freed.T
-        return np.stack([carriers[:, chosen, order, coordinate] for order in range(3)], axis=1)
+        return carriers[:, chosen, :, coordinate].transpose(1, 2, 0)
 
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return them and their rate, (2, f): the reference's at first, then as ordered."""
         del measured
         place, rate, acceleration = self._placed
-        if np.isfinite(self._placed).all():
+        if self.count and np.isfinite(self._placed).all():
             place += dt * rate + dt * dt / 2 * acceleration
             rate += dt * acceleration
             # They are commanded no further than the sides of their boxes.
             outside = (place < self._low) | (place > self._high)
-            place[:] = np.clip(place, self._low, self._high)
+            np.clip(place, self._low, self._high, out=place)
             rate[outside] = 0.0
         else:
             self._placed[:2], self._placed[2] = reference[:2], 0.0

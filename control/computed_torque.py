@@ -18,7 +18,7 @@ from ..models.robot import Robot
 from ..plant import layout
 from ..plant.packing import bodies_of, cables_of, settings_of
 from ..solvers.in_place import InPlace
-from ..solvers.kernels.codes import OPTIMAL
+from ..solvers.status import OPTIMAL
 from .actuators import actuators
 from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command

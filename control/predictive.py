@@ -150,7 +150,7 @@ class Predictive(ComputedTorque):
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
         super().__init__(the_robot, observer=observer, reach=reach, **loops)
         self._reach = reacts if reacts.any() else np.zeros((0, 6))
-        self._followed = flies & ~far.any(axis=1)
+        self._followed = np.flatnonzero(flies & ~far.any(axis=1))
         # What is under way for longer than half of the stages would leave nothing to decide.
         delay = min(2.0 / self._loops[1], self._times[-1] / 2), self._steps[0]
         if the_robot.fixed_lengths is None:
@@ -165,6 +165,8 @@ class Predictive(ComputedTorque):
         self._sizes = count, 12 + 2 * f, m + f
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
         unknown = np.zeros(self.robot.m) if the_robot.fixed_lengths is None else self._statics
+        # How far rates let tensions go until the end of each stage.
+        self._room = self._limits[RATE_MAX] * self._times[1:, None]
         self._preview = Preview(self._steps, self._moved, unknown)
         A, B = self._at_home()
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
@@ -290,7 +292,7 @@ class Predictive(ComputedTorque):
         self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
         if self.handed_over is not None and len(self._beside._reach):
             carriers = np.stack(reference[3:6], axis=1)
-            self._moved.now(dt, self._measured[0], self._preview.rows([reference])[2][0])
+            self._moved.now(dt, self._measured[0], self._preview.moved_of(self._preview.rows([reference])))
             offsets = self._moved.offsets(carriers)
             if offsets is not None:
                 self._beside._reactions[0] = offsets
@@ -312,7 +314,7 @@ class Predictive(ComputedTorque):
     def _predict(self, time: float, dt: float, reference: Reference) -> np.ndarray | None:
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
         bounds, now = self._problems.bounds[:, 0], self._preview.rows([reference])
-        placed = self._moved.now(dt, self._measured[0], now[2][0])
+        placed = self._moved.now(dt, self._measured[0], self._preview.moved_of(now))
         if not all(np.isfinite(part).all() for part in (self._problems.w, *now)):
             self._solved = np.nan
             return None
@@ -321,8 +323,8 @@ class Predictive(ComputedTorque):
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
         # Carriers that fly are where they are, not where they should be.
-        off = self._measured[0, 1:, :3] - carriers[0, :, :3]
-        carriers[:, self._followed, :3] += off[self._followed]
+        for which in self._followed:
+            carriers[:, which, :3] += self._measured[0, 1 + which, :3] - carriers[0, which, :3]
         about = self._memory[0, DISTURBANCE], carriers, states, controls
         write_stages()(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
         h.c += ramps
@@ -337,12 +339,8 @@ class Predictive(ComputedTorque):
             self._surroundings.write(h, states, wanted, self._penalty)
         self._write_bounds(controls, planned)
         # What is left of errors and tensions near the reference must not drown in the rounding of large numbers.
-        h.c += np.einsum("kij,kj->ki", h.A, wanted[:-1]) + np.einsum("kij,kj->ki", h.B, planned[:-1]) - wanted[1:]
-        if self._surroundings.rows:
-            h.d -= np.einsum("kij,kj->ki", h.C, wanted[:-1]) + np.einsum("kij,kj->ki", h.D, planned[:-1])
-        h.u_min -= planned[:-1]
-        h.u_max -= planned[:-1]
-        h.start[:], h.states[:], h.controls[:] = start - wanted[0], states - wanted, controls - planned[:-1]
+        h.start[:], h.states[:], h.controls[:] = start, states, controls
+        h.relative_to(wanted, planned[:-1])
         warm = self._is_near and isfinite(self._solved)  # not with what is left of another flight
         h.iterations_max = ITERATIONS if warm else COLD_ITERATIONS
         h.solve(warm=warm)
@@ -353,7 +351,7 @@ class Predictive(ComputedTorque):
             self._guess = states, controls
         elif not time - self._solved <= self._times[-1]:
             return None
-        pulls = np.clip(controls[:1, :m], *bounds)
+        pulls = np.minimum(np.maximum(controls[:1, :m], bounds[0]), bounds[1])
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
         gained = (wanted[1] - start - ramps[0] + h.c[0])[6:12] + h.A[0, 6:12] @ h.start
         gained += h.B[0, 6:12, :m] @ (pulls[0] - planned[0, :m])
@@ -371,8 +369,8 @@ class Predictive(ComputedTorque):
         late = (time - self._solved) / self._steps[0]
         count = len(self._steps)
         if time - self._solved <= self._times[-1]:  # as where a command is taken from it
-            before, share = int(late), late - int(late)
-            first, second = (np.minimum(np.arange(count + 1) + before + k, count) for k in (0, 1))
+            first = np.minimum(np.arange(count + 1) + int(late), count)
+            second, share = np.minimum(first + 1, count), late - int(late)
             states = (1 - share) * self._guess[0][first] + share * self._guess[0][second]
             first, second = np.minimum(first[:-1], count - 1), np.minimum(second[:-1], count - 1)
             controls = (1 - share) * self._guess[1][first] + share * self._guess[1][second]
@@ -387,16 +385,16 @@ class Predictive(ComputedTorque):
     def _write_bounds(self, controls: np.ndarray, planned: np.ndarray) -> None:
         """Write limits of tensions, as far as their rates let them go, and of the carriers' accelerations."""
         h, m = self._horizon, self.robot.m
-        low, high, rate = self._limits[LOWEST], self._limits[HIGHEST], self._limits[RATE_MAX]
-        cut = self.cut[0]
-        last, room = self._pulls[0, LAST], rate * self._times[1:, None]
+        low, high = self._limits[LOWEST], self._limits[HIGHEST]
+        h.u_min[:, :m], h.u_max[:, :m] = low, high
         if isfinite(self._solved):
-            h.u_min[:, :m] = np.minimum(np.maximum(low, last - room), high)
-            h.u_max[:, :m] = np.maximum(np.minimum(high, last + room), low)
-        else:
-            h.u_min[:, :m], h.u_max[:, :m] = low, high
-        # A bound that is far away costs iterations, since accelerations cost so much less than tensions.
-        usual = planned[:-1, m:]
-        most = np.where(np.abs(controls[:, m:] - usual) > NEAR * self._strongest, self._strongest, np.inf)
-        h.u_min[:, m:], h.u_max[:, m:] = usual - most, usual + most
-        h.u_min[:, :m][:, cut] = h.u_max[:, :m][:, cut] = 0.0
+            last = self._pulls[0, LAST]
+            h.u_min[:, :m] = np.minimum(np.maximum(low, last - self._room), high)
+            h.u_max[:, :m] = np.maximum(np.minimum(high, last + self._room), low)
+        if self._moved.count:
+            # A bound that is far away costs iterations, since accelerations cost so much less than tensions.
+            usual = planned[:-1, m:]
+            most = np.where(np.abs(controls[:, m:] - usual) > NEAR * self._strongest, self._strongest, np.inf)
+            h.u_min[:, m:], h.u_max[:, m:] = usual - most, usual + most
+        if (cut := self.cut[0]).any():
+            h.u_min[:, :m][:, cut] = h.u_max[:, :m][:, cut] = 0.0

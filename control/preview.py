@@ -31,13 +31,14 @@ class Preview:
     """
 
     def __init__(self, steps: np.ndarray, moved: Moved, tensions: np.ndarray):
-        self._steps, self._moved, self._unknown = steps, moved, tensions
+        self._moved, self._unknown = moved, tensions
         self._times = np.concatenate([[0.0], np.cumsum(steps)])
+        self._half, self._sixth = steps[:, None] / 2, steps[:, None] ** 2 / 6
         self.reset()
 
     def reset(self) -> None:
         """Forget what was announced."""
-        self._announced: tuple[float, float, tuple[np.ndarray, ...]] | None = None
+        self._announced: tuple[float, float, tuple[np.ndarray, np.ndarray]] | None = None
 
     def follow(self, references: Sequence[Reference], period: float, start: float) -> None:
         """Receive references, one for each period from `start` on [s].
@@ -56,20 +57,30 @@ class Preview:
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
         self._announced = start, period, self.rows(references)
 
-    def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, ...]:
-        """Return platforms (K, 3, 6), carriers (K, c, 3, 6), moved coordinates (K, 3, f) and tensions (K, m)."""
-        platform = np.array([reference[:3] for reference in references])
-        carriers = np.stack([np.stack(reference[3:6], axis=1) for reference in references])
-        if len(references) > 1:
+    def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, np.ndarray]:
+        """Return motions (K, 3, 6 + 6 c + f) and tensions (K, m).
+
+        Motions are place, rate and acceleration of the platform, of all carriers and of the moved coordinates.
+        """
+        count, carriers = len(references), 6 * len(references[0][3])
+        motions = np.empty((count, 3, 6 + carriers + self._moved.count))
+        for row, reference in zip(motions, references, strict=True):
+            row[:, :6], row[:, 6 : 6 + carriers] = reference[:3], np.reshape(reference[3:6], (3, carriers))
+        platform, of_carriers = motions[..., :6], motions[..., 6 : 6 + carriers].reshape(count, 3, -1, 6)
+        if count > 1:
             platform[:, 0, 3:] = np.unwrap(platform[:, 0, 3:], axis=0)
-            carriers[:, :, 0, 3:] = np.unwrap(carriers[:, :, 0, 3:], axis=0)
-        tensions = [
-            self._unknown if each.tensions is None else np.asarray(each.tensions, dtype=float) for each in references
-        ]
-        return platform, carriers, self._moved.along(platform, carriers), np.stack(tensions)
+            of_carriers[:, 0, :, 3:] = np.unwrap(of_carriers[:, 0, :, 3:], axis=0)
+            motions[:, 0, 6 : 6 + carriers] = of_carriers[:, 0].reshape(count, -1)
+        motions[..., 6 + carriers :] = self._moved.along(platform, of_carriers.swapaxes(1, 2))
+        tensions = [self._unknown if each.tensions is None else each.tensions for each in references]
+        return motions, np.array(tensions, dtype=float)
+
+    def moved_of(self, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """Return place, rate and acceleration of the moved coordinates in the first row, (3, f)."""
+        return rows[0][0, :, rows[0].shape[2] - self._moved.count :]
 
     def at(
-        self, time: float, now: tuple[np.ndarray, ...], attitude: np.ndarray
+        self, time: float, now: tuple[np.ndarray, np.ndarray], attitude: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
 
@@ -78,27 +89,30 @@ class Preview:
         the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
         early.
         """
-        parts = None
-        if self._announced is not None:
-            start, period, rows = self._announced
-            steps = (time + self._times - start) / period
-            before = np.clip(np.floor(steps + ROUNDING), 0, len(rows[0]) - 1).astype(int)
-            announced = rows_at(rows, period * (steps - before), before, period)
-            off = announced[0][0, 0] - now[0][0, 0]
-            off[3:] -= turns(off[3:])
-            if np.abs(off).max() <= CLOSE:
-                parts = announced
-        if parts is None:
-            parts = rows_at(now, self._times, np.zeros(len(self._times), dtype=int), 1.0)
-        platform, carriers, moved, tensions = parts
-        states = np.concatenate([platform[:, 0], platform[:, 1], moved[:, 0], moved[:, 1]], axis=1)
+        first = np.zeros(len(self._times), dtype=int)
+        motions, tensions = self._announced_at(time, now) or rows_at(*now, self._times, first, 1.0)
+        place, rate, acceleration = motions.swapaxes(0, 1)
+        moved = motions.shape[2] - self._moved.count
+        states = np.concatenate([place[:, :6], rate[:, :6], place[:, moved:], rate[:, moved:]], axis=1)
         states[:, 3:6] += turns(attitude - states[0, 3:6])
-        ramp, dt = np.diff(np.concatenate([platform[:, 2], moved[:, 2]], axis=1), axis=0), self._steps[:, None]
-        further, faster = dt * dt / 6 * ramp, dt / 2 * ramp
-        ramps = np.concatenate([further[:, :6], faster[:, :6], further[:, 6:], faster[:, 6:]], axis=1)
-        controls = np.concatenate([tensions, moved[:, 2]], axis=1)
-        still = np.ascontiguousarray(carriers[:, :, :2]).reshape(len(states), -1, 12)  # poses and velocities
-        return states, still, controls, ramps
+        ramp = acceleration[1:] - acceleration[:-1]
+        further, faster = self._sixth * ramp, self._half * ramp
+        ramps = np.concatenate([further[:, :6], faster[:, :6], further[:, moved:], faster[:, moved:]], axis=1)
+        controls = np.concatenate([tensions, acceleration[:, moved:]], axis=1)
+        carriers = motions[:, :2, 6:moved].reshape(len(states), 2, -1, 6)
+        return states, carriers.swapaxes(1, 2).reshape(len(states), -1, 12), controls, ramps
+
+    def _announced_at(self, time: float, now: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return motions and tensions at all stages as they were announced, None if that was another reference."""
+        if self._announced is None:
+            return None
+        start, period, (motions, tensions) = self._announced
+        steps = (time + self._times - start) / period
+        before = np.clip(np.floor(steps + ROUNDING), 0, len(motions) - 1).astype(int)
+        announced = rows_at(motions, tensions, period * (steps - before), before, period)
+        off = announced[0][0, 0, :6] - now[0][0, 0, :6]
+        off[3:] -= turns(off[3:])
+        return announced if np.abs(off).max() <= CLOSE else None
 
 
 def turns(off: np.ndarray) -> np.ndarray:
@@ -107,17 +121,18 @@ def turns(off: np.ndarray) -> np.ndarray:
 
 
 def rows_at(
-    rows: tuple[np.ndarray, ...], after: np.ndarray, before: np.ndarray, period: float
-) -> tuple[np.ndarray, ...]:
+    motions: np.ndarray, tensions: np.ndarray, after: np.ndarray, before: np.ndarray, period: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return references at times between those that are known.
 
     Between two of them accelerations and tensions change evenly; beyond the last one accelerations stay.
 
     Parameters
     ----------
-    rows
-        Platforms (K, 3, 6), carriers (K, c, 3, 6) and moved coordinates (K, 3, f), each place, rate and acceleration,
-        and tensions (K, m) [N].
+    motions
+        (K, 3, d), each place, rate and acceleration.
+    tensions
+        (K, m) [N].
     after
         How long after a row each time is, (N,) [s].
     before
@@ -125,17 +140,13 @@ def rows_at(
     period
         From one row to the next [s].
     """
+    motion, last = motions[before], tensions[before]
     if np.abs(after).max() <= ROUNDING * period:
-        return tuple(part[before] for part in rows)
-    following = np.minimum(before + 1, len(rows[0]) - 1)
-    result = []
-    for part in rows[:3]:
-        t, motion = after.reshape(-1, *[1] * (part.ndim - 2)), part[before]
-        rate, acceleration = motion[..., 1, :], motion[..., 2, :]
-        change = t / period * (part[following][..., 2, :] - acceleration)
-        motion[..., 0, :] += t * (rate + t / 2 * (acceleration + change / 3))
-        rate += t * (acceleration + change / 2)
-        acceleration += change
-        result.append(motion)
-    last = rows[3][before]
-    return *result, last + after[:, None] / period * (rows[3][following] - last)
+        return motion, last
+    following, t = np.minimum(before + 1, len(motions) - 1), after[:, None]
+    place, rate, acceleration = motion.swapaxes(0, 1)
+    change = t / period * (motions[following, 2] - acceleration)
+    place += t * (rate + t / 2 * (acceleration + change / 3))
+    rate += t * (acceleration + change / 2)
+    acceleration += change
+    return motion, last + t / period * (tensions[following] - last)

@@ -3,7 +3,7 @@
     R(q), omega = R Omega                     for a unit quaternion q and a rate Omega in the body's axes
     dq = q (0, Omega) / 2
 
-Each coordinate of an imposed carrier is a polynomial of time, see `carrier_motion`. Its attitude goes from Euler angles
+Each coordinate of an imposed carrier is a polynomial of time. Its attitude goes from Euler angles
 to the quaternion here, with Omega = P dTheta and alpha = dP dTheta + P ddTheta.
 """
 

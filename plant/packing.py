@@ -1,4 +1,4 @@
-"""A robot and its motion as the arrays that the kernels of the plant read."""
+"""A robot and its motion as the rows and records that the plant reads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ from ..models.part import COORDINATES, inertia_matrix
 from ..models.robot import Robot
 from . import layout
 
-__all__ = ["bodies_of", "cables_of", "place", "settings_of"]
+__all__ = ["SETTINGS", "bodies_of", "cables_of", "place", "settings_of"]
+
+SETTINGS = np.dtype(  # `towline_plant` of core/plant/plant.h
+    [
+        ("drive", "i4"),
+        ("located", "i4"),
+        *((name, "f8") for name in ("carrier_bandwidth", "winch_bandwidth", "tension_lag")),
+    ]
+)
 
 
 def bodies_of(robot: Robot) -> np.ndarray:

@@ -13,13 +13,14 @@ import numpy as np
 from ..base import processors
 from ..base.errors import InputError, SolverError
 from ..base.inputs import leading, number, one_of, repeated, shown, whole_number
+from ..core import run_plant
 from ..models.batch import as_array
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
+from ..models.record import FREE, IMPOSED, RESTS, record_of
 from ..models.robot import Robot
 from . import layout
-from .machine import run_rows
-from .packing import bodies_of, cables_of, place, settings_of
+from .packing import SETTINGS, place
 from .reading import Reading
 from .samples import complete
 
@@ -54,7 +55,7 @@ class History(NamedTuple):
 
 
 class Plant:
-    """Simulate a robot: what it does for commands, step by step, in one kernel for all robots.
+    """Simulate a robot: what it does for commands, step by step.
 
     A state is a row of numbers, (n,), and the only memory: `start` makes one, `read` reads it, `step` and `run` return
     later ones. Arguments may have leading batch dimensions, which broadcast. The same arguments give the same bits.
@@ -86,11 +87,14 @@ class Plant:
         The `Robot`.
     size
         How many numbers a state has, n.
+    record
+        The robot as the numeric core reads it, with the plant's stiffness and damping; it cannot be written to.
 
     Raises
     ------
     InputError
-        If an argument has a wrong value, or forces are commanded of cables without winches. Every method raises it, in
+        If an argument has a wrong value, forces are commanded of cables without winches, or the robot has more cables
+        or carriers than the numeric core has room for. Every method raises it, in
         one line, for an argument of a wrong shape or value.
     """
 
@@ -119,14 +123,20 @@ class Plant:
             raise InputError(
                 f"contacts must be 'located' unless all cables stretch, got no stiffness of cables[{first}]"
             )
-        self._bodies, self._cables = bodies_of(self.robot), cables_of(self.robot, EA, C)
-        self._settings = settings_of(self.robot)
-        self._settings[layout.DRIVE] = DRIVES[drive]
-        self._settings[layout.LOCATE] = float(contacts == "located")
-        self._settings[layout.CARRIER_BANDWIDTH] = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e4)
-        self._settings[layout.WINCH_BANDWIDTH] = number("winch_bandwidth", winch_bandwidth, 1e-3, 1e4)
-        self._settings[layout.LAG] = number("tension_lag", tension_lag, 0.0, 1e3)
-        self._places = layout.BODY * len(self._bodies)
+        self.record = record_of(self.robot).copy()
+        self.record["cable"]["stiffness"][: self.robot.m], self.record["cable"]["damping"][: self.robot.m] = EA, C
+        self.record.flags.writeable = False
+        self._settings = np.array(
+            (
+                DRIVES[drive],
+                contacts == "located",
+                number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e4),
+                number("winch_bandwidth", winch_bandwidth, 1e-3, 1e4),
+                number("tension_lag", tension_lag, 0.0, 1e3),
+            ),
+            SETTINGS,
+        )
+        self._places = layout.BODY * (1 + len(self.robot.carriers))
         self.size = self._places + layout.CABLE_BLOCKS * self.robot.m
         self._command_size = layout.COMMANDS + self.robot.m + layout.CARRIER * len(self.robot.carriers)
 
@@ -191,17 +201,17 @@ class Plant:
         bodies = np.zeros((*batch, 1 + count, layout.BODY))
         place(bodies[..., 0, :], poses, velocities, np.array(robot.platform.com))
         place(bodies[..., 1:, :], carriers, moving, np.zeros(3))
-        kinds = self._bodies[1:, layout.MOTION]
-        bodies[..., 1:, layout.VELOCITY : layout.RATE] *= (kinds != layout.RESTS)[:, None]
-        bodies[..., 1:, layout.RATE :] *= np.isin(kinds, (layout.FREE, layout.IMPOSED))[:, None]
+        motions = self.record["body"]["motion"][1 : 1 + count]
+        bodies[..., 1:, layout.VELOCITY : layout.RATE] *= (motions != RESTS)[:, None]
+        bodies[..., 1:, layout.RATE :] *= np.isin(motions, (FREE, IMPOSED))[:, None]
         cables = np.zeros((*batch, layout.CABLE_BLOCKS, robot.m))
         if self.drive == "tensions":
             first = pulls
         elif lengths is not None:
             first = own
         else:
-            stretches = self._cables[:, layout.STIFFNESS] > 0
-            strain = np.where(stretches, pulls / np.where(stretches, self._cables[:, layout.STIFFNESS], 1.0), 0.0)
+            EA = self.record["cable"]["stiffness"][: robot.m]
+            strain = np.where(EA > 0, pulls / np.where(EA > 0, EA, 1.0), 0.0)
             first = np.maximum(dynamics_of(robot).cable_lengths(poses, carriers) / (1 + strain), layout.SHORTEST)
         cables[..., layout.LENGTH, :] = cables[..., layout.REFERENCE, :] = first
         return np.concatenate([bodies.reshape(*batch, -1), cables.reshape(*batch, -1)], axis=-1)
@@ -314,7 +324,8 @@ class Plant:
         if not math.isfinite(np.vdot(state, state) + np.vdot(rows, rows)):
             return None
         history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
-        run_rows()(0, 1, *self.arrays, state[None], rows[None], 1, dt, 1, 1, history, tensions)
+        given = np.ascontiguousarray(state), np.ascontiguousarray(rows)
+        run_plant(self.record, self._settings, given[0], given[1], history, tensions, 1, dt, 1, 1)
         return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
 
     def run(
@@ -377,29 +388,26 @@ class Plant:
         batch = leading({"state": states.shape[:-1], "commands": rows.shape[:-2]})
         count, kept = math.prod(batch), 1 + steps // keep
         history, tensions = np.empty((count, kept, self.size)), np.empty((count, kept, self.robot.m))
-        arguments = (
-            *self.arrays,
-            np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size),
-            np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:]),
-            steps,
-            period,
-            substeps,
-            keep,
-            history,
-            tensions,
-        )
+        states = np.ascontiguousarray(np.broadcast_to(states, (*batch, self.size)).reshape(count, self.size))
+        rows = np.broadcast_to(rows, (*batch, *rows.shape[-2:])).reshape(count, *rows.shape[-2:])
+        rows = np.ascontiguousarray(rows)
+
+        def run_rows(begin: int, end: int) -> None:
+            some = slice(begin, end)
+            given = states[some], rows[some], history[some], tensions[some]
+            run_plant(self.record, self._settings, *given, steps, period, substeps, keep)
+
         if threads is None:
             threads = min(processors.available(), count * steps * substeps // STEPS_WORTH_A_THREAD)
         else:
             threads = whole_number("threads", threads, 1, 10**4)
         threads = max(1, min(threads, count))
-        kernel = run_rows()
         if threads == 1:
-            kernel(0, count, *arguments)
+            run_rows(0, count)
         else:
             edges = [count * i // threads for i in range(threads + 1)]
             with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(lambda begin, end: kernel(begin, end, *arguments), edges[:-1], edges[1:]))
+                list(pool.map(run_rows, edges[:-1], edges[1:]))
         if not np.isfinite(history[:, -1]).all():
             raise SolverError(
                 f"the motion of {self.robot.name} grows beyond all numbers in steps of {period / substeps:g} s: use "
@@ -409,9 +417,9 @@ class Plant:
         return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))
 
     @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return bodies, cables and settings as the kernels read them, see `layout`."""
-        return self._bodies, self._cables, self._settings
+    def settings(self) -> np.ndarray:
+        """Return drive, contacts and bandwidths as the numeric core reads them, of `packing.SETTINGS`."""
+        return self._settings
 
     def read(self, states: np.ndarray) -> Reading:
         """Return what `states`, (..., n), are: poses [m, rad], velocities, lengths."""

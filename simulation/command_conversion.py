@@ -8,9 +8,9 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..control import Command
+from ..core import winch_lengths
 from ..plant import Plant, layout
 from .experiment import Experiment, Wind
-from .machine import write_lengths
 
 __all__ = ["Orders"]
 
@@ -21,8 +21,8 @@ class Orders:
     """Translate commands.
 
     Tensions are commanded as they are if the plant's drive has them, or winches that pull with a force. Elastic cables
-    without winches in their file are assumed to have some that measure their tension and reach it within the period,
-    see `winch_lengths`. Carriers are commanded for one instant; until the next they move as the reference does.
+    without winches in their file are assumed to have some that measure their tension and reach it within the period:
+    core/plant/winch_lengths.c. Carriers are commanded for one instant; until the next they move as the reference does.
 
     Parameters
     ----------
@@ -37,10 +37,7 @@ class Orders:
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int]):
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
         self._period, self._drive, self._fixed = conditions.period, plant.drive, robot.fixed_lengths
-        columns = plant.arrays[1]
-        self._elastic = columns[:, layout.STIFFNESS].copy(), columns[:, layout.DAMPING].copy()
-        self._first = layout.BODY * (1 + len(robot.carriers))  # of the unstrained lengths in a state
-        self._last_rates, self._write = np.full((len(seeds), robot.m), np.nan), write_lengths()
+        self._record, self._last_rates = plant.record, np.full((len(seeds), robot.m), np.nan)
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
@@ -81,8 +78,7 @@ class Orders:
             self._cables[:] = self._fixed
         else:
             tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._last_rates.shape)
-            at = self._period, layout.SHORTEST, self._rows.reshape(len(rows), -1), layout.COMMANDS
-            self._write(states, self._first, lengths, self._last_rates, tensions, *self._elastic, *at)
+            winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
         if self._moves:
             self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
             self._accelerations[:] = command.carrier_acceleration

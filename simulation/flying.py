@@ -11,12 +11,12 @@ import numpy as np
 
 from ..control import Command, Controller, Reference, State
 from ..control.command import HOLD
+from ..core import sense
 from ..plant import Plant
 from ..plant.periods import Periods
 from .checking import check_command
 from .command_conversion import Orders
 from .experiment import Experiment
-from .machine import sense_rows
 from .noise import Noise
 from .recorder import Period, Recorder
 
@@ -128,7 +128,7 @@ def fly(
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
-    sense, periods = sense_rows(), Periods(plant, period, conditions.substeps)
+    periods = Periods(plant, period, conditions.substeps)
     faults, silent_until, command = list(conditions.faults), -1.0, None
     expected: list[tuple[int, ...]] | None = None
     for k, reference in enumerate(conditions.references):
@@ -141,7 +141,7 @@ def fly(
                 periods.lose(fault.part)
             else:
                 states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.part)
-        sense(*periods.geometry, states, motions, lengths)
+        sense(plant.record, states, motions, lengths)
         reported = sensors.report(k, motions, pulls)
         if command is None or time >= silent_until:
             command = pilot.step(time, *reported, reference)

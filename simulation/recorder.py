@@ -21,7 +21,7 @@ class Period(NamedTuple):
     alive
         Which flights survive it, (N,); the others are over.
     motions, lengths
-        As `sensors.sense_rows` writes them.
+        As `core.sense` writes them.
     tensions
         Their means over the period, (N, m) [N].
     command

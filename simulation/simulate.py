@@ -26,7 +26,6 @@ from .experiment import Experiment
 from .faults import read_faults
 from .flights import flights
 from .flying import fly
-from .machine import prepare
 from .noise import Noise
 from .record import Record
 from .runs import fly_many
@@ -169,7 +168,6 @@ def simulate(
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
     if runs is None:
         where.check_alone()
-    prepare()  # not in the time of the run
     if runs is None:
         return _one(plant, pilot, experiment, first, error)
     seeds = range(first, first + whole_number("runs", runs, 1, MOST_RUNS))

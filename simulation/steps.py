@@ -8,7 +8,7 @@ import numpy as np
 
 from ..models.dynamics import dynamics_of
 from ..models.part import inertia_matrix
-from ..plant import Plant, layout
+from ..plant import Plant
 
 __all__ = ["steps_in"]
 
@@ -21,8 +21,8 @@ def steps_in(period: float, plant: Plant) -> int:
     With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
     that unit tensions cause; the largest eigenvalues of G K and G C bound frequency and decay.
     """
-    cables = plant.arrays[1]
-    stiffness, damping = cables[:, layout.STIFFNESS], cables[:, layout.DAMPING]
+    cables = plant.record["cable"][: plant.robot.m]
+    stiffness, damping = cables["stiffness"], cables["damping"]
     if plant.drive == "tensions" or not stiffness.all():
         return 1
     robot = plant.robot

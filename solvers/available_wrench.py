@@ -8,12 +8,13 @@ Krut 2010). `solvers.capacity_margin` has the nearest of them for one wrench; he
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from math import comb
 
 import numpy as np
 
+from .. import core
 from ..base.display import Displayed
+from ..core import CABLES, ROWS, full_rank
 
 RANK = 1e-9  # relative: directions that the cables hardly reach are none; twelve-digit geometry makes such
 
@@ -86,11 +87,14 @@ def facets(A: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> Facets:
 
 def spans(A: np.ndarray) -> np.ndarray:
     """Return whether the columns of each A (N, n, m) span R^n, (N,) of bool."""
-    from .facet_kernel import full_rank
-
-    full = np.empty(len(A), dtype=np.bool_)
-    full_rank(np.ascontiguousarray(A), RANK, full)
-    return full
+    count, n, m = A.shape
+    if n > ROWS or m > CABLES:
+        sigma = np.linalg.svd(A, compute_uv=False)
+        return (m >= n) & (sigma[:, -1] > RANK * sigma[:, 0])
+    full = np.zeros(count)
+    if A.size:
+        full_rank(n, RANK, np.ascontiguousarray(A), full)
+    return full > 0
 
 
 def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
@@ -107,17 +111,12 @@ def _by_rank(columns: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
 
 def _full(columns: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return normals (N, K, n) and minimum and maximum along them (N, K), of columns (N, n, m) that span R^n."""
-    from . import facet_kernel
-
     count, n, m = columns.shape
     if n == 0:
         return np.zeros((count, 1, 0)), np.zeros((count, 1)), np.zeros((count, 1))
-    subsets = np.array(list(combinations(range(m), n - 1)), dtype=np.int64).reshape(comb(m, n - 1), n - 1)
-    shared = np.zeros(len(subsets), dtype=np.int64)
-    shared[1:] = np.cumprod(subsets[1:] == subsets[:-1], axis=1).sum(axis=1)
-    normals = np.empty((count, len(subsets), n))
-    least, most = np.empty((count, len(subsets))), np.empty((count, len(subsets)))
-    facet_kernel.facets(np.ascontiguousarray(columns), low, high, subsets, shared, normals, least, most)
+    number = comb(m, n - 1)
+    normals, least, most = np.empty((count, number, n)), np.empty((count, number)), np.empty((count, number))
+    core.facets(np.ascontiguousarray(columns), low, high, normals, least, most)
     return normals, least, most
 
 

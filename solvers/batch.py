@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,21 +16,19 @@ from ..base.errors import InputError
 from ..base.inputs import leading, number, real_array, shown, whole_number
 from ..base.text import quantity
 from ..core import CABLES, ROWS, solve_rows
-from . import compiled
-from .kernels.codes import INACCURATE, INVALID, OPTIMAL, UNSURE
 from .problem import TensionProblem
 from .solution import TensionSolution
 from .solve import solve
-from .status import STATUSES, Status
+from .status import INVALID, STATUSES, UNSURE, Status
 
 __all__ = ["BatchSolution", "solve_batch"]
 
 Array = NDArray[np.float64]
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond
-# The C core takes half a microsecond to two for a row, the lanes ten times as much in NumPy, and a third of it in
-# machine code, which takes seconds to load. That pays for larger batches only, among them the blocks of workspaces.
-MOST_ROWS_OF_CORE = 8000
+BACKENDS = LANES, ONE_BY_ONE = "lanes", "c"
+NONE = np.empty(0)  # stands for equal weights
+BEYOND_THE_CORE = "python"  # the back end that is reported for sizes that it does not take
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +57,7 @@ class BatchSolution(Displayed):
     rho :
         As it was given.
     backend :
-        "c" if the C core solved all rows, else the form in which the lanes ran, "compiled" or "interpreted", on which
-        the numbers do not depend.
+        "lanes" or "c", see `solve_batch`; "python" for sizes that the C core does not take.
     """
 
     tensions: Array  # (..., m)
@@ -140,15 +138,12 @@ def solve_batch(
     Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. A row whose numbers are no problem
     (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved.
 
-    Batches of at most 8000 rows are solved by the C core, row by row, where towline was installed with it. Larger ones
-    go through lanes, which solve many rows together: their statuses are the same, and their tensions but for rounding.
-    The core solves the rows of which the lanes are not sure, and `solve` those of which the core is not sure either:
-    they lie near the boundary of the available wrench set or of the rank cut. Without the C core `solve` takes both.
+    The C core solves some rows at a time, in the lanes of the processor's vectors, and those of which lanes are not
+    sure one by one. `solve` takes the rows of which the core is not sure either: they lie near the boundary of the
+    available wrench set or of the rank cut. Statuses are those of `solve`, and so are tensions but for rounding.
+    Neither the other rows, nor their number, nor that of threads changes a bit of a row's result.
 
-    The lanes run as NumPy operations, some 0.1 s for 10,000 rows, until a process has spent as much time on them as
-    loading their machine code takes (1 s; compiling it, once on a machine, 15 s). Neither form, nor the number of
-    threads, nor what was solved before, changes a bit of the result. A program that is going to solve millions of rows
-    saves time by calling `towline.solvers.compiled.load()` first.
+    The core takes up to 6 wrench rows and 32 cables. `solve` takes all rows of larger problems, some 0.2 ms each.
 
     Parameters
     ----------
@@ -172,8 +167,8 @@ def solve_batch(
         How many threads share the rows; None = one for each 2000 rows, at most as many as there are processors. The
         result does not depend on it.
     backend :
-        "c" or "lanes" for all rows; None = as stated above. Machine code solves a batch of 1000 to 8000 rows in half of
-        the time of the C core: a program that has loaded it and solves thousands of such batches states "lanes".
+        "lanes" as stated above, or "c" for rows one by one from the first on, by the method of `solve`: for tests, and
+        for bits that are those of `solve`. None = "lanes".
 
     Raises
     ------
@@ -183,7 +178,8 @@ def solve_batch(
     start = time.perf_counter()
     if threads is not None:
         threads = whole_number("threads", threads, 1, 1024)
-    soft = 0.0 if rho is None else 1.0 / number("rho", rho, 1e-12, 1e12, also=", or None")
+    if rho is not None:
+        rho = number("rho", rho, 1e-12, 1e12, also=", or None")
     matrix = _real("A", A)
     if matrix.ndim < 2 or 0 in matrix.shape[-2:]:
         raise InputError(
@@ -201,97 +197,106 @@ def solve_batch(
     }
     core = {name: {"A": 2, "length": 0}.get(name, 1) for name in given}
     lead = leading({name: value.shape[: value.ndim - core[name]] for name, value in given.items()})
-    rows = int(np.prod(lead, dtype=np.int64))
+    problem = {
+        name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
+    }
+    rows, backend = _Rows.unsolved(int(np.prod(lead, dtype=np.int64)), n, m), _backend(backend, n, m)
+    if backend != BEYOND_THE_CORE and rows.status.size:
+        columns = [
+            (NONE, 0) if name == "weights" and weights is None else _column(value, core[name], rows.status.size, lead)
+            for name, value in given.items()
+        ]
+        _solve_by_core(rows, columns, backend == LANES, rho or 0.0, threads)
+    code = rows.status.astype(np.int8).reshape(lead)
+    _solve_others(rows, code, problem, rho)
+    return BatchSolution(
+        rows.tensions.reshape(*lead, m),
+        code,
+        rows.residual.reshape(lead),
+        rows.direction.reshape(*lead, n),
+        rows.info[:, 1].reshape(lead),
+        rows.info[:, 0].reshape(lead),
+        time.perf_counter() - start,
+        problem,
+        rho,
+        backend,
+    )
 
-    flat, per = [], np.zeros(7, np.int64)
-    for position, (name, value) in enumerate(given.items()):
-        if weights is None and name == "weights":
-            flat.append(np.empty(0))
-            continue
-        own, tail = value.shape[: value.ndim - core[name]], value.shape[value.ndim - core[name] :]
-        if np.prod(own, dtype=np.int64) != 1:
-            value = np.broadcast_to(value, lead + tail)
-            per[position] = np.prod(tail, dtype=np.int64)
-        flat.append(np.ascontiguousarray(value).reshape(-1))
 
-    tensions, direction, info, residual = (np.empty(rows * size) for size in (m, n, 2, 1))
-    status = np.full(rows, float(UNSURE))
-    kernels = compiled.current()
-    core_alone = _is_for_core(backend, rows, n, m)
-    share, together = 1, 1 if core_alone else kernels.rows_at_once
-    if together is None:  # NumPy takes all rows together
-        together = max(rows, 1)
-    else:
-        share = threads or min(processors.available(), max(1, rows // ROWS_WORTH_A_THREAD))
-    block = max(together, -(-rows // (together * share)) * together)
+class _Rows(NamedTuple):
+    """Results of the core for each row, as in `core/batch/batch.h`."""
+
+    tensions: Array  # (rows, m)
+    direction: Array  # (rows, n)
+    info: Array  # (rows, 2)
+    residual: Array  # (rows,)
+    status: Array  # (rows,)
+
+    @classmethod
+    def unsolved(cls, rows: int, n: int, m: int) -> Self:
+        status = np.full(rows, float(UNSURE))
+        return cls(np.empty((rows, m)), np.empty((rows, n)), np.empty((rows, 2)), np.empty(rows), status)
+
+
+def _column(value: Array, core: int, rows: int, lead: tuple[int, ...]) -> tuple[Array, int]:
+    """Return the numbers of all rows as (rows, ...), or those that serve all as (1, ...), and how many a row has."""
+    tail = value.shape[value.ndim - core :]
+    size = int(np.prod(tail, dtype=np.int64))
+    if value.size == size:
+        return np.ascontiguousarray(value).reshape(1, size), 0
+    return np.ascontiguousarray(np.broadcast_to(value, lead + tail)).reshape(rows, size), size
+
+
+def _solve_by_core(
+    rows: _Rows, columns: list[tuple[Array, int]], in_lanes: bool, rho: float, threads: int | None
+) -> None:
+    """Solve all rows by the core, shared among threads; those of which it is not sure stay unsure."""
+    count, m = rows.tensions.shape
+    share = threads or min(processors.available(), max(1, count // ROWS_WORTH_A_THREAD))
+    block = max(1, -(-count // share))
+    per = np.array([size for _, size in columns], dtype=np.float64)
 
     def work(first: int) -> None:
-        stop = min(first + block, rows)
-        if not core_alone:
-            kernels.many(*flat, per, soft, n, m, first, stop, tensions, direction, info, residual, status)
-        part = slice(first, stop)
-        if n <= ROWS and m <= CABLES and (status[part] == UNSURE).any():
-            given = (array[first * int(size) :] for array, size in zip(flat, per, strict=True))
-            got = (tensions[first * m : stop * m], direction[first * n : stop * n], info[2 * first : 2 * stop])
-            solve_rows(n, m, rho or 0.0, *given, per.astype(np.float64), *got, residual[part], status[part])
+        part = slice(first, first + block)
+        own = (array[part] if size else array for array, size in columns)
+        solve_rows(rows.direction.shape[1], m, rho, in_lanes, *own, per, *(array[part] for array in rows))
 
     if share == 1:
         work(0)
     else:
         with ThreadPoolExecutor(share) as pool:
-            list(pool.map(work, range(0, rows, block)))
-
-    code = status.astype(np.int8)
-    t, d, proof = tensions.reshape(rows, m), direction.reshape(rows, n), info.reshape(rows, 2)
-    problem = {
-        name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
-    }
-    if code.any():
-        without = (code != OPTIMAL) & (code != INACCURATE)
-        t[without], residual[without] = np.nan, np.nan
-        unproven = (code == OPTIMAL) | (code == INVALID) | np.isnan(proof[:, 1])
-        d[unproven], proof[unproven] = np.nan, np.nan
-        for row in np.flatnonzero(code == UNSURE):
-            index = tuple(int(i) for i in np.unravel_index(row, lead))
-            t[row], residual[row] = np.nan, np.nan
-            d[row], proof[row] = np.nan, np.nan
-            try:
-                solution = _alone(_row(problem, index), rho)
-            except InputError:
-                code[row] = INVALID
-                continue
-            code[row] = STATUSES.index(solution.status)
-            if solution.tensions is not None:
-                t[row], residual[row] = solution.tensions, solution.residual
-            if (certificate := solution.certificate) is not None:
-                d[row], proof[row] = certificate.direction, (certificate.support, certificate.shortfall)
-    else:
-        d[:], proof[:] = np.nan, np.nan
-    return BatchSolution(
-        t.reshape(*lead, m),
-        code.reshape(lead),
-        residual.reshape(lead),
-        d.reshape(*lead, n),
-        proof[:, 1].reshape(lead),
-        proof[:, 0].reshape(lead),
-        time.perf_counter() - start,
-        problem,
-        rho,
-        "c" if core_alone else kernels.backend,
-    )
+            list(pool.map(work, range(0, count, block)))
 
 
-def _is_for_core(backend: str | None, rows: int, n: int, m: int) -> bool:
-    """Return whether the C core is to solve all rows, or raise InputError."""
+def _solve_others(rows: _Rows, code: NDArray[np.int8], problem: dict[str, Array], rho: float | None) -> None:
+    """Solve the rows that are unsure by `solve`, and write their codes."""
+    for row in np.flatnonzero(code == UNSURE):
+        for array in rows[:-1]:
+            array[row] = np.nan
+        index = tuple(int(i) for i in np.unravel_index(row, code.shape))
+        try:
+            solution = _alone(_row(problem, index), rho)
+        except InputError:
+            code[index] = INVALID
+            continue
+        code[index] = STATUSES.index(solution.status)
+        if solution.tensions is not None:
+            rows.tensions[row], rows.residual[row] = solution.tensions, solution.residual
+        if (certificate := solution.certificate) is not None:
+            rows.direction[row], rows.info[row] = certificate.direction, (certificate.support, certificate.shortfall)
+
+
+def _backend(given: str | None, n: int, m: int) -> str:
+    """Return the back end for problems of this size, or raise InputError."""
     fits = n <= ROWS and m <= CABLES
-    if backend is None:
-        return fits and rows <= MOST_ROWS_OF_CORE
-    if not isinstance(backend, str) or backend not in (("c", "lanes") if fits else ("lanes",)):
+    if given is None:
+        return LANES if fits else BEYOND_THE_CORE
+    if not isinstance(given, str) or given not in BACKENDS or not fits:
         accepted = "c, lanes or None"
         if not fits:
-            accepted = f"lanes or None for {n} wrench rows and {m} cables, which the C core does not take"
-        raise InputError(f"backend must be {accepted}, got {shown(backend)}")
-    return backend == "c"
+            accepted = f"None for {n} wrench rows and {m} cables, which the C core does not take"
+        raise InputError(f"backend must be {accepted}, got {shown(given)}")
+    return given
 
 
 def _alone(problem: TensionProblem, rho: float | None) -> TensionSolution:

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from ..base.display import Displayed, record
 from ..base.errors import InputError
-from ..base.inputs import shown, whole_number
-from .stages import layout, machine
-from .stages.sizes import padded, places
+from ..base.inputs import real_array, shown, whole_number
+from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
 
 __all__ = ["Horizon", "Multipliers", "Residuals"]
 
 Array = NDArray[np.float64]
+
+COLD, WARM, SHIFTED = 0, 1, 2  # of `towline_beginning`
 
 
 class Multipliers(NamedTuple):
@@ -78,9 +79,9 @@ class Horizon(Displayed):
     subject to $x_{k+1} = A_k x_k + B_k u_k + c_k$ from a given $x_0$, $u_{\min,k} \le u_k \le u_{\max,k}$ and
     $C_k x_k + D_k u_k \le d_k + s_k$, $s_k \ge 0$. It is feasible for any data.
 
-    A predictive controller solves such a problem at each step. All arrays are parts of one, in the layout of the
-    machine code: nothing is copied, allocated or checked. Where a number is not finite or the cost is not convex, the
-    controls are still finite and inside their bounds, and the solution is not converged.
+    A predictive controller solves such a problem at each step. All arrays are parts of the memory on which the core
+    works (`core/horizon`): nothing is copied, allocated or checked. Where a number is not finite or the cost is not
+    convex, the controls are still finite and inside their bounds, and the solution is not converged.
 
     Parameters
     ----------
@@ -122,44 +123,61 @@ class Horizon(Displayed):
         N, n, m = (whole_number(name, value, 1, 1000) for name, value in (("N", N), ("n", n), ("m", m)))
         rows = whole_number("rows", rows, 0, 1000)
         self._sizes = N, n, m, rows
-        self._places, size = places(*self._sizes)
-        self._work = np.zeros(size)
-        w, wp, mp, pp = n + m, padded(n + m), padded(m), padded(rows)
+        self._memory = np.zeros(horizon_size(*self._sizes))
+        places = horizon_places(*self._sizes, self._memory)
 
-        def part(block: int, *shape: int, at: int = 0) -> Array:
-            begin = self._places[block] + at
-            return self._work[begin : begin + int(np.prod(shape))].reshape(shape)
+        def part(name: str, *shape: int) -> Array:
+            """Return an array in the memory, of which the core pads rows to multiples of four."""
+            *blocks, columns = shape
+            padded, begin = -(-columns // 4) * 4, places[name]
+            whole = self._memory[begin : begin + int(np.prod(blocks)) * padded]
+            return whole.reshape(*blocks, padded)[..., :columns]
 
-        hessian, dynamics = part(layout.HESSIAN, N + 1, w, wp), part(layout.DYNAMICS, N, n, wp)
-        self.R, self.S, self.Q = hessian[:N, :m, :m], hessian[:N, :m, m:w], hessian[:, m:w, m:w]
-        self.B, self.A = dynamics[:, :, :m], dynamics[:, :, m:w]
-        self.c, self.start = part(layout.OFFSET, N, padded(n))[:, :n], part(layout.START, n)
-        gradient, rows_of = part(layout.GRADIENT, N + 1, wp), part(layout.ROWS, N, rows, wp)
-        self.r, self.q = gradient[:N, :m], gradient[:, m:w]
-        self.D, self.C = rows_of[:, :, :m], rows_of[:, :, m:w]
-        self.u_min, self.u_max = part(layout.LOWEST, N, mp)[:, :m], part(layout.HIGHEST, N, mp)[:, :m]
+        H, G, h = part("H", N + 1, m + n, m + n), part("G", N, n, m + n), part("h", N + 1, m + n)
+        self.R, self.S, self.Q = H[:N, :m, :m], H[:N, :m, m:], H[:, m:, m:]
+        self.B, self.A, self.r, self.q = G[:, :, :m], G[:, :, m:], h[:N, :m], h[:, m:]
+        self.c, self.start = part("c", N, n), part("start", n)
+        self.u_min, self.u_max = part("u_min", N, m), part("u_max", N, m)
         self.u_min.fill(-np.inf)
         self.u_max.fill(np.inf)
-        blocks = (layout.LIMIT, layout.WEIGHT, layout.SQUARE)
-        self.d, self.penalty, self.square = [part(block, N, pp)[:, :rows] for block in blocks]
-        point, costate = part(layout.POINT, N + 1, wp), part(layout.COSTATE, N + 1, wp)
-        self.controls, self.states = point[:N, :m], point[:, m:w]
-        bounds = N * mp
-        lower, upper = (part(layout.MULTIPLIER, N, mp, at=at)[:, :m] for at in (0, bounds))
-        rows_force = part(layout.MULTIPLIER, N, pp, at=2 * bounds)[:, :rows]
-        self.multipliers = Multipliers(costate[1:, m:w], lower, upper, rows_force)
-        # Where there is no such limit, slack and multiplier stay one.
-        part(layout.SLACK, 2 * self._places[layout.PAIRS]).fill(1.0)
-        part(layout.FREE, wp)[:m] = 1.0
-        part(layout.MASK, 2 * N, pp, at=2 * bounds)[:, :rows] = 1.0
-        self._settings = np.zeros(layout.SETTINGS)
+        E = part("E", N, rows, m + n)
+        self.D, self.C = E[:, :, :m], E[:, :, m:]
+        self.d, self.penalty, self.square = (part(name, N, rows) for name in ("d", "penalty", "square"))
+        z, y = part("z", N + 1, m + n), part("y", N + 1, m + n)
+        self.controls, self.states = z[:N, :m], z[:, m:]
+        self.multipliers = Multipliers(y[1:, m:], part("lower", N, m), part("upper", N, m), part("force", N, rows))
+        self._residuals, self._count, self._converged = np.zeros(4), 0, False
         self.tolerance, self.iterations_max = 1e-8, 50
-        self._kernel = machine.solve_stages()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle the one array, whose parts the others are."""
-        state = self._work.copy(), self._settings.copy(), self.tolerance, self.iterations_max
-        return _restored, (self._sizes, *state)
+        """Copy and pickle the memory, whose parts the arrays are."""
+        solved = self._residuals.copy(), self._count, self._converged
+        return _restored, (self._sizes, self._memory.copy(), *solved, self.tolerance, self.iterations_max)
+
+    def relative_to(self, states: Array, controls: Array) -> None:
+        """Write the same problem in differences from a reference.
+
+        Start, dynamics, bounds and soft rows change, and the states and controls that a solve may begin with; costs are
+        those of differences already. Small differences are no longer lost in the rounding of large numbers.
+
+        Parameters
+        ----------
+        states, controls :
+            Of the reference, shapes (N + 1, n) and (N, m).
+
+        Raises
+        ------
+        InputError
+            If an array has another shape.
+        """
+        N, n, m, _ = self._sizes
+        given = []
+        for name, value, shape in (("states", states, (N + 1, n)), ("controls", controls, (N, m))):
+            array = np.ascontiguousarray(real_array(name, value), dtype=np.float64)
+            if array.shape != shape:
+                raise InputError(f"{name} must have shape {shape}, got {array.shape}")
+            given.append(array)
+        horizon_relative_to(*self._sizes, PROCESSOR, self._memory, *given)
 
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
         """Solve the problem in the arrays, and return whether the solution converged.
@@ -179,30 +197,45 @@ class Horizon(Displayed):
         for name, value in (("shifted", shifted), ("warm", warm)):
             if value is not True and value is not False:
                 raise InputError(f"{name} must be True or False, got {shown(value)}")
-        settings = self._settings
-        settings[layout.WARM] = layout.SHIFTED if shifted else layout.AS_IT_IS if warm else layout.COLD
-        settings[layout.TOLERANCE], settings[layout.ITERATIONS] = self.tolerance, self.iterations_max
-        self._kernel(self._work, self._places, settings)
-        return self.converged
+        beginning = SHIFTED if shifted else WARM if warm else COLD
+        self._count, self._converged = horizon_solve(
+            *self._sizes,
+            PROCESSOR,
+            beginning,
+            int(self.iterations_max),
+            self.tolerance,
+            self._memory,
+            self._residuals,
+        )
+        return self._converged
 
     @property
     def converged(self) -> bool:
         """Return whether the last solution converged."""
-        return bool(self._settings[layout.CONVERGED])
+        return self._converged
 
     @property
     def iterations(self) -> int:
         """Return how many Newton matrices the last solution took, without the one of a cold start."""
-        return int(self._settings[layout.COUNT])
+        return self._count
 
     @property
     def residuals(self) -> Residuals:
         """Return the residuals of the last solution."""
-        return Residuals(*self._settings[layout.STATIONARITY : layout.SOFT + 1].tolist())
+        return Residuals(*self._residuals.tolist())
 
 
-def _restored(sizes: tuple[int, ...], work: Array, settings: Array, tolerance: float, iterations: int) -> Horizon:
+def _restored(
+    sizes: tuple[int, ...],
+    memory: Array,
+    residuals: Array,
+    count: int,
+    converged: bool,
+    tolerance: float,
+    iterations_max: int,
+) -> Horizon:
     horizon = Horizon(*sizes)
-    horizon._work[:], horizon._settings[:] = work, settings
-    horizon.tolerance, horizon.iterations_max = tolerance, iterations
+    horizon._memory[:], horizon._residuals[:] = memory, residuals
+    horizon._count, horizon._converged = count, converged
+    horizon.tolerance, horizon.iterations_max = tolerance, iterations_max
     return horizon

@@ -7,15 +7,19 @@ from numpy.typing import NDArray
 
 from ..core import CABLES, ROWS, solve_rows
 from .batch import solve_batch
-from .kernels.codes import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 from .problem import TensionProblem
 from .solve import solve
+from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
 __all__ = ["InPlace"]
 
 Array = NDArray[np.float64]
 
 RHO = 1e8  # weight of the squared wrench error in a soft answer, beside the squared tensions
+
+# With up to so many more cables than equations lanes are as quick for one row and several times as quick for many. With
+# more, one row takes 1.5 times as long. A row has the same bits alone and among others: the shape alone decides.
+IN_LANES = 2
 
 
 class InPlace:
@@ -60,10 +64,11 @@ class InPlace:
     def _arrange(self) -> None:
         """Set the arguments of the core, which are these arrays and parts of them."""
         _, n, m = self.A.shape
+        results = (self.tensions, self.direction, self._info)
         per = np.array([n * m, n, m, m, m, 0, 0], dtype=float)  # one length and equal weights for all rows
         given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), self._lengths, per)
-        self._exact = (n, m, 0.0, *given, self.tensions, self.direction, self._info, self._residual, self.code)
-        self._soft = (n, m, RHO, *given, self.tensions, *self._spare, self._residual, self.code)
+        self._exact = (n, m, 0.0, m - n <= IN_LANES, *given, *results, self._residual, self.code)
+        self._soft = (n, m, RHO, False, *given, self.tensions, *self._spare, self._residual, self.code)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and pickles hold: without the arguments of the core, parts of arrays no longer."""
@@ -103,7 +108,7 @@ class InPlace:
         self.direction[unproven], self._info[unproven] = np.nan, np.nan
 
     def _prove_without_core(self) -> None:
-        """Decide the rows of which the core is not sure, or all without it."""
+        """Decide the rows of which the core is not sure, or all of a size that it does not take."""
         rows = np.flatnonzero(self.code == UNSURE)
         if not rows.size:
             return

@@ -11,14 +11,13 @@ from ..base.inputs import shown
 from ..core import CABLES, ROWS, solve_packed
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
-from .kernels.codes import INFEASIBLE, OPTIMAL, SINGULAR, UNSURE
 from .methods import METHODS
 from .methods.active_set import ActiveSet
 from .methods.method import Method, Proposal
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
 from .standard_form import StandardForm, standard_forms
-from .status import STATUSES
+from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES, UNSURE
 from .verify import verify
 
 __all__ = ["methods", "solve"]
@@ -68,7 +67,7 @@ def solve(
             return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
     chosen, backend = _look_up(method, backend, options)
     chosen = chosen.for_options(problem, options)
-    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core is not there, or was not sure
+    used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core does not take this size, or was not sure
 
     left, exact, forms = problem, None, list[StandardForm]()
     while True:

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.display import record
-from ..base.tolerances import AT_LIMIT, DOUBTFUL, OPTIMALITY, RANK
+from ..base.tolerances import AT_LIMIT, DECISIVE, DOUBTFUL, OPTIMALITY, RANK, SLACK
 from .box_least_squares import box_least_squares
-from .kernels.codes import DECISIVE, SLACK
 from .problem import Array, TensionProblem
 
 

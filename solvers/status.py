@@ -32,4 +32,9 @@ class Status(StrEnum):
 
 
 STATUSES = tuple(Status)
-"""By code: `kernels.codes` and `BatchSolution.code` count in this order."""
+"""By code: the C core and `BatchSolution.code` count in this order."""
+
+OPTIMAL, INFEASIBLE, SINGULAR, INACCURATE, INVALID, FAILED = range(len(STATUSES))
+
+UNSURE = len(STATUSES)
+"""Of a problem that the C core is to solve, or that it could not: see `core/batch/batch.h`."""

@@ -99,7 +99,8 @@ def test_a_cost_of_ones_own_is_worth_what_the_same_term_of_the_objective_is(robo
     assert mine.feasible
     assert other.feasible
     assert mine.objective == pytest.approx(other.objective, rel=1e-6)
-    np.testing.assert_allclose(mine.audit.tensions, other.audit.tensions[: len(mine.audit.tensions)], rtol=1e-3)
+    tensions = other.audit.tensions[: len(mine.audit.tensions)]
+    np.testing.assert_allclose(mine.audit.tensions, tensions, rtol=1e-3, atol=1e-9)  # what is slack has rounding
 
 
 def test_a_time_law_is_chosen_by_costs_of_ones_own_too():

@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.control import ComputedTorque, Reference, State
+from towline.core._core import sense
 from towline.estimation.calibration.geometry import runs
 from towline.export.step.mechanics import mechanics
 from towline.models import Dynamics, Robot, load, points, pose_from_lengths, rotation
@@ -20,8 +21,6 @@ from towline.models.part import inertia_matrix
 from towline.models.sensitivity import wrench_matrices
 from towline.ocp.tasks.scenario import _pose_in
 from towline.plant import Plant, layout
-from towline.simulation import sensors
-from towline.simulation.machine import sense_rows
 
 COUNT, UPRIGHT = 2000, 400  # poses, and how many of them are at a pitch of +-90 degrees
 ROBOTS = ["caroca-pulleys", "wang-flying"]
@@ -150,22 +149,17 @@ def test_states_of_the_plant_have_the_poses_they_began_with(case):
     same(turned, angular_motion(pose[clear, 3:], velocity[clear, 3:], np.zeros((clear.sum(), 3)))[0], 1e-9)
 
 
-@pytest.mark.parametrize("kernel", [sense_rows, lambda: sensors.sense_rows])
-def test_sensors_report_poses_and_lengths(case, kernel):
+def test_sensors_report_poses_and_lengths(case):
     robot, (pose, velocity, _), carriers, truth = case
-    some = slice(None) if kernel is sense_rows else slice(UPRIGHT - 20, UPRIGHT + 20)
     plant = Plant(robot, drive="tensions")
-    states = plant.start(pose, velocity, carriers, tensions=np.zeros(robot.m))[some].copy()
-    bodies, cables, _ = plant.arrays
-    free = bodies.copy()
-    free[:, layout.MOTION] = layout.FREE
+    states = plant.start(pose, velocity, carriers, tensions=np.zeros(robot.m))
     motions, lengths = np.zeros((len(states), 1 + carriers.shape[1], 12)), np.zeros((len(states), 2, robot.m))
-    kernel()(free, cables, np.array(robot.platform.com), states, motions, lengths)
-    same(matrices(motions[:, 0, 3:6]), truth.R[some])
-    same(motions[:, 0, :3], pose[some, :3])
-    same(lengths[:, 0], truth.lengths[some])
+    sense(plant.record, states, motions, lengths)
+    same(matrices(motions[:, 0, 3:6]), truth.R)
+    same(motions[:, 0, :3], pose[:, :3])
+    same(lengths[:, 0], truth.lengths)
     for k in range(carriers.shape[1]):
-        same(matrices(motions[:, 1 + k, 3:6]), matrices(carriers[some, k, 3:]))
+        same(matrices(motions[:, 1 + k, 3:6]), matrices(carriers[:, k, 3:]))
 
 
 def test_lengths(case):

@@ -5,7 +5,6 @@ import shutil
 import numpy as np
 import pytest
 
-from towline.core import CABLES
 from towline.solvers import TensionProblem, capacity_margin, certify, solve, solve_batch
 
 from .references import linear_program_status
@@ -14,7 +13,7 @@ from .soak.exact_problems import exact_problem
 from .soak.exactness import check, check_float
 from .soak.step_distribution import StepDistribution
 
-BACKENDS = ("lanes", *(("c",) if CABLES else ()))
+BACKENDS = ("lanes", "c")
 COUNT = 1200
 
 
@@ -115,7 +114,7 @@ def test_in_float_nothing_is_optimal_that_is_out_of_reach(steps):
 
 @pytest.mark.parametrize("seed", [seed for seed in range(40) if not exact_problem(seed).rough][:8])
 def test_the_number_of_rows_does_not_change_a_status(seed):
-    """One row, some, more than the C core takes by itself, and rows that share a matrix."""
+    """One row, some, many, and rows that share a matrix."""
     p = exact_problem(seed)
     w = np.outer(np.r_[np.linspace(-1.0, 3.0, 32), 1.0], p.w)
     rest = (p.t_min, p.t_max, p.t_ref, p.weights, p.length)
@@ -126,10 +125,10 @@ def test_the_number_of_rows_does_not_change_a_status(seed):
     sure = np.flatnonzero(
         [solve(problem_of(p._replace(w=row))).backend == "c" for row in w]
     )  # others take milliseconds
-    many, times = np.tile(w[sure], (-(-8001 // max(len(sure), 1)), 1)), [expected[row] for row in sure]
-    assert solve_batch(p.A, many, *rest).status.tolist() == times * (len(many) // max(len(sure), 1))
+    many, times = np.tile(w[sure], (200, 1)), [expected[row] for row in sure]
+    assert solve_batch(p.A, many, *rest).status.tolist() == times * 200
     rows = np.tile(p.A, (len(many), 1, 1))
-    assert solve_batch(rows, many, *rest).status.tolist() == times * (len(many) // max(len(sure), 1))
+    assert solve_batch(rows, many, *rest).status.tolist() == times * 200
 
 
 def test_margins_are_the_distances_that_problems_were_made_with():

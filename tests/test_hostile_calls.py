@@ -345,6 +345,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "Sweep.plan.index": lambda: 0,
     "N": lambda: 1,
     "Horizon.rows": lambda: 0,
+    "Horizon.relative_to.states": lambda: np.zeros((2, 6)),
+    "Horizon.relative_to.controls": lambda: np.zeros((1, 2)),
     "shifted": lambda: False,
     "warm": lambda: False,
     "Robot.parameter_values.names": lambda: ["cables[0].anchor.x"],

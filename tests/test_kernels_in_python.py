@@ -1,4 +1,4 @@
-"""Kernels of plant, sensors and controllers as plain Python, which checks every index; machine code writes anywhere."""
+"""Kernels of controllers as plain Python, which checks every index; machine code writes anywhere."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,7 @@ from towline.control import (
     thrusts,
 )
 from towline.models import load
-from towline.plant import periods, plant, rows
-from towline.simulation import command_conversion, flying, sensors, simulate, winch_lengths
+from towline.simulation import simulate
 
 PLAIN = [
     (computed_torque, "mechanics", mechanics.write_rows),
@@ -28,10 +27,6 @@ PLAIN = [
     (predictive, "aim", aiming.aim),
     (carrier_references, "directions", fixed_length_carriers.write_directions),
     (carrier_references, "carriers_of", fixed_length_carriers.write_carriers),
-    (periods, "run_rows", rows.run_rows),
-    (plant, "run_rows", rows.run_rows),
-    (flying, "sense_rows", sensors.sense_rows),
-    (command_conversion, "write_lengths", winch_lengths.write_lengths),
 ]
 FLIGHTS = [
     ("caroca-pulleys", ComputedTorque, 4),

@@ -7,12 +7,11 @@ from scipy.optimize import linprog
 from towline import load, plan
 from towline.base.errors import InputError
 from towline.control import Command, ComputedTorque, Controller, State
+from towline.core._core import sense, winch_lengths
 from towline.models import Dynamics, Robot
 from towline.ocp import Task
-from towline.plant import Plant
-from towline.plant.periods import Periods
+from towline.plant import Plant, layout
 from towline.simulation import simulate
-from towline.simulation.machine import sense_rows, write_lengths
 from towline.simulation.steps import steps_in
 from towline.simulation.trajectory import read_trajectory
 
@@ -195,13 +194,16 @@ def test_winding_makes_the_tension_that_is_ordered():
     Ordered is the mean of the second period but for the cable's own stiffness, whose tension grows until its end.
     """
     rng, period = np.random.default_rng(2), 1e-3
-    own, order = rng.uniform(1, 5, (3, 4)), rng.uniform(5, 50, (3, 4))
-    lengths = np.stack([own * rng.uniform(1, 1.002, (3, 4)), rng.normal(size=(3, 4))], axis=1)
     EA, C = rng.uniform(1e4, 1e6, 4), rng.uniform(0, 300, 4)
-    rows, last, acceleration = np.zeros((3, 9)), np.full((3, 4), np.nan), np.zeros((3, 4))
+    plant = Plant("planar-4", stiffness=EA, damping=C)
+    own, order = rng.uniform(1, 5, (3, 4)), rng.uniform(5, 50, (3, 4))
+    states, rows = plant.start(lengths=own), np.tile(plant.command(np.ones(4)), (3, 1))
+    wound = rows[:, layout.COMMANDS : layout.COMMANDS + 4]
+    lengths = np.stack([own * rng.uniform(1, 1.002, (3, 4)), rng.normal(size=(3, 4))], axis=1)
+    last, acceleration = np.full((3, 4), np.nan), np.zeros((3, 4))
     for _ in range(2):
-        write_lengths()(np.pad(own, ((0, 0), (2, 0))), 2, lengths, last, order, EA, C, period, 1e-3, rows, 5)
-        rate = lengths[:, 1] + period / 2 * acceleration - (rows[:, 5:] - own) / period  # mean, of the elongation
+        winch_lengths(plant.record, states, lengths, order, last, rows, period)
+        rate = lengths[:, 1] + period / 2 * acceleration - (wound - own) / period  # mean, of the elongation
         reached = EA * (lengths[:, 0] - own + period * rate) / own + C * rate
         np.testing.assert_allclose(reached, order, rtol=1e-8)
         acceleration = rng.normal(size=(3, 4))
@@ -226,7 +228,7 @@ def test_perfect_sensors_report_the_motion_that_a_state_was_made_of():
     carriers[:, :, 2] += 3.0
     states = plant.start(pose, velocity, carriers, moving)
     motions, lengths = np.zeros((rows, 2, 12)), np.zeros((rows, 2, robot.m))
-    sense_rows()(*Periods(plant, 1e-3, 1).geometry, states, motions, lengths)
+    sense(plant.record, states, motions, lengths)
     turn = np.mod(motions[:, 0, 3:6] - pose[:, 3:] + np.pi, 2 * np.pi) - np.pi
     near = np.abs(pose[:, 4]) < 1.5  # beyond a right angle of pitch other angles are the same attitude
     np.testing.assert_allclose(motions[near, 0, :3], pose[near, :3], atol=1e-12)

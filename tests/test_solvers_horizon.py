@@ -349,6 +349,26 @@ def test_a_shifted_start_in_a_loop():
     assert shifted < cold
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_differences_from_a_reference_have_the_solution_less_the_reference(seed):
+    """The cost (z - z_ref)' H (z - z_ref) / 2 written out, and the same in differences, without linear cost."""
+    rng = np.random.default_rng(seed)
+    one = random_problem(seed, N=7, p=seed % 3, q=None, r=None, S=None)
+    states, controls = rng.normal(size=(8, 4)), rng.normal(size=(7, 3))
+    q, r = -np.einsum("kij,kj->ki", one.Q, states), -np.einsum("kij,kj->ki", one.R, controls)
+    expected = solved(random_problem(seed, N=7, p=seed % 3, q=q, r=r, S=None), tolerance=1e-11)
+    horizon = written(one.arrays)
+    horizon.tolerance = 1e-11
+    horizon.relative_to(states, controls)
+    assert horizon.solve()
+    np.testing.assert_allclose(horizon.controls + controls, expected.controls, atol=1e-6)
+    np.testing.assert_allclose(horizon.states + states, expected.states, atol=1e-6)
+    for own, other in zip(horizon.multipliers, expected.multipliers, strict=True):
+        np.testing.assert_allclose(own, other, atol=1e-5)
+    with pytest.raises(InputError, match="controls must have shape"):
+        horizon.relative_to(states, controls[1:])
+
+
 @pytest.mark.parametrize("name", ["A", "B", "start", "Q", "R", "c", "q", "r", "C", "d", "penalty", "u_min"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
 def test_nonsense_is_answered_inside_bounds_and_forgotten(name, value):

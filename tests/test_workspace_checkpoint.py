@@ -16,7 +16,6 @@ from towline.base import checkpoint
 from towline.base.checkpoint import Kind, open_checkpoint
 from towline.base.errors import InputError
 from towline.models import load
-from towline.solvers import compiled
 from towline.workspace import Condition, StaticEquilibrium, sample, save
 from towline.workspace.run import KIND
 from towline.workspace.sampling import CHUNK
@@ -57,7 +56,6 @@ def run(checkpoint, resume, condition: Condition | None = None, **changed):
 
 def test_killed_and_resumed_is_the_identical_file(tmp_path):
     """A real process with two workers, killed as soon as some chunks are there; nobody of it lives on."""
-    compiled.keep()  # or the run would spend its first minute with that
     command = [str(TOWLINE), "workspace", "wang-flying", "--samples", "1e6", "--json", "--resume"]
     options = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     first = subprocess.Popen([*command, "killed", "--workers", "2"], **options)

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..base import processors
 from ..base.display import Displayed
-from ..solvers import compiled
 from .condition import Condition
 from .counts import Counts
 from .domain import Domain
@@ -45,11 +44,6 @@ class Counter(Displayed):
     sampler: Sampler | None
     keep: str
     samples: int
-
-    def prepare(self) -> None:
-        """Compile the kernels of a large run once, before its processes start: each would compile them for itself."""
-        if self.samples >= WORTH_KERNELS:
-            compiled.keep()
 
     def chunk(self, counts: Counts, units: np.ndarray, known: bytes | None, keep: bool) -> bytes:
         """Add the points of a chunk (n, d) to counts; return which of them are accepted, one bit a sample.

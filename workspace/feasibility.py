@@ -14,7 +14,6 @@ from ..base.inputs import required
 from ..models import Robot
 from ..models.batch import compiled
 from ..models.dynamics import dynamics_of
-from ..solvers import compiled as solver_kernels
 from ..solvers import solve_batch
 from .places import Places, check_places
 from .robust_limits import Tightened
@@ -40,7 +39,6 @@ def load_kernels(robot: Robot) -> None:
     It is never needed: without it, code that takes about ten times as long per place runs until compiling pays.
     """
     compiled(dynamics_of(robot).functions["wrench_matrix"])
-    solver_kernels.load()
 
 
 def rest_wrench(robot: Robot) -> np.ndarray:

@@ -147,8 +147,6 @@ def sample(
     if where.checkpoint is not None:
         header = _header(robot, {**requested, "samples": total, "size": size})
         opened = open_checkpoint(Path(where.checkpoint), KIND, header, where.resume)
-    if where.workers > 1 and where.scheduler is None:
-        counter.prepare()
     with start_workers(where.workers, where.scheduler) as started, opened as stored:
         _Run(counter, counts, started, stored, where.progress).count(refinement)
     result = dataset(counts, domain, keep, method, refinement)

@@ -1,6 +1,6 @@
 /*
- * The numbers by which results are judged, all relative. Those of double are those of tolerances.py and
- * kernels/codes.py: both languages give the same status.
+ * The numbers by which results are judged, all relative. Those of double that Python has too are in
+ * base/tolerances.py: both languages give the same status.
  */
 #ifndef TOWLINE_TOLERANCES_H
 #define TOWLINE_TOLERANCES_H

@@ -3,6 +3,7 @@
 #define TOWLINE_ONE_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -12,16 +13,33 @@
 #define INLINE static inline
 #endif
 
+enum { LANES = 1 };
+
 typedef double num;
+typedef int mask;
 typedef uint64_t bits;
 
 INLINE num number(double x) { return x; }
+
+INLINE num where(mask chosen, num yes, num no) { return chosen ? yes : no; }
+
+INLINE num smaller(num x, num y) { return x < y ? x : y; }
+
+INLINE num larger(num x, num y) { return x > y ? x : y; }
 
 INLINE num square_root(num x) { return sqrt(x); }
 
 INLINE num magnitude(num x) { return fabs(x); }
 
 INLINE num angle_of(num y, num x) { return atan2(y, x); }
+
+/* The numbers of a row, as those of lanes.h. */
+INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, ptrdiff_t rows, int size) {
+    (void)rows;
+    for (int i = 0; i < size; i++) {
+        to[i] = from[first * per + i];
+    }
+}
 
 INLINE bits bits_of(num x) {
     bits b;

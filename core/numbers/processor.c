@@ -13,7 +13,7 @@ static uint64_t saved_registers(void) {
 }
 
 /* By cpuid: `__builtin_cpu_supports` answers no where Clang links without its run-time library. */
-int towline_processor(void) {
+static int kind_of_processor(void) {
     enum { OSXSAVE = 1 << 27, AVX = 1 << 28, AVX2 = 1 << 5, AVX512F = 1 << 16, AVX512DQ = 1 << 17 };
     enum { YMM = 0x6, ZMM = 0xe6 };
     uint32_t a, b, c, d;
@@ -25,6 +25,21 @@ int towline_processor(void) {
         return 0;
     }
     return (b & AVX512F) && (b & AVX512DQ) && (saved & ZMM) == ZMM ? 2 : 1;
+}
+
+/*
+ * The core's only variable, for something that never changes: in a virtual machine each cpuid costs a microsecond, more
+ * than many a call. Threads may look at the same time, and see the same.
+ */
+static int known = -1;
+
+int towline_processor(void) {
+    int kind = __atomic_load_n(&known, __ATOMIC_RELAXED);
+    if (kind < 0) {
+        kind = kind_of_processor();
+        __atomic_store_n(&known, kind, __ATOMIC_RELAXED);
+    }
+    return kind;
 }
 
 #else

@@ -1,8 +1,7 @@
 /* Tension distribution for Python: one problem, and the rows of a batch. */
 #include "python/extension.h"
 
-#include <math.h>
-
+#include "batch/batch.h"
 #include "distribution/towline_core.h"
 #include "python/arrays.h"
 
@@ -67,92 +66,71 @@ PyObject *towline_py_solve_packed(PyObject *module, PyObject *const *arguments, 
 enum { A, W, T_MIN, T_MAX, T_REF, WEIGHTS, LENGTH, PER, GIVEN };      /* arrays of a batch, */
 enum { TENSIONS = GIVEN, DIRECTION, INFO, RESIDUAL, STATUS, ARRAYS }; /* and what it gets */
 
-enum { UNSURE = 6 }; /* of kernels/codes.py */
+/* Return whether an array has the numbers of all rows: `per` from one row to the next, `size` in each. */
+static int has(const arrays *given, int i, Py_ssize_t per, Py_ssize_t size, Py_ssize_t rows) {
+    const Py_ssize_t least = rows == 0 ? 0 : per * (rows - 1) + size;
+    return (per == 0 || per == size) && given->size[i] >= least;
+}
 
-/* Solve each row of a batch whose status is UNSURE, see `towline_solve_soft` if rho > 0; return how many are optimal. */
-static Py_ssize_t solve_batch(double *const *array, Py_ssize_t rows, int n, int m, double rho) {
-    Py_ssize_t optimal = 0;
-    for (Py_ssize_t row = 0; row < rows; row++) {
-        const double *given[PER];
-        if (array[STATUS][row] < UNSURE) {
-            optimal += array[STATUS][row] == TOWLINE_OPTIMAL;
-            continue;
-        }
-        for (int i = 0; i < PER; i++) {
-            given[i] = array[i] ? array[i] + row * (Py_ssize_t)array[PER][i] : NULL;
-        }
-        const towline_problem problem = {
-            n, m, given[A], given[W], given[T_MIN], given[T_MAX], given[T_REF], given[WEIGHTS], *given[LENGTH], 0};
-        towline_answer answer;
-        const towline_status status =
-            rho > 0 ? towline_solve_soft(&problem, rho, &answer) : towline_solve(&problem, &answer);
-        const int proven = status == TOWLINE_INFEASIBLE || status == TOWLINE_SINGULAR;
-        int code = (int)status;
-        if (rho > 0 && status != TOWLINE_INVALID && status != TOWLINE_OPTIMAL) {
-            code = TOWLINE_INACCURATE;
-        }
-        if (rho > 0 ? status != TOWLINE_INVALID && !answer.soft_is_proven : status == TOWLINE_INACCURATE) {
-            code = UNSURE;
-        }
-        array[STATUS][row] = code;
-        optimal += code == TOWLINE_OPTIMAL;
-        array[RESIDUAL][row] = answer.residual;
-        array[INFO][2 * row] = answer.support;
-        array[INFO][2 * row + 1] = proven ? answer.shortfall : (double)NAN;
-        for (int c = 0; c < m && code != UNSURE && (status == TOWLINE_OPTIMAL || answer.soft); c++) {
-            array[TENSIONS][row * m + c] = answer.tensions[c];
-        }
-        for (int i = 0; i < n && proven; i++) {
-            array[DIRECTION][row * n + i] = answer.direction[i];
-        }
+static int is_batch(const arrays *given, Py_ssize_t n, Py_ssize_t m) {
+    const Py_ssize_t sizes[ARRAYS] = {n * m, n, m, m, m, m, 1, 0, m, n, 2, 1, 1}, rows = given->size[STATUS];
+    int fits = n >= 1 && n <= TOWLINE_ROWS && m >= 1 && m <= TOWLINE_CABLES && given->size[PER] == PER;
+    for (int i = 0; fits && i < PER; i++) {
+        const Py_ssize_t per = (Py_ssize_t)given->of[PER][i];
+        const int equal_weights = i == WEIGHTS && given->size[i] == 0;
+        fits = equal_weights ? per == 0 : has(given, i, per, sizes[i], rows);
     }
-    return optimal;
+    for (int i = TENSIONS; fits && i < ARRAYS; i++) {
+        fits = has(given, i, sizes[i], sizes[i], rows);
+    }
+    return fits;
+}
+
+static towline_column column(const arrays *given, int i) {
+    return (towline_column){given->size[i] > 0 ? given->of[i] : NULL, (ptrdiff_t)given->of[PER][i]};
 }
 
 PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
-    Py_buffer views[ARRAYS];
-    double *array[ARRAYS];
-    int taken = 0, fits = 0;
-    Py_ssize_t optimal = 0;
-    if (count != ARRAYS + 3) {
-        PyErr_SetString(PyExc_TypeError, "solve_rows takes n, m, rho and thirteen arrays");
+    enum { N, M, RHO, IN_LANES, BEFORE };
+    arrays given;
+    if (count < BEFORE) {
+        PyErr_SetString(PyExc_TypeError, "solve_rows takes n, m, rho, in_lanes and thirteen arrays");
         return NULL;
     }
-    const long n = PyLong_AsLong(arguments[0]), m = PyLong_AsLong(arguments[1]);
-    const double rho = PyFloat_AsDouble(arguments[2]);
-    while (!PyErr_Occurred() && taken < ARRAYS) {
-        Py_ssize_t size;
-        array[taken] = numbers_of(arguments[3 + taken], &views[taken], taken >= TENSIONS, &size);
-        taken += array[taken] != NULL;
+    const long n = PyLong_AsLong(arguments[N]), m = PyLong_AsLong(arguments[M]);
+    const double rho = PyFloat_AsDouble(arguments[RHO]);
+    const int in_lanes = PyObject_IsTrue(arguments[IN_LANES]);
+    if (PyErr_Occurred() || !take(&given, arguments + BEFORE, count - BEFORE, ARRAYS, TENSIONS)) {
+        return NULL;
     }
-    if (taken == ARRAYS && n >= 1 && n <= TOWLINE_ROWS && m >= 1 && m <= TOWLINE_CABLES &&
-        views[PER].len == PER * DOUBLE) {
-        const Py_ssize_t rows = views[STATUS].len / DOUBLE;
-        const long sizes[ARRAYS] = {n * m, n, m, m, m, m, 1, 0, m, n, 2, 1, 1};
-        fits = 1;
-        for (int i = 0; i < ARRAYS; i++) {
-            const Py_ssize_t per = i < PER ? (Py_ssize_t)array[PER][i] : sizes[i];
-            const Py_ssize_t least =
-                i == PER || rows == 0 || (i == WEIGHTS && views[i].len == 0) ? 0 : per * (rows - 1) + sizes[i];
-            fits = fits && (per == 0 || per == sizes[i]) && views[i].len >= least * DOUBLE;
-            if (i == WEIGHTS && views[i].len == 0) {
-                array[i] = NULL; /* all are equal */
-                fits = fits && per == 0;
-            }
-        }
-        if (fits) {
-            Py_BEGIN_ALLOW_THREADS optimal = solve_batch(array, rows, (int)n, (int)m, rho);
-            Py_END_ALLOW_THREADS
-        }
+    Py_ssize_t optimal = 0;
+    const int fits = is_batch(&given, n, m);
+    if (fits) {
+        const towline_batch batch = {
+            (int)n,
+            (int)m,
+            rho,
+            column(&given, A),
+            column(&given, W),
+            column(&given, T_MIN),
+            column(&given, T_MAX),
+            column(&given, T_REF),
+            column(&given, WEIGHTS),
+            column(&given, LENGTH),
+            given.of[TENSIONS],
+            given.of[DIRECTION],
+            given.of[INFO],
+            given.of[RESIDUAL],
+            given.of[STATUS],
+        };
+        Py_BEGIN_ALLOW_THREADS;
+        optimal = towline_solve_batch(&batch, given.size[STATUS], in_lanes);
+        Py_END_ALLOW_THREADS;
     }
-    while (taken > 0) {
-        PyBuffer_Release(&views[--taken]);
-    }
+    release(&given);
     if (!fits) {
-        if (!PyErr_Occurred()) {
-            PyErr_SetString(PyExc_ValueError, "the arrays must be those of one batch, of a size that the core has");
-        }
+        PyErr_SetString(PyExc_ValueError, "the arrays must be those of one batch, of a size that the core has");
         return NULL;
     }
     return PyLong_FromSsize_t(optimal);

@@ -36,8 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towline.base.errors import InputError, SolverError
-from towline.core import CABLES
-from towline.solvers import TensionProblem, compiled, solve, solve_batch
+from towline.solvers import TensionProblem, solve, solve_batch
 from towline.solvers.status import STATUSES
 
 from .exact_judge import DOUBLE, FLOAT, Judge
@@ -69,7 +68,6 @@ PARTS = ("exact", "random", "float")
 
 def soak(start: int, count: int, parts: Sequence[str]) -> bool:
     """Check the problems of `count` seeds in each of `parts`, print what is wrong, and return whether nothing is."""
-    compiled.load()
     return all([_soak_part(part, range(start, start + count)) for part in parts])
 
 
@@ -139,9 +137,7 @@ def check(seeds: range, family: str = "exact", step: StepDistribution | None = N
     """Solve the problems of these seeds by all solvers, in batches of one shape, and judge."""
     report = Report(Counter(), [], 0.0)
     for members, problems, arrays in _shapes(seeds, FAMILIES[family]):
-        batches = {
-            name: solve_batch(*arrays, threads=1, backend=name) for name in ("lanes", *(("c",) if CABLES else ()))
-        }
+        batches = {name: solve_batch(*arrays, threads=1, backend=name) for name in ("lanes", "c")}
         stepped = step.solve(*arrays) if step else None
         for row, (seed, problem) in enumerate(zip(members, problems, strict=True)):
             given = {"solve": _alone(problem)}

@@ -1,0 +1,80 @@
+/*
+ * A robot in forward time: what platform, carriers and cables do for commands, in wind, step by step.
+ *
+ * A state is a row of numbers, and all that a plant remembers. It has 13 for each body, the platform first: position
+ * [m] (of the platform's CoM, of a carrier's frame), quaternion (w, x, y, z), velocity in {G} [m/s], rate in the body's
+ * own axes [rad/s]. Then it has for all cables the unstrained lengths [m] (tensions [N] where these are commanded),
+ * their rates, the lengths last commanded, and the conditions.
+ *
+ * A command is a row too: whether there is air, its velocity in {G} (3), force and moment about the CoM on the platform
+ * (6), a number for each cable, and 24 for each carrier: commands of its actuators (6), and pose, velocity and
+ * acceleration of its reference (6 each) as the command begins.
+ */
+#ifndef TOWLINE_PLANT_H
+#define TOWLINE_PLANT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "robot.h"
+
+enum {
+    TOWLINE_BODY_NUMBERS = 13,
+    TOWLINE_CABLE_BLOCKS = 4,
+    TOWLINE_PLATFORM_COMMANDS = 10,
+    TOWLINE_CARRIER_COMMANDS = 24
+};
+
+/* What the cables are commanded. */
+typedef enum { TOWLINE_LENGTHS = 0, TOWLINE_RATES = 1, TOWLINE_FORCES = 2, TOWLINE_TENSIONS = 3 } towline_drive;
+
+/* The condition of a cable: its winch works, is stuck, or the cable is cut. */
+typedef enum { TOWLINE_WORKS = 0, TOWLINE_STUCK = 1, TOWLINE_CUT = 2 } towline_condition;
+
+typedef struct {
+    int32_t drive;   /* a `towline_drive` */
+    int32_t located; /* 1: steps end where a contact changes; 0: Runge-Kutta over the kinks, for elastic cables alone */
+    double carrier_bandwidth, winch_bandwidth; /* of the servo loops [rad/s] */
+    double tension_lag;                        /* time constant of commanded tensions [s]; 0: none */
+} towline_plant;
+
+typedef struct {
+    ptrdiff_t rows;     /* states, each with commands of its own */
+    ptrdiff_t commands; /* of a row: `steps`, or one more, which says where carriers move in the last step */
+    ptrdiff_t steps;    /* commands that are held for a period each */
+    ptrdiff_t keep;     /* every so manieth state is written to the history */
+    int32_t substeps;   /* Runge-Kutta steps in a period */
+    double period;      /* [s] */
+} towline_run;
+
+/* How many numbers a state and a command have. */
+ptrdiff_t towline_plant_state_size(const towline_robot *robot);
+ptrdiff_t towline_plant_command_size(const towline_robot *robot);
+
+/*
+ * Run each row. The history (rows, 1 + steps / keep, state) gets every state of which the number is a multiple of
+ * `keep`, after the impacts of the command that begins there, and `tensions` (.., m) those there under that command
+ * [N]; at the end, the state that the last command leaves and the tensions under it.
+ */
+void towline_plant_run(const towline_robot *robot, const towline_plant *plant, const towline_run *run,
+                       const double *states, const double *commands, double *history, double *tensions);
+
+/*
+ * What perfect sensors measure of states: `motions` (rows, 1 + carriers, 12), pose and its time derivative of platform
+ * frame and carriers, and `lengths` (rows, 2, m), distances along the cables and their rates. At a pitch of 90 degrees
+ * the derivatives of roll and yaw are nan.
+ */
+void towline_plant_sense(const towline_robot *robot, ptrdiff_t rows, const double *states, double *motions,
+                         double *lengths);
+
+/*
+ * The unstrained lengths that winches without a model reach within a period, so that tensions are as ordered; see
+ * winch_lengths.c. All arrays are rows of m numbers, but `states`, whole states, `lengths`, rows of 2 m as from
+ * `towline_plant_sense`, and `commands`, `commands_per` numbers from one row's command to the next, of which those of
+ * the cables are written. `last_rates` has the rates one period before [m/s], nan if there was none, and gets those now.
+ */
+void towline_plant_winch_lengths(const towline_robot *robot, ptrdiff_t rows, double period, const double *states,
+                                 const double *lengths, const double *tensions, double *last_rates, double *commands,
+                                 ptrdiff_t commands_per);
+
+#endif

@@ -1,0 +1,72 @@
+/* The available wrench sets of many wrench matrices, for Python. */
+#include "available_wrench/available_wrench.h"
+
+#include "python/arrays.h"
+#include "python/extension.h"
+
+/* Return the matrices of an array of n x m numbers each; of a size that the core has not, none fit. */
+static int matrices_of(const arrays *given, int i, Py_ssize_t n, Py_ssize_t m, towline_matrices *matrices) {
+    if (!given->of[i] || n < 1 || n > TOWLINE_ROWS || m < 1 || m > TOWLINE_CABLES || given->size[i] % (n * m)) {
+        return 0;
+    }
+    *matrices = (towline_matrices){(int)n, (int)m, given->size[i] / (n * m), given->of[i]};
+    return 1;
+}
+
+static PyObject *none_or_refusal(arrays *given, int fits) {
+    release(given);
+    if (!fits) {
+        PyErr_SetString(PyExc_ValueError, "the arrays must be those of wrench matrices of a size that the core has");
+        return NULL;
+    }
+    Py_RETURN_NONE;
+}
+
+PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { A, LOW, HIGH, NORMALS, LEAST, MOST_, ALL };
+    arrays given;
+    towline_matrices matrices;
+    if (!take(&given, arguments, count, ALL, NORMALS)) {
+        return NULL;
+    }
+    const Py_ssize_t m = given.size[LOW], rows = given.size[LEAST];
+    const Py_ssize_t n = rows > 0 ? given.size[NORMALS] / rows : 0;
+    int fits = matrices_of(&given, A, n, m, &matrices);
+    if (fits) {
+        const Py_ssize_t facets = matrices.count * towline_facets_of((int)n, (int)m);
+        fits =
+            given.size[HIGH] == m && given.size[NORMALS] == facets * n && rows == facets && given.size[MOST_] == facets;
+    }
+    if (fits) {
+        Py_BEGIN_ALLOW_THREADS;
+        towline_facets(&matrices, given.of[LOW], given.of[HIGH], given.of[NORMALS], given.of[LEAST], given.of[MOST_]);
+        Py_END_ALLOW_THREADS;
+    }
+    return none_or_refusal(&given, fits);
+}
+
+PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { N, TOLERANCE, BEFORE };
+    enum { A, FULL, ALL };
+    arrays given;
+    towline_matrices matrices;
+    if (count < BEFORE) {
+        PyErr_SetString(PyExc_TypeError, "full_rank takes n, tolerance, A and full");
+        return NULL;
+    }
+    const Py_ssize_t n = PyLong_AsSsize_t(arguments[N]);
+    const double tolerance = PyFloat_AsDouble(arguments[TOLERANCE]);
+    if (PyErr_Occurred() || !take(&given, arguments + BEFORE, count - BEFORE, ALL, FULL)) {
+        return NULL;
+    }
+    const Py_ssize_t per = given.size[FULL] > 0 ? given.size[A] / given.size[FULL] : 0;
+    const int fits = n > 0 && matrices_of(&given, A, n, per / n, &matrices) && matrices.count == given.size[FULL];
+    if (fits) {
+        Py_BEGIN_ALLOW_THREADS;
+        towline_full_rank(&matrices, tolerance, given.of[FULL]);
+        Py_END_ALLOW_THREADS;
+    }
+    return none_or_refusal(&given, fits);
+}

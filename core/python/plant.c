@@ -1,0 +1,111 @@
+/* The plant for Python: runs of many states, sensors, and the lengths that winches are commanded. */
+#include "plant/plant.h"
+
+#include "python/arrays.h"
+#include "python/extension.h"
+
+/* Read whole numbers, and return 0 with an exception if one is none from 1 to `most`. */
+static int whole_number(PyObject *argument, Py_ssize_t most, Py_ssize_t *number) {
+    *number = PyLong_AsSsize_t(argument);
+    if (*number == -1 && PyErr_Occurred()) {
+        return 0;
+    }
+    if (*number < 1 || *number > most) {
+        PyErr_Format(PyExc_ValueError, "steps, substeps and keep must be from 1 to %zd, got %zd", most, *number);
+        return 0;
+    }
+    return 1;
+}
+
+PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, SETTINGS, STATES, COMMANDS, HISTORY, TENSIONS, ARRAYS };
+    enum { STEPS = ARRAYS, PERIOD, SUBSTEPS, KEEP, ALL };
+    arrays given;
+    Py_ssize_t steps, substeps, keep;
+    if (count != ALL) {
+        PyErr_Format(PyExc_TypeError, "run_plant takes %d arguments, got %zd", (int)ALL, count);
+        return NULL;
+    }
+    const double period = PyFloat_AsDouble(arguments[PERIOD]);
+    if ((period == -1 && PyErr_Occurred()) || !whole_number(arguments[STEPS], PTRDIFF_MAX / 2, &steps) ||
+        !whole_number(arguments[SUBSTEPS], INT32_MAX, &substeps) ||
+        !whole_number(arguments[KEEP], PTRDIFF_MAX / 2, &keep) || !take(&given, arguments, ARRAYS, ARRAYS, HISTORY)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    int fits = robot && given.of[SETTINGS] && given.view[SETTINGS].len == (Py_ssize_t)sizeof(towline_plant);
+    for (int i = STATES; i < ARRAYS; i++) {
+        fits = fits && given.of[i];
+    }
+    if (fits) {
+        const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
+        const Py_ssize_t rows = given.size[STATES] / size, kept = 1 + steps / keep;
+        const Py_ssize_t commands = rows ? given.size[COMMANDS] / width / rows : steps;
+        fits = given.size[STATES] == rows * size && given.size[COMMANDS] == rows * commands * width &&
+               commands >= steps && (!rows || kept <= PTRDIFF_MAX / rows / (size * DOUBLE)) &&
+               given.size[HISTORY] == rows * kept * size && given.size[TENSIONS] == rows * kept * robot->cables;
+        if (fits) {
+            const towline_run run = {rows, commands, steps, keep, (int32_t)substeps, period};
+            Py_BEGIN_ALLOW_THREADS;
+            towline_plant_run(robot, (const void *)given.of[SETTINGS], &run, given.of[STATES], given.of[COMMANDS],
+                              given.of[HISTORY], given.of[TENSIONS]);
+            Py_END_ALLOW_THREADS;
+        }
+    }
+    return done(&given, fits);
+}
+
+PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, STATES, MOTIONS, LENGTHS, ALL };
+    arrays given;
+    if (!take(&given, arguments, count, ALL, MOTIONS)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    int fits = robot && given.of[STATES] && given.of[MOTIONS] && given.of[LENGTHS];
+    if (fits) {
+        const Py_ssize_t size = towline_plant_state_size(robot), rows = given.size[STATES] / size;
+        fits = given.size[STATES] == rows * size && given.size[MOTIONS] == rows * 12 * (1 + robot->carriers) &&
+               given.size[LENGTHS] == rows * 2 * robot->cables;
+        if (fits) {
+            Py_BEGIN_ALLOW_THREADS;
+            towline_plant_sense(robot, rows, given.of[STATES], given.of[MOTIONS], given.of[LENGTHS]);
+            Py_END_ALLOW_THREADS;
+        }
+    }
+    return done(&given, fits);
+}
+
+PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, STATES, LENGTHS, TENSIONS, LAST_RATES, COMMANDS, ARRAYS, PERIOD = ARRAYS, ALL };
+    arrays given;
+    if (count != ALL) {
+        PyErr_Format(PyExc_TypeError, "winch_lengths takes %d arguments, got %zd", (int)ALL, count);
+        return NULL;
+    }
+    const double period = PyFloat_AsDouble(arguments[PERIOD]);
+    if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, LAST_RATES)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    int fits = robot != NULL;
+    for (int i = STATES; i < ARRAYS; i++) {
+        fits = fits && given.of[i];
+    }
+    if (fits) {
+        const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
+        const Py_ssize_t rows = given.size[STATES] / size, m = robot->cables;
+        const Py_ssize_t per = rows ? given.size[COMMANDS] / rows : width;
+        fits = given.size[STATES] == rows * size && given.size[LENGTHS] == rows * 2 * m &&
+               given.size[TENSIONS] == rows * m && given.size[LAST_RATES] == rows * m &&
+               given.size[COMMANDS] == rows * per && per >= width;
+        if (fits) {
+            towline_plant_winch_lengths(robot, rows, period, given.of[STATES], given.of[LENGTHS], given.of[TENSIONS],
+                                        given.of[LAST_RATES], given.of[COMMANDS], per);
+        }
+    }
+    return done(&given, fits);
+}
