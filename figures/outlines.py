@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.netcdf import Variable
+from ..base.netcdf import Variable, numbers_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["outline_variables", "outlines_from"]
 
@@ -25,9 +29,19 @@ def outline_variables(regions: Sequence[Sequence[np.ndarray]]) -> dict[str, Vari
     }
 
 
-def outlines_from(points: np.ndarray, numbers: np.ndarray) -> list[list[np.ndarray]]:
-    """Return the lines of each region from `keep_out` (n, 3) [m] and `keep_out_region` (n,)."""
-    gaps = np.isnan(points).any(axis=1)
+def outlines_from(dataset: xr.Dataset, where: str) -> list[list[np.ndarray]]:
+    """Return the lines of each region that a dataset, named `where` in errors, has; none without regions.
+
+    Raises
+    ------
+    InputError
+        If its variables are no outlines.
+    """
+    if "keep_out" not in dataset:
+        return []
+    points = numbers_of(dataset, "keep_out", (-1, 3), where, gaps=True)
+    numbers = numbers_of(dataset, "keep_out_region", (len(points),), where)
+    gaps = np.isnan(points[:, 0])
     regions: dict[float, list[np.ndarray]] = {}
     for rows in np.split(np.arange(len(points)), np.flatnonzero(gaps) + 1):
         if len(line := points[rows[~gaps[rows]]]):

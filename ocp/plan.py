@@ -76,7 +76,7 @@ class Plan(PlanData, Filmed, Reported):
     def _scene(self, times: np.ndarray) -> Scene:
         from ..statics.scene import scene
 
-        return scene(self.trajectory, times)
+        return scene(self.scenario.robot, self.trajectory, times)
 
     def _report(self) -> Report:
         from .reports.drawings import drawings

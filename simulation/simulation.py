@@ -166,7 +166,7 @@ class Simulation(SimulationData, Filmed, Reported):
     def _scene(self, times: np.ndarray) -> Scene:
         from ..statics.scene import scene
 
-        return scene(self.trajectory, times)
+        return scene(self.robot, self.trajectory, times)
 
     def _report(self) -> Report:
         largest = f"error of at most {quantity(1e3 * self.error.max(), 'mm')}"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.inputs import file_path, number, real_array, shown
-from ..base.netcdf import check_units, load_netcdf
+from ..base.netcdf import load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
 from ..models.parsing import validate
 from ..models.part import LARGEST
@@ -123,10 +123,11 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     needed = (*_PARTS, *(f"carrier_{part}" for part in _PARTS), "time")
     if why := dataset.attrs.get("no_reference"):
         raise InputError(f"reference must be a plan whose motion a robot can follow, got {why}")
+    read = partial(numbers_of, dataset, where="reference", largest=LARGEST)
     missing = [name for name in needed if name not in dataset]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
-    if "phase_load" in dataset and (loads := _array(dataset, "phase_load")).any():
+    if "phase_load" in dataset and (loads := read("phase_load", (-1,))).any():
         raise InputError(
             f"reference must be a plan without loads, which flights do not carry, got one of {loads.max():g} kg"
         )
@@ -135,10 +136,10 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     count, m = len(robot.carriers), robot.m
     if (name and name != robot.name) or dataset["carrier_pose"].shape[1:] != (count, 6):
         raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
-    nodes = _array(dataset, "time", (-1,))
+    nodes = read("time", (-1,))
     n = len(nodes)
-    platform = [_array(dataset, part, (n, 6)) for part in _PARTS]
-    carriers = [_array(dataset, f"carrier_{part}", (n, count, 6)) for part in _PARTS]
+    platform = [read(part, (n, 6)) for part in _PARTS]
+    carriers = [read(f"carrier_{part}", (n, count, 6)) for part in _PARTS]
     for poses in (platform[0], carriers[0]):  # those of a flight are measured, and may jump by turns
         poses[..., 3:] = np.unwrap(poses[..., 3:], axis=0)
     if n < 2 or nodes[0] < 0 or np.diff(nodes).min() < SHORTEST:
@@ -148,8 +149,8 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
-    keep_out = _outlines(dataset)
-    planned = _array(dataset, "tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
+    keep_out = outlines_from(dataset, "reference")
+    planned = read("tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
         return Trajectory(float(nodes[-1]), at, keep_out=keep_out)
@@ -158,37 +159,6 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
     return Trajectory(float(nodes[-1]), at, tensions, keep_out)
-
-
-def _outlines(dataset: xr.Dataset) -> list[list[np.ndarray]]:
-    """Return the outlines of the regions to keep out of, which a film of the run draws."""
-    if "keep_out" not in dataset:
-        return []
-    points = _array(dataset, "keep_out", (*dataset["keep_out"].shape[:1], 3), gaps=True)
-    return outlines_from(points, _array(dataset, "keep_out_region", (len(points),)))
-
-
-def _array(
-    dataset: xr.Dataset, name: str, shape: tuple[int, ...] | None = None, gaps: bool = False
-) -> NDArray[np.float64]:
-    """Return a copy of a variable's numbers, of any shape or of this one; nan only with `gaps`, for what is not known.
-
-    Raises
-    ------
-    InputError
-        If they are anything else.
-    """
-    check_units(name, dataset[name].attrs)
-    values = dataset[name].values
-    accepted = f"numbers up to {LARGEST:g}" + ("" if shape is None else f" of shape {shape}".replace("-1", "n"))
-    fits = shape is None or (len(shape) == values.ndim and shape in (values.shape, (-1,)))
-    if values.dtype.kind not in "fiu" or not fits:
-        given = f"{values.dtype.name} of shape {values.shape}"
-        raise InputError(f"reference must be a plan whose {name} has {accepted}, got {given}")
-    wrong = values[~((np.abs(values) <= LARGEST) | (gaps & np.isnan(values)))]
-    if wrong.size:
-        raise InputError(f"reference must be a plan whose {name} has {accepted}, got {wrong[0]:g}")
-    return values.astype(np.float64)
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

@@ -29,13 +29,13 @@ def simulated(planned):
 def test_a_file_has_all_that_a_film_draws(name, request, tmp_path):
     result, times = request.getfixturevalue(name), np.array([0.0, 0.04, 0.1])
     saved = xr.load_dataset(result.save(tmp_path / "result.nc"), engine="h5netcdf")
-    own, of_file = (dataclasses.asdict(scene(dataset, times)) for dataset in (result.trajectory, saved))
+    own, of_file = (dataclasses.asdict(scene(load("cogiro"), dataset, times)) for dataset in (result.trajectory, saved))
     np.testing.assert_equal(of_file, own)
     assert own["title"] == {"planned": "cogiro, task: feasible", "simulated": "cogiro, flight: passed"}[name]
 
 
 def test_what_is_drawn_is_where_the_robot_was(simulated):
-    drawn = scene(simulated.trajectory, np.array([0.02]))
+    drawn = scene(simulated.robot, simulated.trajectory, np.array([0.02]))
     row = round(0.02 / simulated.period)
     pose, carriers = simulated.record.motions[row, 0, :6], simulated.record.motions[row, 1:, :6]
     lengths = Dynamics(load("cogiro")).cable_lengths(pose, carriers)
@@ -44,7 +44,7 @@ def test_what_is_drawn_is_where_the_robot_was(simulated):
 
 
 def test_a_simulation_draws_the_regions_that_its_plan_keeps_out_of(planned, simulated):
-    ball, post = scene(simulated.trajectory, np.zeros(1)).obstacles
+    ball, post = scene(simulated.robot, simulated.trajectory, np.zeros(1)).obstacles
     np.testing.assert_allclose(np.linalg.norm(np.vstack(ball) - BALL["centre"], axis=1), BALL["radius"])
     np.testing.assert_array_equal(np.ptp(np.vstack(post), axis=0), [1, 1, 3])
     assert len(post) == 12

@@ -19,4 +19,4 @@ def film(replay: Replay) -> bytes:
         path = Path(folder) / "film.gif"
         speed = min(max(replay.duration / LONGEST, 1.0), FASTEST)
         when = timing(path, replay.duration, float(f"{speed:.2g}"), RATE)
-        return draw(scene(replay.dataset, when.times), when, path).read_bytes()
+        return draw(scene(replay.robot, replay.dataset, when.times), when, path).read_bytes()

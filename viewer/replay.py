@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..base.errors import InputError
 from ..base.inputs import printable
-from ..base.netcdf import check_units
+from ..base.netcdf import numbers_of
 from ..figures.outlines import outlines_from
 from ..models import Robot
 from ..models.parsing import parse_yaml
@@ -26,7 +26,6 @@ from .snapshot import Snapshot, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
-LARGEST = 1e12  # of any number: velocities and tensions of real machines are far below
 LONGEST = 100  # letters of a text of the file
 
 
@@ -72,21 +71,21 @@ class Replay:
         self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
         self.title = printable(str(dataset.attrs.get("title", self.robot.name)), LONGEST)
         self.geometry = Geometry(self.robot)
-        self.times = _array(dataset, "time", (-1,), where, largest=FARTHEST)
+        self.times = numbers_of(dataset, "time", (-1,), where, largest=FARTHEST)
         n, c = len(self.times), len(self.robot.carriers)
-        self._pose = _array(dataset, "pose", (n, 6), where, largest=FARTHEST)
+        self._pose = numbers_of(dataset, "pose", (n, 6), where, largest=FARTHEST)
         self._velocity, self._acceleration = (
-            _array(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
+            numbers_of(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
         )
-        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
-        self.tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
+        self._carriers = numbers_of(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
+        self.tensions = numbers_of(dataset, "tensions", (n, self.robot.m), where, gaps=True)
         self.reference = (
-            _array(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
+            numbers_of(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
         )
         self._words = _answers(dataset) if self._flown else None
-        self._cut = _array(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
+        self._cut = numbers_of(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
         self._events = _events(dataset) if self._flown else []
-        self.obstacles = _outlines(dataset, where)
+        self.obstacles = outlines_from(dataset, where)
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
         self._points = self.geometry(self._pose, self._carriers)
@@ -196,38 +195,3 @@ def _events(dataset: xr.Dataset) -> list[tuple[float, str]]:
     except (ValueError, KeyError, TypeError):
         return []
     return [(at, f"{at:.4g} s: {printable(what, LONGEST)}") for at, what in found]
-
-
-def _outlines(dataset: xr.Dataset, where: str) -> list[list[np.ndarray]]:
-    if "keep_out" not in dataset.variables:
-        return []
-    points = _array(dataset, "keep_out", (-1, 3), where, gaps=True)
-    return outlines_from(points, _array(dataset, "keep_out_region", (len(points),), where))
-
-
-def _array(
-    dataset: xr.Dataset,
-    name: str,
-    shape: tuple[int, ...],
-    where: str,
-    gaps: bool = False,
-    largest: float = LARGEST,
-) -> np.ndarray:
-    """Return a variable as numbers of the expected shape, -1 for any length; `gaps` permits nan."""
-    if name not in dataset.variables or dataset[name].dtype.kind not in "fiu":
-        given = f"an array of {dataset[name].dtype}" if name in dataset.variables else "none"
-        raise InputError(f"{where}: {name} must be an array of numbers, got {given}")
-    try:
-        check_units(name, dataset[name].attrs)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    values = dataset[name].to_numpy().astype(float)
-    fits = len(values.shape) == len(shape) and all(
-        want in (-1, have) for want, have in zip(shape, values.shape, strict=True)
-    )
-    if not fits:
-        raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")
-    wrong = ~(np.abs(values) <= largest) & ~(gaps & np.isnan(values))
-    if wrong.any():
-        raise InputError(f"{where}: {name} must have numbers up to {largest:g}, got {values[wrong][0]:g}")
-    return values

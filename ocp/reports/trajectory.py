@@ -11,7 +11,7 @@ from ...figures.outlines import outline_variables
 from ...models.dimensions import dimensions
 from ...models.parsing import to_yaml
 from ..result import PlanData
-from .outlines import outline
+from .keep_out import outline
 
 __all__ = ["output_rows", "trajectory"]
 
