@@ -97,7 +97,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Statement:
-    """What a paper states, and the sentences of the verdicts on it, as `claims.yaml` of a study has them.
+    """A statement of a paper, and the sentences of the verdicts on it, as `claims.yaml` of a study has them.
 
     All texts may have fields such as `{least:.1f}`, whose names begin with a small letter; whoever computes the claim
     gives their values.
