@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .estimation.calibration import Calibration, Measurements, calibrate, read_measurements
     from .export.step import export_step
     from .models import Dynamics, Robot, available, load
-    from .ocp import Plan, Planner, Sweep, Task, Timing, plan, read_task, sweep, time_along
+    from .ocp import Plan, Planner, Sweep, Task, plan, read_task, sweep, time_along
     from .simulation import Simulation, simulate
     from .solvers import Certificate, TensionProblem, TensionSolution, methods, solve, solve_batch
     from .statics.distribution import tensions
@@ -33,7 +33,7 @@ _HOMES = {
     "models": ("Dynamics", "Robot", "available", "load"),
     "solvers": ("Certificate", "TensionProblem", "TensionSolution", "methods", "solve", "solve_batch"),
     "statics.distribution": ("tensions",),
-    "ocp": ("Plan", "Planner", "Sweep", "Task", "Timing", "plan", "read_task", "sweep", "time_along"),
+    "ocp": ("Plan", "Planner", "Sweep", "Task", "plan", "read_task", "sweep", "time_along"),
     "workspace": ("sample",),
     "estimation.calibration": ("Calibration", "Measurements", "calibrate", "read_measurements"),
     "control": ("Controller",),
@@ -64,7 +64,6 @@ __all__ = [
     "Task",
     "TensionProblem",
     "TensionSolution",
-    "Timing",
     "TowlineError",
     "available",
     "calibrate",

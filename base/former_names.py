@@ -29,6 +29,8 @@ NOW = {
 # Where each name is now, and its new name if it was renamed: the old one goes with the next release.
 MOVED = {
     (None, "Flight"): ("simulation", "Simulation"),
+    (None, "Timing"): ("ocp", "Plan"),
+    ("ocp", "Timing"): ("ocp", "Plan"),
     ("simulation", "Flight"): ("simulation", "Simulation"),
     ("models", "PoseEstimate"): ("estimation", None),
     ("models", "PoseTracker"): ("estimation", None),

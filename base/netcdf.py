@@ -22,7 +22,7 @@ from .writing import whole_file
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Contents", "Variable", "check_units", "load_netcdf", "save_netcdf"]
+__all__ = ["Contents", "Variable", "check_units", "load_netcdf", "numbers_of", "save_netcdf"]
 
 _alone = threading.Lock()
 LARGEST = 4_000_000_000  # [bytes]; an hour of a flight with a sample each millisecond
@@ -147,3 +147,30 @@ def check_units(name: str, attributes: Mapping[Any, Any]) -> None:
     given = attributes.get("units", accepted)
     if accepted and not (isinstance(given, str) and given == accepted):
         raise InputError(f"{name} must have the units {accepted!r}, got {shown(given)}")
+
+
+def numbers_of(
+    dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False, largest: float = 1e12
+) -> np.ndarray:
+    """Return a copy of a variable's numbers, of the expected shape, -1 for any length; `gaps` permits nan.
+
+    Raises
+    ------
+    InputError
+        Naming the dataset as `where`, if they are anything else.
+    """
+    if name not in dataset.variables or dataset[name].dtype.kind not in "fiu":
+        given = f"an array of {dataset[name].dtype}" if name in dataset.variables else "none"
+        raise InputError(f"{where}: {name} must be an array of numbers, got {given}")
+    try:
+        check_units(name, dataset[name].attrs)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    values = dataset[name].to_numpy().astype(float)
+    fits = values.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, values.shape, strict=True))
+    if not fits:
+        raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")
+    wrong = ~(np.abs(values) <= largest) & ~(gaps & np.isnan(values))
+    if wrong.any():
+        raise InputError(f"{where}: {name} must have numbers up to {largest:g}, got {values[wrong][0]:g}")
+    return values

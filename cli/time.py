@@ -33,7 +33,8 @@ def time(
     still air counts; without `wind` there are no aerodynamic forces. Any other wind or limit, a tube and a free base
     are refused.
 
-    The result is a task file with the timed motion; `towline plan` can audit it like any other task.
+    The motion is audited as every plan is. The result is a task file with the time law in it, which `towline plan`
+    reads like any other task.
     """
     from ..models import load
     from ..ocp import read_task, time_along
@@ -41,13 +42,15 @@ def time(
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-timed.yaml")
     check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml")})
-    timing = time_along(loaded, read, grid=grid)
-    file = timing.save_task(target, f"{read.name[:54]}-timed") if timing.feasible else None
+    found = time_along(loaded, read, grid=grid)
+    file = None
+    if found.feasible:
+        file = found.scenario.task.model_copy(update={"name": f"{read.name[:54]}-timed"}).save(target)
     if as_json:
-        print_json({**timing.to_dict(), "file": file})
+        print_json({**found.to_dict(), "file": file})
     else:
-        typer.echo(timing.report())
+        typer.echo(found.report())
         if file is not None:
             print_written([file])
-    if not timing.feasible:
+    if not found.feasible:
         raise typer.Exit(1)

@@ -8,67 +8,14 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
 from . import style
 from .drawing import Drawing
 
-PAGE = Template("""\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title>
-<style>
-:root { color-scheme: light dark;
-  --ink: #222; --paper: #fff; --faint: #555; --line: #ddd; --box: #f6f6f6; --link: #0057a0; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #e4e4e4; --paper: #17191c; --faint: #a9adb2; --line: #3c4046; --box: #22252a; --link: #7cbcf5; }
-}
-body { font: 16px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 46rem;
-  margin: 0 auto; padding: 0.5rem 1rem 3rem; overflow-wrap: anywhere; }
-a { color: var(--link); }
-h1 { font-size: 1.5rem; margin: 0.8rem 0 0.3rem; }
-h2 { font-size: 1.1rem; margin: 1.6rem 0 0.3rem; }
-h3 { font-size: 1rem; margin: 1.2rem 0 0.2rem; }
-.status { border-left: 0.4rem solid $colour; padding: 0.3rem 0.8rem; background: var(--box); margin: 0.6rem 0; }
-table { border-collapse: collapse; width: 100%; }
-th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.8rem 0.25rem 0; border-top: 1px solid var(--line); }
-th { font-weight: 600; width: 9.5rem; }
-.wide { overflow-x: auto; }
-table.columns th { width: auto; }
-table.columns td, table.columns th { overflow-wrap: break-word; }  /* whole words decide the widths */
-tr.more th, tr.more td { border-top: 0; padding-top: 0; }
-figure { margin: 1.2rem 0; }
-.side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(20rem, 100%), 1fr)); gap: 0 1rem; }
-/* Figures stay dark on white in either scheme: their colours are chosen for paper. */
-img { width: 100%; max-width: 32rem; height: auto; display: block; margin: auto; background: #fff;
-  border-radius: 0.3rem; }
-figcaption, footer, .source { color: var(--faint); font-size: 0.9rem; }
-details { border-top: 1px solid var(--line); padding: 0.25rem 0; }
-details > table, details > figure { margin: 0.3rem 0 0.8rem 1rem; width: calc(100% - 1rem); }
-summary { cursor: pointer; }
-pre { overflow-x: auto; font-size: 0.8rem; background: var(--box); padding: 0.6rem; overflow-wrap: normal; }
-@media (max-width: 40rem) {
-  th { width: 6.5rem; }
-  /* Each cell in a line of its own, behind the name of its column. */
-  table.columns tr.heads { display: none; }
-  table.columns tr { display: block; border-top: 1px solid var(--line); padding: 0.4rem 0; }
-  table.columns td { display: block; border-top: 0; padding: 0.1rem 0; }
-  table.columns td::before { content: attr(data-label) ": "; color: var(--faint); }
-}
-</style>
-</head>
-<body>
-<h1>$title</h1>
-<p class="status"><strong>$word</strong>: $summary</p>
-$parts
-<footer>towline $version</footer>
-</body>
-</html>
-""")
+PAGE = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
 
 
 class Link(NamedTuple):

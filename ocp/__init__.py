@@ -1,13 +1,15 @@
-"""Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; timing."""
+"""Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; time laws."""
 
+from typing import TYPE_CHECKING, Any
+
+from ..base.former_names import moved_name
 from .plan import Plan
 from .planner import Planner, plan
 from .sweeps.result import Sweep
 from .sweeps.run import sweep
 from .tasks.status import MotionStatus
 from .tasks.task import Task, read_task
-from .timing.fastest_law import time_along
-from .timing.timing import Timing
+from .timing.time_along import time_along
 
 __all__ = [
     "MotionStatus",
@@ -15,9 +17,15 @@ __all__ = [
     "Planner",
     "Sweep",
     "Task",
-    "Timing",
     "plan",
     "read_task",
     "sweep",
     "time_along",
 ]
+
+
+if not TYPE_CHECKING:  # a type checker would accept any name
+
+    def __getattr__(name: str) -> Any:
+        """Return what a former name stands for."""
+        return moved_name("ocp", name)

@@ -74,9 +74,9 @@ class Plan(PlanData, Filmed, Reported):
         return self.scenario.duration
 
     def _scene(self, times: np.ndarray) -> Scene:
-        from .reports.scene import scene
+        from ..statics.scene import scene
 
-        return scene(self, times)
+        return scene(self.scenario.robot, self.trajectory, times)
 
     def _report(self) -> Report:
         from .reports.drawings import drawings

@@ -55,7 +55,6 @@ from .tasks.paths import AnyPath
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
 from .tasks.task import Task, read_task
-from .timing.timing import Timing
 
 LEAST_SHARE = 1e-9  # of robots that must keep their limits, or that need not
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
@@ -65,7 +64,7 @@ def plan(
     robot: Robot | str | os.PathLike[str],
     task: Task | dict[str, Any] | str | os.PathLike[str],
     progress: Progress | None = None,
-    start: Plan | Timing | AnyPath | dict[str, Any] | None = None,
+    start: Plan | AnyPath | dict[str, Any] | None = None,
     initial: Initial | Measured | dict[str, Any] | None = None,
     robust: float | None = None,
 ) -> Plan:
@@ -87,7 +86,7 @@ def plan(
     progress
         Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
     start
-        Where to start: a plan of the same robot for a similar task, a timing, or a path for the platform (or a mapping
+        Where to start: a plan of the same robot for a similar task, or a path for the platform (or a mapping
         with its keys) in the frame of the task's path. Default: a guess of the planner's own.
     initial
         The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a mapping with
@@ -163,9 +162,7 @@ class Planner(Displayed):
         plan = replace(plan, stages=tuple(search.stages))
         return plan if self._share is None else judged(plan, self.scenario.robot, self._share)
 
-    def plan(
-        self, progress: Progress | None = None, start: Plan | Timing | AnyPath | dict[str, Any] | None = None
-    ) -> Plan:
+    def plan(self, progress: Progress | None = None, start: Plan | AnyPath | dict[str, Any] | None = None) -> Plan:
         """Plan; from `start`, else from the last solution, else from a guess.
 
         Raises
@@ -334,15 +331,15 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     if own and scenario.task.objective.time is None:
         return None, own
     with search.stage("timing") as stage:
-        timing, stage.message = fastest(scenario)
-    if timing is None:
+        fast, stage.message = fastest(scenario)
+    if fast is None or fast.law is None:
         return None, own
-    if timing.duration is not None and span.min <= timing.duration <= span.max:
-        chosen = scenario.along(timing.path, timing.duration)
+    if fast.feasible and span.min <= fast.duration <= span.max:
+        chosen = scenario.along(fast.law.path, fast.duration)
         audit = search.audit_motion(chosen, None, "audit with the fastest time law")
         return (Plan(chosen, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None), own
-    too_slow = timing.duration is not None and BOUND * timing.duration > span.max
-    if own or not (too_slow or timing.certificate is not None):
+    too_slow = fast.feasible and BOUND * fast.duration > span.max
+    if own or not (too_slow or fast.law.certificate is not None):
         return None, own
     # No law is fast enough, or there is a place that no law passes. The slowest motion is the closest one.
     slowest = scenario.lasting(span.max)

@@ -28,6 +28,7 @@ from .warnings.warnings import warnings
 
 if TYPE_CHECKING:
     from .audits.robust_margin import RobustMargin
+    from .timing.fastest_law import FastestLaw
 
 __all__ = ["PlanData", "Relaxed"]
 
@@ -66,6 +67,9 @@ class PlanData(Displayed):
         How the tensions differ between the robots of the uncertainty; None unless the task requires it.
     offers
         Computes `relaxations`.
+    law
+        The fastest time law along the path, or where there is none, with the limits that are active along it; None for
+        other plans than those of `time_along`.
     """
 
     scenario: Scenario
@@ -82,6 +86,7 @@ class PlanData(Displayed):
     objective: float | None = None
     robust: RobustMargin | None = None
     offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
+    law: FastestLaw | None = field(default=None, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the relaxations, which are computed now, rather than what computes them."""
@@ -95,6 +100,11 @@ class PlanData(Displayed):
     def feasible(self) -> bool:
         """Return whether the audit confirms every tension limit, and every other limit of task and robot."""
         return self.status is MotionStatus.FEASIBLE
+
+    @property
+    def duration(self) -> float:
+        """Return how long the motion lasts [s]; where a path has no time law, that is of one that shows the path."""
+        return self.scenario.duration
 
     @property
     def tension_min(self) -> float | None:
@@ -215,6 +225,7 @@ class PlanData(Displayed):
             "feasible": self.feasible,
             "status": self.status.value,
             "reason": self.reason,
+            "duration": self.duration,
             "tension_min": self.tension_min,
             "tension_max": self.tension_max,
             "margin": self.margin,
@@ -232,6 +243,8 @@ class PlanData(Displayed):
             "relaxations": [relaxed.to_dict() for relaxed in self.relaxations],
             "phases": [phase._asdict() for phase in self.phases],
             "stages": [stage._asdict() for stage in self.stages],
+            **({} if self.law is None else self.law.to_dict()),
+            **({} if self.law is None or self.law.exists else {"duration": None}),
         }
 
 

@@ -43,6 +43,8 @@ class Experiment(NamedTuple):
         Of the sensors.
     faults
         In the order of their times.
+    keep_out
+        Outlines of the regions that the reference keeps out of, see `Trajectory`.
     """
 
     period: float
@@ -52,6 +54,7 @@ class Experiment(NamedTuple):
     disturbance: np.ndarray
     noise: Noise
     faults: tuple[Fault, ...]
+    keep_out: Sequence[Sequence[np.ndarray]]
 
     __repr__ = record
 

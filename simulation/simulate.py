@@ -114,7 +114,7 @@ def simulate(
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     reference
-        A plan, the NetCDF file of one, a timing, a path (also as a mapping, as in a task), or a pose (6,) to stay at.
+        A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to stay at.
     controller
         Default: `ComputedTorque(robot)`. One run calls its `reset` and uses it as it is; many use copies, unless it
         accepts batches.
@@ -193,6 +193,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         disturbance=meets.disturbance,
         noise=required("noise", meets.noise, Noise),
         faults=read_faults(robot, meets.events, periods * period, events),
+        keep_out=trajectory.keep_out,
     )
 
 

@@ -17,6 +17,7 @@ from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import quantity
 from ..control import ANSWERS
 from ..figures.drawn import Filmed
+from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
@@ -127,9 +128,11 @@ class Simulation(SimulationData, Filmed, Reported):
             variables["wind"] = over(("time", "axis"), self.wind[rows], "m/s", "velocity of the air in G")
         variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
         variables["t_max"] = over(("cable",), robot.t_max, "N", "largest tension allowed")
+        variables |= outline_variables(self.conditions.keep_out)
+        status = "passed" if self.passed else "failed"
         attributes = {
-            "title": f"towline flight of {robot.name}",
-            "status": "passed" if self.passed else "failed",
+            "title": f"{robot.name}, flight: {status}",
+            "status": status,
             "tolerance_m": self.tolerance,
             "robot": to_yaml(robot),
             "conditions": json.dumps({"seed": self.seed, **self.conditions.to_dict()}),
@@ -161,9 +164,9 @@ class Simulation(SimulationData, Filmed, Reported):
         return self.times[-1]
 
     def _scene(self, times: np.ndarray) -> Scene:
-        from .scene import scene
+        from ..statics.scene import scene
 
-        return scene(self, times)
+        return scene(self.robot, self.trajectory, times)
 
     def _report(self) -> Report:
         largest = f"error of at most {quantity(1e3 * self.error.max(), 'mm')}"

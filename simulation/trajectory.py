@@ -1,17 +1,18 @@
-"""`Trajectory`: the reference of a flight over time, from a plan, its file, a timing, a path or a pose."""
+"""`Trajectory`: the reference of a flight over time, from a plan, its file, a path or a pose."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.inputs import file_path, number, real_array, shown
-from ..base.netcdf import check_units, load_netcdf
+from ..base.netcdf import load_netcdf, numbers_of
+from ..figures.outlines import outlines_from
 from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Trajectory", "read_trajectory"]
 
-ACCEPTED = "a plan, the NetCDF file of one, a timing, a path or a pose (6,)"
+ACCEPTED = "a plan, the NetCDF file of one, a path or a pose (6,)"
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -39,11 +40,14 @@ class Trajectory(NamedTuple):
         each.
     tensions
         Returns the planned tensions at times, (n, m) [N]; None if none are planned.
+    keep_out
+        For each region that a plan keeps out of, the lines that outline it, (n, 3) each in {G} [m].
     """
 
     duration: float | None
     at: Callable[[np.ndarray], tuple[Motion, Motion]]
     tensions: Callable[[np.ndarray], np.ndarray] | None = None
+    keep_out: Sequence[Sequence[np.ndarray]] = ()
 
 
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
@@ -64,8 +68,6 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
         from ..ocp import Task
 
         return _of_path(robot, validate({"path": reference}, Task, "reference").path, duration)
-    if callable(getattr(reference, "motion", None)) and hasattr(reference, "bottlenecks"):
-        return _of_timing(reference)
     if callable(getattr(reference, "at", None)):
         return _of_path(robot, reference, duration)
     try:
@@ -109,18 +111,6 @@ def _of_path(robot: Robot, path: Any, duration: float | None) -> Trajectory:
     return Trajectory(lasting, at)
 
 
-def _of_timing(timing: Any) -> Trajectory:
-    lasting = timing.duration
-    if lasting is None:
-        raise InputError("reference must be a feasible timing, got an infeasible one")
-
-    def at(times: np.ndarray) -> tuple[Motion, Motion]:
-        platform, carriers = timing.motion(np.minimum(times, lasting))
-        return _resting(platform, times, lasting), _resting(carriers, times, lasting)
-
-    return Trajectory(lasting, at)
-
-
 def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
     """Return a motion that rests after its end."""
     pose, velocity, acceleration = (np.array(part) for part in motion)
@@ -131,10 +121,13 @@ def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
 def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes."""
     needed = (*_PARTS, *(f"carrier_{part}" for part in _PARTS), "time")
+    if why := dataset.attrs.get("no_reference"):
+        raise InputError(f"reference must be a plan whose motion a robot can follow, got {why}")
+    read = partial(numbers_of, dataset, where="reference", largest=LARGEST)
     missing = [name for name in needed if name not in dataset]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
-    if "phase_load" in dataset and (loads := _array(dataset, "phase_load")).any():
+    if "phase_load" in dataset and (loads := read("phase_load", (-1,))).any():
         raise InputError(
             f"reference must be a plan without loads, which flights do not carry, got one of {loads.max():g} kg"
         )
@@ -143,10 +136,10 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     count, m = len(robot.carriers), robot.m
     if (name and name != robot.name) or dataset["carrier_pose"].shape[1:] != (count, 6):
         raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
-    nodes = _array(dataset, "time", (-1,))
+    nodes = read("time", (-1,))
     n = len(nodes)
-    platform = [_array(dataset, part, (n, 6)) for part in _PARTS]
-    carriers = [_array(dataset, f"carrier_{part}", (n, count, 6)) for part in _PARTS]
+    platform = [read(part, (n, 6)) for part in _PARTS]
+    carriers = [read(f"carrier_{part}", (n, count, 6)) for part in _PARTS]
     for poses in (platform[0], carriers[0]):  # those of a flight are measured, and may jump by turns
         poses[..., 3:] = np.unwrap(poses[..., 3:], axis=0)
     if n < 2 or nodes[0] < 0 or np.diff(nodes).min() < SHORTEST:
@@ -156,38 +149,16 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
-    planned = _array(dataset, "tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
+    keep_out = outlines_from(dataset, "reference")
+    planned = read("tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
-        return Trajectory(float(nodes[-1]), at)
+        return Trajectory(float(nodes[-1]), at, keep_out=keep_out)
 
     def tensions(times: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
-    return Trajectory(float(nodes[-1]), at, tensions)
-
-
-def _array(
-    dataset: xr.Dataset, name: str, shape: tuple[int, ...] | None = None, gaps: bool = False
-) -> NDArray[np.float64]:
-    """Return a copy of a variable's numbers, of any shape or of this one; nan only with `gaps`, for what is not known.
-
-    Raises
-    ------
-    InputError
-        If they are anything else.
-    """
-    check_units(name, dataset[name].attrs)
-    values = dataset[name].values
-    accepted = f"numbers up to {LARGEST:g}" + ("" if shape is None else f" of shape {shape}".replace("-1", "n"))
-    fits = shape is None or (len(shape) == values.ndim and shape in (values.shape, (-1,)))
-    if values.dtype.kind not in "fiu" or not fits:
-        given = f"{values.dtype.name} of shape {values.shape}"
-        raise InputError(f"reference must be a plan whose {name} has {accepted}, got {given}")
-    wrong = values[~((np.abs(values) <= LARGEST) | (gaps & np.isnan(values)))]
-    if wrong.size:
-        raise InputError(f"reference must be a plan whose {name} has {accepted}, got {wrong[0]:g}")
-    return values.astype(np.float64)
+    return Trajectory(float(nodes[-1]), at, tensions, keep_out)
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

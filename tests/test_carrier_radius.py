@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from towline import Robot, load, plan
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.models.rotor_discs import rotor_discs
-from towline.ocp.reports.scene import scene
+from towline.statics.scene import scene
 from towline.viewer.shapes import rotors
 
 QUAD = {
@@ -162,6 +162,6 @@ def test_pictures_draw_that_radius():
     up = Rotation.from_euler("ZYX", carriers[..., 5:2:-1].reshape(-1, 3)).as_matrix()[:, :, 2].reshape(3, 4, 3)
     np.testing.assert_allclose(np.einsum("kcpi,kci->kcp", arms, up), 0, atol=1e-12)
     task = {"path": {"kind": "rest", "pose": [0, 0, 0]}, "duration": 1, "base": {"kind": "hold"}}
-    drawn = scene(plan(robot, task), np.array([0.0, 1.0])).rotors
+    drawn = scene(robot, plan(robot, task).trajectory, np.array([0.0, 1.0])).rotors
     np.testing.assert_allclose(drawn, rotor_discs(robot, robot.carrier_home[None]).repeat(2, axis=0), atol=1e-9)
     assert rotor_discs(load("cogiro"), load("cogiro").carrier_home[None]).size == 0

@@ -80,7 +80,7 @@ def test_without_a_law_there_is_a_proof_and_no_file(folder):
     assert not list(folder.glob("*-timed.yaml"))
     text = run("time", "heavy.yaml", "lift.yaml", cwd=folder).stdout
     assert text.startswith("hoist, lift: INFEASIBLE, short by 4.62 N at s = ")
-    assert "is the worst place of the path (s = 0 at its start, 1 at its end)" in text
+    assert "of the path (0 at its start, 1 at its end), where no time law is feasible" in text
 
 
 @pytest.mark.parametrize(

@@ -47,8 +47,8 @@ def results():
         "infeasible Plan": blocked,
         "Simulation": short,
         "Simulation with nan": broken,
-        "Timing": quick,
-        "infeasible Timing": towline.time_along(robot, LIFT | {"path": LIFT["path"] | {"end": [9, 0, 0]}}),
+        "Plan of time_along": quick,
+        "blocked time_along": towline.time_along(robot, LIFT | {"path": LIFT["path"] | {"end": [9, 0, 0]}}),
         "Sweep": towline.sweep(robot, LIFT, {"duration": [0.2, 3]}),
         "TensionSolution": tensions(robot, robot.home),
         "infeasible TensionSolution": away,
@@ -73,7 +73,7 @@ def held(value, depth=3):
             continue  # which are computed for seconds, or are among the results
         try:
             part = getattr(value, name, None)
-        except towline.TowlineError:  # an infeasible timing has no path
+        except towline.TowlineError:
             continue
         if type(part).__module__.startswith("towline") and not callable(part):
             yield from held(part, depth - 1)
@@ -113,9 +113,7 @@ def test_a_table_of_at_most_20_rows_with_one_picture(results):
         rows = {row[0].text: row[1].text for row in page.iter("tr")}
         assert 1 <= len(rows) <= 20, name
         pictures = list(page.iter(f"{SVG}svg"))
-        drawn = (
-            name.endswith(("Robot", "Plan", "Simulation", "nan", "TensionSolution", "Calibration")) or name == "Timing"
-        )
+        drawn = name.endswith(("Robot", "Plan", "time_along", "Simulation", "nan", "TensionSolution", "Calibration"))
         assert len(pictures) == drawn, name
         assert page.find("p/strong").text.startswith(repr(result).splitlines()[0][:100]), name
         first = re.match(r"  (.+?): ", repr(result).splitlines()[1])

@@ -80,7 +80,6 @@ NOT_CALLED = {
     "State",
     "Sweep",
     "TensionSolution",
-    "Timing",
     "evaluate",  # of a condition: `holds` checks the arguments and calls it
     "serve",  # a context: the tests of the viewer enter it
 }
@@ -194,7 +193,7 @@ def a_sweep() -> towline.Sweep:
 
 
 @cache
-def time_law() -> towline.Timing:
+def time_law() -> towline.Plan:
     return time_along(ROBOT, {"path": LINE}, grid=10)
 
 
@@ -259,7 +258,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "progress": lambda: None,
     "grid": lambda: 10,
     "times": lambda: np.zeros(2),
-    "path": lambda: time_law().parametrised.path,
+    "path": lambda: time_law().law.parametrised.path,
     "file": lambda: "file.nc",
     "Plan.animate.file": lambda: "film.gif",
     "Simulation.animate.file": lambda: "film.gif",
@@ -418,7 +417,6 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Simulation": lambda: towline.simulate(ROBOT, robot().home, duration=0.02),
     "Planner": a_planner,
     "Plan": a_plan,
-    "Timing": time_law,
     "Sweep": a_sweep,
     "TensionProblem": problem,
     "TensionSolution": lambda: solve(problem()),

@@ -145,6 +145,9 @@ def test_former_names_can_be_imported():
     for package in (towline, towline.simulation):
         with pytest.warns(DeprecationWarning, match="Flight is called Simulation now"):
             assert package.Flight is towline.Simulation
+    for package in (towline, towline.ocp):
+        with pytest.warns(DeprecationWarning, match="Timing is called Plan now"):
+            assert package.Timing is towline.Plan
     assert towline.models.pose_from_lengths is towline.estimation.pose_from_lengths
 
 

@@ -83,7 +83,14 @@ def test_without_any_compiler_one_line_says_what_to_install(sources):
     ]
 
 
-def test_a_wheel_has_the_core(sources, tmp_path):
+def data_files():
+    """The files that packages read beside their modules, by their names in a wheel."""
+    beside = (file for init in ROOT.glob("*/**/__init__.py") for file in init.parent.iterdir())
+    files = [file.relative_to(ROOT) for file in beside if file.suffix in (".yaml", ".json", ".html", ".js")]
+    return {f"towline/{file.as_posix()}" for file in files if not {"tests", "build"} & set(file.parts)}
+
+
+def test_a_wheel_has_the_core_and_what_packages_read(sources, tmp_path):
     """It solves as this installation does, on its own."""
     compilers = [os.environ["PATH"]] if shutil.which(sysconfig.get_config_var("CC").split()[0]) else []
     compilers += [""] if find_spec("ziglang") else []
@@ -94,6 +101,7 @@ def test_a_wheel_has_the_core(sources, tmp_path):
         wheel = run(f"{BACKEND}; print(backend.build_wheel('dist{number}'))", sources, path)
         with ZipFile(sources / f"dist{number}" / wheel) as archive:
             archive.extractall(tmp_path / str(number))
+            assert data_files() <= set(archive.namelist())
         folder, _, numbers = run(SOLVE, tmp_path, "", PYTHONPATH=str(tmp_path / str(number))).partition(" ")
         assert Path(folder) == tmp_path / str(number) / "towline"
         printed.add(numbers)

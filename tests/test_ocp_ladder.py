@@ -174,7 +174,7 @@ class TestTiming:
         assert "timing" in names(easy)
         assert easy.deviation is not None  # the program's
         # It did choose what costs less.
-        timed = Planner(robot, timing.task()).plan()
+        timed = Planner(robot, timing.scenario.task).plan()
         task = easy.scenario.task
         assert cost(easy) < timed.scenario.duration / 1.0 + np.mean(
             np.sum((timed.audit.tensions / robot.force_scale) ** 2, axis=1)
@@ -185,7 +185,7 @@ class TestTiming:
         given = scenario("cogiro", path=WAYPOINTS, duration=2, margin=20)
         timing, _ = fastest(given)
         looks = given.path.by_fraction(np.linspace(0, 1, 40_001)).pose[:, :3]
-        walked = timing.motion(np.linspace(0, timing.duration, 200))[0].pose[:, :3]
+        walked = timing.scenario.motion(np.linspace(0, timing.duration, 200), None)[0].pose[:, :3]
         nearest = [np.linalg.norm(looks - point, axis=1).min() for point in walked]
         assert max(nearest) < 1e-4  # the looks lie 1e-4 apart
         # The path's own law on the same spline cannot be faster.
@@ -211,13 +211,13 @@ class TestTiming:
         given = scenario(robot, **task)
         start = deviation_from(given, timing)
         moved, _ = given.lasting(start.nodes[-1]).motion(start.nodes, start)
-        wanted, _ = timing.motion(start.nodes)
+        wanted, _ = timing.scenario.motion(start.nodes, None)
         for mine, its in zip(moved, wanted, strict=True):
             # The last node is read off the cubic before it, which a timing is not.
             np.testing.assert_allclose(mine[:-1], its[:-1], atol=1e-9)
         assert start.nodes[-1] == pytest.approx(timing.duration)
         assert plan(robot, {**task, "duration": 3}, start=timing).feasible
-        with pytest.raises(InputError, match="start must be a timing of robot 'ipanema-1'"):
+        with pytest.raises(InputError, match="start must be a plan of robot 'ipanema-1'"):
             plan(load("ipanema-1"), {**task, "duration": 3}, start=timing)
 
 
@@ -247,7 +247,7 @@ def test_wrong_starts_are_refused():
     planner = Planner(load("cogiro"), {"path": LINE, "duration": 3, "tube": TUBE, "steps": 10})
     with pytest.raises(InputError, match=r"start\.frame must be 'world', as that of the task's path, got 'quad'"):
         planner.plan(start={"kind": "rest", "pose": [0, 0, 2], "frame": "quad"})
-    with pytest.raises(InputError, match=r"start must be a Plan, a Timing, a path .*, got 3"):
+    with pytest.raises(InputError, match=r"start must be a Plan, a path .*, got 3"):
         planner.plan(start=3)
     with pytest.raises(InputError, match="kind"):
         planner.plan(start={"kind": "spiral"})

@@ -21,10 +21,11 @@ from towline.figures.style import typeset
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.excess import Excess
+from towline.ocp.reports.keep_out import outline
 from towline.ocp.reports.report import headline, sections, spans_table, stages_table
-from towline.ocp.reports.scene import outline, scene
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 from towline.solvers import TensionProblem, certify
+from towline.statics.scene import scene
 
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.2 * np.pi}
 FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
@@ -252,7 +253,7 @@ def test_scene_has_the_cables_where_the_dynamics_has_them(name):
     path = {"kind": "line", "start": list(there), "end": list(there + 0.1)}
     found = plan(robot, {"path": path, "duration": 1})
     times = np.array([0.0, 0.25, 1.0])
-    shown = scene(found, times)
+    shown = scene(found.scenario.robot, found.trajectory, times)
     rows = [0, 250, 1000]
     lengths = Dynamics(robot).cable_lengths(found.audit.motion.pose[rows], found.audit.carriers.pose[rows])
     np.testing.assert_allclose(np.linalg.norm(shown.anchors - shown.attachments, axis=2), lengths, rtol=1e-12)
@@ -285,7 +286,7 @@ def test_carriers_that_tilt_tell_so_and_obstacles_are_in_the_film(tmp_path):
     largest = np.degrees(np.arccos((np.cos(pose[:, 3]) * np.cos(pose[:, 4])).min()))
     assert number(tilt.removeprefix("up to ")) == pytest.approx(largest, rel=1e-3)
     assert tilt.endswith("(limit 17.19 degrees)")
-    assert [len(lines) for lines in scene(found, np.zeros(1)).obstacles] == [12]
+    assert [len(lines) for lines in scene(found.scenario.robot, found.trajectory, np.zeros(1)).obstacles] == [12]
     with Image.open(found.animate(tmp_path / "post.gif", fps=5)) as picture:
         assert picture.n_frames == 11
 

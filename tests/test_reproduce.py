@@ -5,19 +5,21 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from towline import studies
 from towline.base.errors import SolverError
 from towline.figures import style
 from towline.figures.drawing import Drawing
 from towline.models import Dynamics, load
 from towline.studies.accounts import text
 from towline.studies.accounts.account import Chapter, Paper, gather
-from towline.studies.accounts.claim import Verdict, compared, repaired, stated, undetermined, value_text
+from towline.studies.accounts.claim import Statement, Verdict, statements, value_text
 from towline.studies.accounts.files import write
 from towline.studies.flying import (
     balance,
@@ -77,26 +79,41 @@ def verdict(part, name):
 
 
 def test_a_verdict_follows_from_the_numbers():
-    words = {"agrees": "yes", "differs": "no"}
-    near = compared("a", "Eq. 1", "x", (1.0, 2.0), (1.0, 2.05), within=0.1, **words)
-    far = compared("a", "Eq. 1", "x", (1.0, 2.0), (1.0, 2.15), within=0.1, **words)
+    words = {"agrees": "yes", "differs": "no", "works": "yes", "fails": "no"}
+    statement = Statement("a", "Eq. 1", "x", printed=(1.0, 2.0), within=0.1, **words)
+    near, far = (statement.compared((1.0, second)) for second in (2.05, 2.15))
     assert (near.verdict, near.why) == (Verdict.REPRODUCED, "yes")
     assert (far.verdict, far.why) == (Verdict.DIFFERS, "no")
-    assert compared("a", "Eq. 1", "x", 1.0, float("nan"), within=0.1, **words).verdict is Verdict.DIFFERS
-    never = stated("b", "Eq. 2", "x", None, "y", holds=False, otherwise=Verdict.IMPOSSIBLE, **words)
-    assert never.verdict is Verdict.IMPOSSIBLE
-    reasons = {"works": "yes", "fails": "no"}
-    possible, not_found = (repaired("c", "VI", "x", 1.0, holds=holds, **reasons) for holds in (True, False))
+    assert statement.compared(float("nan"), printed=1.0).verdict is Verdict.DIFFERS
+    assert statement.stated("y", False, otherwise=Verdict.IMPOSSIBLE).verdict is Verdict.IMPOSSIBLE
+    bare = replace(statement, printed=None)
+    possible, not_found = (bare.repaired(1.0, holds) for holds in (True, False))
     assert (possible.verdict, possible.why, possible.printed) == (Verdict.REPAIRED, "yes", None)
     assert (not_found.verdict, not_found.why) == (Verdict.NOT_DETERMINED, "no")
     assert value_text((1.0, 2.5), "m") == "(1, 2.5) m"
     assert value_text(-0.0, "N") == "0 N"
 
 
+def test_the_sentences_of_a_claim_have_its_values_and_its_frames():
+    statement = Statement("a-{n}", "Eq. {n}", "In {G}, {x:.1f} {unit}.", unit="{unit}", missing="Of {what}.")
+    claim = statement.undetermined(1.0, n=2, x=0.25, unit="m", what="{n}")
+    assert (claim.id, claim.place, claim.statement, claim.unit) == ("a-2", "Eq. 2", "In {G}, 0.2 m.", "m")
+    assert claim.why == "Of {n}."
+    with pytest.raises(KeyError, match="what"):
+        statement.undetermined(1.0, n=2, x=0.25, unit="m")
+
+
+@pytest.mark.parametrize("paper", ["flying", "towing"])
+def test_each_statement_is_computed(paper):
+    folder = Path(studies.__file__).parent / paper
+    sources = "".join(file.read_text() for file in folder.glob("*.py"))
+    assert [name for name in statements(folder / "claims.yaml") if f'"{name}"' not in sources] == []
+
+
 def example(name, **broken):
     """An account of two claims, one of them of text that would break a table or a page."""
-    good = compared("good", "Eq. 1", "says", 1.0, 1.0, within=0.1, agrees="so", differs="no", figure="plot")
-    nasty = undetermined("bad", "Eq. 2", "a | b <script>", None, "c\nd", missing="<b>not</b> printed")
+    good = Statement("good", "Eq. 1", "says", printed=1.0, within=0.1, agrees="so", figure="plot").compared(1.0)
+    nasty = Statement("bad", "Eq. 2", "a | b <script>", missing="<b>not</b> printed").undetermined("c\nd")
     canvas = style.figure()
     style.axes(canvas, "x [m]", "y [m]").plot([0, 1], [0, 1])
     drawings = {"plot": Drawing("A plot", canvas)}
@@ -130,7 +147,7 @@ def test_an_account_is_written_from_the_same_claims(tmp_path):
 
 
 def test_a_repair_is_no_claim_of_the_paper(tmp_path):
-    other = repaired("other", "VI", "Not in the paper: x.", 1.0, holds=True, works="It works.", fails="no")
+    other = Statement("other", "VI", "Not in the paper: x.", works="It works.").repaired(1.0, True)
     account = example("small", Two=lambda: Chapter([other]))
     assert account.summary() == ("2 claims: 1 reproduced, 1 not determined; 1 repaired, which are not in the paper")
     errata = text.errata(account)

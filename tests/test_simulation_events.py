@@ -9,7 +9,7 @@ from matplotlib import pyplot
 
 from towline import load, simulate
 from towline.figures.cut_cables import drawn_ends
-from towline.simulation.scene import scene
+from towline.statics.scene import scene
 from towline.viewer import read
 from towline.viewer.labels import readout
 
@@ -84,7 +84,7 @@ def test_figures_mark_the_instants(failed):
 
 
 def test_a_cut_cable_hangs_from_its_anchor(failed):
-    drawn = scene(failed, np.array([0.7, 0.9]))
+    drawn = scene(failed.robot, failed.trajectory, np.array([0.7, 0.9]))
     assert drawn.cut.tolist() == [[False] * 6, [False, False, True, False, False, False]]
     ends = drawn_ends(drawn.anchors, drawn.attachments, drawn.cut)
     assert (ends[0] == drawn.attachments[0]).all()

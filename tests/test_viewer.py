@@ -400,7 +400,7 @@ def test_texts_from_files_do_not_reach_the_terminal_as_commands(folder, tmp_path
 
 def test_names_from_files_cannot_be_code(folder, tmp_path):
     saved = xr.load_dataset(folder / "line.nc").isel(time=slice(3))
-    saved.attrs["status"] = "</title><script>alert(1)</script>"
+    saved.attrs["title"] = "</title><script>alert(1)</script>"
     saved.to_netcdf(tmp_path / "hostile.nc", engine="h5netcdf")
     page = save_page(read(str(tmp_path / "hostile.nc")), tmp_path / "page.html").read_text()
     assert "alert(1)" in page

@@ -15,9 +15,9 @@ from towline.base.errors import InputError
 from towline.figures.animation import timing
 from towline.models import load
 from towline.ocp import plan
+from towline.statics.scene import scene
 from towline.viewer import read, serve
 from towline.viewer.curves import Curves, curves
-from towline.viewer.film import scene
 from towline.viewer.replay import Replay
 
 from .viewer_wire import Wire
@@ -119,7 +119,7 @@ def test_a_film_of_the_saved_instants_is_sent_while_the_view_goes_on(wire, folde
         assert picture.n_frames == int(2 * 12.5) + 1
         assert picture.info["duration"] == 80
     replay = read(str(folder / "line.nc")).replay
-    drawn = scene(replay, timing(Path("x.gif"), 2.0, 1.0, 12.5))
+    drawn = scene(replay.robot, replay.dataset, timing(Path("x.gif"), 2.0, 1.0, 12.5).times)
     saved = xr.load_dataset(folder / "line.nc").sel(time=drawn.path_times[0] + np.arange(26) * 0.08, method="nearest")
     np.testing.assert_allclose(drawn.tensions, saved["tensions"])
 

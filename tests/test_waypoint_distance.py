@@ -58,7 +58,7 @@ def test_all_reports_name_the_waypoint(tmp_path):
     timing = time_along(COGIRO, {"path": path()})
     cut = f"passed at up to {1e3 * timing.waypoint_distance.position.distance:.4g} mm (points["
     assert cut in timing.report()
-    audited = plan(COGIRO, timing.task())
+    audited = plan(COGIRO, timing.scenario.task)
     assert audited.waypoint_distance.position.distance == pytest.approx(
         timing.to_dict()["waypoint_distance"]["position"]["distance"], abs=1e-7
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,33 +17,7 @@ if TYPE_CHECKING:
     from ..models import Robot
     from .subject import Subject
 
-# Each frame of the scene is one of FRAMES, in order; `frames.ATOMIC` reports its number, from 1, before it is drawn.
-SCRIPT = """
-const box = document.querySelector("aside details"), all = (name) => box.querySelectorAll(".towline-" + name);
-if (innerWidth < innerHeight) box.open = false;
-let shown = 0;
-if (FRAMES.clocks.length > 1) addEventListener("towline-instant", (event) => {
-  const k = event.detail - 1;
-  if (k === shown) return;
-  shown = k;
-  all("status")[0].textContent = FRAMES.statuses[k];
-  all("time")[0].textContent = FRAMES.clocks[k];
-  FRAMES.tensions[k].forEach((tension, i) => {
-    all("tension")[i].textContent = tension === null ? "none" : tension.toFixed(2) + " N";
-    all("bar")[i].style.width = FRAMES.widths[k][i] + "%";
-    all("bar")[i].style.background = FRAMES.colours[k][i];
-  });
-});
-"""
-
-
-# viser's player takes its camera from the address of the page; files differ from their addresses only after a "?".
-CAMERA = """
-if (innerWidth < innerHeight) {
-  const aspect = innerWidth / innerHeight, place = CENTRE.map((x, i) => x + ALONG[i] * NEAREST / aspect);
-  history.replaceState(null, "", `?initialCameraPosition=${place}&initialCameraLookAt=${CENTRE}` + location.hash);
-}
-"""
+SCRIPT, CAMERA = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.js", "camera.js"))
 
 
 def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
@@ -57,7 +32,7 @@ def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
     """
     values = {"CENTRE": centre.tolist(), "ALONG": along.tolist(), "NEAREST": nearest}
     constants = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
-    return f"<script>{{ const {constants};{CAMERA}}}</script>"
+    return f"<script>{{ const {constants};\n{CAMERA}}}</script>"
 
 
 def aside(subject: Subject, frames: list[Snapshot], cell: float) -> str:
@@ -73,7 +48,7 @@ def aside(subject: Subject, frames: list[Snapshot], cell: float) -> str:
         'pointer-events:none;color:#222;background:#ffffffcc;font-family:system-ui,sans-serif"><details open>'
         '<summary style="padding:4px 12px;font-weight:600;pointer-events:auto;cursor:pointer">'
         f'{escape(subject.title)}</summary><div style="{labels.BODY}">{status}{clock}{table}</div>'
-        f"{labels.legend(subject, cell)}</details></aside><script>const FRAMES = {data};{SCRIPT}</script>"
+        f"{labels.legend(subject, cell)}</details></aside><script>const FRAMES = {data};\n{SCRIPT}</script>"
     )
 
 

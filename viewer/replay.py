@@ -11,12 +11,12 @@ import xarray as xr
 
 from ..base.errors import InputError
 from ..base.inputs import printable
-from ..base.netcdf import check_units
+from ..base.netcdf import numbers_of
+from ..figures.outlines import outlines_from
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
 from ..ocp.audits.by_phase import certified
-from ..ocp.reports.scene import outline
 from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
@@ -26,7 +26,6 @@ from .snapshot import Snapshot, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
-LARGEST = 1e12  # of any number: velocities and tensions of real machines are far below
 LONGEST = 100  # letters of a text of the file
 
 
@@ -42,12 +41,16 @@ class Replay:
 
     Attributes
     ----------
+    dataset
+        The contents of the file.
     robot, title, times
         Times of the saved instants (n,) [s].
     tensions
         (n, m) [N], nan where there are none.
     reference
         Origin of the platform's frame (n, 3) in {G} [m] where a flight should have it; None for a plan.
+    obstacles
+        Lines (k, 3) in {G} [m] that outline each of the regions to keep out of.
 
     Raises
     ------
@@ -59,29 +62,30 @@ class Replay:
         for name in (*NEEDED, "time"):
             if name not in dataset.variables:
                 raise InputError(f"{where} must be a plan saved by `towline plan`, got one without {name!r}")
+        self.dataset = dataset
         self._flown = "reference_pose" in dataset.variables
         for name in ("robot",) if self._flown else ("robot", "task"):
             if not isinstance(dataset.attrs.get(name), str):
                 raise InputError(f"{where} must be a plan saved by `towline plan`, got one without its {name}")
         self.robot = parse_yaml(dataset.attrs["robot"], Robot, f"{where}, robot")
         self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
-        what, status = "flight" if self._task is None else self._task.name, dataset.attrs.get("status", "a plan")
-        self.title = f"{self.robot.name}, {printable(what, LONGEST)}: {printable(str(status), LONGEST)}"
+        self.title = printable(str(dataset.attrs.get("title", self.robot.name)), LONGEST)
         self.geometry = Geometry(self.robot)
-        self.times = _array(dataset, "time", (-1,), where, largest=FARTHEST)
+        self.times = numbers_of(dataset, "time", (-1,), where, largest=FARTHEST)
         n, c = len(self.times), len(self.robot.carriers)
-        self._pose = _array(dataset, "pose", (n, 6), where, largest=FARTHEST)
+        self._pose = numbers_of(dataset, "pose", (n, 6), where, largest=FARTHEST)
         self._velocity, self._acceleration = (
-            _array(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
+            numbers_of(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
         )
-        self._carriers = _array(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
-        self.tensions = _array(dataset, "tensions", (n, self.robot.m), where, gaps=True)
+        self._carriers = numbers_of(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
+        self.tensions = numbers_of(dataset, "tensions", (n, self.robot.m), where, gaps=True)
         self.reference = (
-            _array(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
+            numbers_of(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
         )
         self._words = _answers(dataset) if self._flown else None
-        self._cut = _array(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
+        self._cut = numbers_of(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
         self._events = _events(dataset) if self._flown else []
+        self.obstacles = outlines_from(dataset, where)
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
         self._points = self.geometry(self._pose, self._carriers)
@@ -111,13 +115,6 @@ class Replay:
         """Return the origins of the carriers' frames that move, (n, 3) each in {G} [m]."""
         paths = np.moveaxis(self._carriers[:, :, :3], 1, 0)
         return [path for path in paths if np.ptp(path, axis=0).max() > 1e-9]
-
-    @property
-    def obstacles(self) -> list[list[np.ndarray]]:
-        """Return lines (k, 3) in {G} [m] that outline each of the regions to keep out of."""
-        if self._task is None:
-            return []
-        return [outline(place) for place in self._task.limits.keep_out if place.frame == "world"]
 
     def index_at(self, time: float) -> int:
         """Return the index of the instant nearest to `time` [s]."""
@@ -198,31 +195,3 @@ def _events(dataset: xr.Dataset) -> list[tuple[float, str]]:
     except (ValueError, KeyError, TypeError):
         return []
     return [(at, f"{at:.4g} s: {printable(what, LONGEST)}") for at, what in found]
-
-
-def _array(
-    dataset: xr.Dataset,
-    name: str,
-    shape: tuple[int, ...],
-    where: str,
-    gaps: bool = False,
-    largest: float = LARGEST,
-) -> np.ndarray:
-    """Return a variable as numbers of the expected shape, -1 for any length; `gaps` permits nan."""
-    if name not in dataset.variables or dataset[name].dtype.kind not in "fiu":
-        given = f"an array of {dataset[name].dtype}" if name in dataset.variables else "none"
-        raise InputError(f"{where}: {name} must be an array of numbers, got {given}")
-    try:
-        check_units(name, dataset[name].attrs)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    values = dataset[name].to_numpy().astype(float)
-    fits = len(values.shape) == len(shape) and all(
-        want in (-1, have) for want, have in zip(shape, values.shape, strict=True)
-    )
-    if not fits:
-        raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")
-    wrong = ~(np.abs(values) <= largest) & ~(gaps & np.isnan(values))
-    if wrong.any():
-        raise InputError(f"{where}: {name} must have numbers up to {largest:g}, got {values[wrong][0]:g}")
-    return values

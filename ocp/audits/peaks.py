@@ -33,13 +33,18 @@ UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 
 
 def _corners(scenario: Scenario, seen: Instants) -> np.ndarray:
-    """Return the instants at corners of the motion, and just before those at which its load may jump, (k,)."""
+    """Return the instants at corners of the motion, and just before its jumps, (k,).
+
+    It jumps where its load or the acceleration of a time law may. Of laws there is an instant between two jumps too.
+    """
     nodes = np.zeros(0) if seen.deviation is None else seen.deviation.nodes
-    boundaries, duration = scenario.phases.boundaries, float(seen.times[-1])
-    corners = np.unique(np.concatenate([nodes, boundaries]))
+    laws = np.concatenate([[], *(path.jumps() for path in (scenario.path, *scenario.carrier_paths.values()))])
+    laws, duration = np.unique(laws), float(seen.times[-1])
+    jumps = np.unique(np.concatenate([laws, scenario.phases.boundaries]))
+    corners = np.unique(np.concatenate([nodes, jumps, (laws[1:] + laws[:-1]) / 2]))
     step = seen.times[1] - seen.times[0]
     corners = corners[np.abs(corners - np.round(corners / step) * step) > APART * step]
-    corners = np.concatenate([corners, np.unique(boundaries) - BESIDE * duration])
+    corners = np.concatenate([corners, jumps - BESIDE * duration])
     return np.unique(corners[(corners > 0.0) & (corners < duration)])
 
 

@@ -11,9 +11,9 @@ from ...figures.convergence import convergence
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
 from ...figures.views import views
+from ...statics.scene import scene
 from ..result import PlanData
 from .limited import limited
-from .scene import scene
 from .trajectory import output_rows
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     times = np.linspace(0.0, plan.scenario.duration, INSTANTS)
     drawn = {
         "path": Drawing("Path of the platform and places of the carriers", plan_figures.path(trajectory)),
-        "views": Drawing("From above and from the side", views(scene(plan, times))),
+        "views": Drawing("From above and from the side", views(scene(plan.scenario.robot, trajectory, times))),
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
     if trajectory["carrier_moves"].any():

@@ -13,6 +13,7 @@ from ...models.parsing import to_yaml
 from ...solvers import Certificate
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
+from ..timing.fastest_law import FastestLaw
 from .motion_facts import Fact, millimetres, motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
@@ -36,6 +37,7 @@ def sections(plan: PlanData) -> list[Section]:
     every = [
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
+        Section("What is at its limit along the path (s = 0 at its start, 1 at its end)", _bottlenecks(plan)),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Robots of the uncertainty", _robots(plan)),
@@ -126,6 +128,10 @@ def _up(plan: PlanData) -> np.ndarray:
 
 
 def _of_the_motion(plan: PlanData) -> str:
+    if plan.law is not None and not plan.law.exists:
+        return _without_law(plan.law)
+    if plan.law is not None and plan.feasible:
+        return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
         if plan.margin is None or plan.margin < WORTH_A_NUMBER:
             return "every tension inside its limits"
@@ -140,6 +146,16 @@ def _of_the_motion(plan: PlanData) -> str:
     if certificate.wind is not None:
         short += f" in wind {wind(certificate.wind)}"
     return f"{short}{_more(len(excess))}"
+
+
+def _without_law(law: FastestLaw) -> str:
+    if law.certificate is None:
+        return "one that only shows the path"
+    return f"short by {quantity(law.certificate.shortfall, 'N')} at s = {law.at:.4g}, whatever the speed"
+
+
+def _bottlenecks(plan: PlanData) -> list[Fact]:
+    return [] if plan.law is None else [("", each.describe()) for each in plan.law.bottlenecks]
 
 
 def _in_phase(plan: PlanData, time: float | None) -> str:
@@ -157,6 +173,13 @@ def _reasons(plan: PlanData) -> list[Fact]:
     if plan.feasible:
         return []
     facts: list[Fact] = []
+    if plan.law is not None and not plan.law.exists:
+        place = f"s = {plan.law.at:.4g} of the path (0 at its start, 1 at its end)"
+        if plan.law.certificate is None:
+            facts.append(("search ended at", place))
+        else:
+            facts.append(("worst place", f"{place}, where no time law is feasible"))
+        facts.append(("motion", f"the one below only shows the path, in {quantity(plan.duration, 's')}"))
     if (certificate := plan.certificate) is not None:
         text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
         facts += [

@@ -7,9 +7,11 @@ import json
 import numpy as np
 
 from ...base.netcdf import Contents, Variable
+from ...figures.outlines import outline_variables
 from ...models.dimensions import dimensions
 from ...models.parsing import to_yaml
 from ..result import PlanData
+from .keep_out import outline
 
 __all__ = ["output_rows", "trajectory"]
 
@@ -41,6 +43,7 @@ def trajectory(plan: PlanData) -> Contents:
     variables["tracking_error"] = over(("time",), audit.tracking_error[rows], "m", "distance from the path")
     variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
     variables["t_max"] = over(("cable",), robot.t_max, "N", "largest tension allowed")
+    variables |= outline_variables([outline(place) for place in task.limits.keep_out if place.frame == "world"])
     coordinates = {}
     if phases := plan.phases:
         total = np.zeros(len(rows)) if audit.supports is None else audit.supports[rows].sum(axis=1)
@@ -50,12 +53,14 @@ def trajectory(plan: PlanData) -> Contents:
             variables[f"phase_{name}"] = over(("phase",), values, unit, f"{about} of each phase")
         coordinates["phase"] = Variable(("phase",), np.array([phase.name for phase in phases]))
     attributes = {
-        "title": f"towline plan of {robot.name}: {task.name}",
+        "title": f"{robot.name}, {task.name}: {plan.status.value}",
         "status": plan.status.value,
         "robot": to_yaml(robot),
         "task": to_yaml(task.in_file()),
         "report": json.dumps(plan.to_dict()),
     }
+    if plan.law is not None and not plan.feasible:
+        attributes["no_reference"] = "one of time_along without a feasible time law"
     coordinates |= dimensions(robot, audit.times[rows])
     return Contents(variables, coordinates, attributes)
 

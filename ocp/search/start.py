@@ -1,4 +1,4 @@
-"""Turn what a user lets the planner start from, a plan, a timing or a path, into a deviation from the references."""
+"""Turn what a user lets the planner start from, a plan or a path, into a deviation from the references."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..plan import Plan
 from ..tasks.deviation import Deviation
 from ..tasks.paths import AnyPath, PathBase, RestPath
 from ..tasks.scenario import Scenario
-from ..timing.timing import Timing
+from ..timing.fastest_law import FastestLaw
 
 __all__ = ["deviation_from"]
 
@@ -27,7 +27,7 @@ class _Start(Part):
     start: AnyPath = Field(description="for the platform to start from")
 
 
-def deviation_from(scenario: Scenario, start: Plan | Timing | AnyPath | dict[str, Any]) -> Deviation | None:
+def deviation_from(scenario: Scenario, start: Plan | AnyPath | dict[str, Any]) -> Deviation | None:
     """Return the deviation of a start from the references of `scenario`; None if the task fixes the motion.
 
     Raises
@@ -37,19 +37,17 @@ def deviation_from(scenario: Scenario, start: Plan | Timing | AnyPath | dict[str
     """
     if isinstance(start, Plan):
         return _of_plan(scenario, start)
-    if isinstance(start, Timing):
-        return _of_timing(scenario, start)
     if isinstance(start, dict):
         start = validate({"start": start}, _Start, "plan").start
     if not isinstance(start, PathBase):
-        raise InputError(f"start must be a Plan, a Timing, a path or a mapping with its keys, got {shown(start)}")
+        raise InputError(f"start must be a Plan, a path or a mapping with its keys, got {shown(start)}")
     return _along(scenario, start, {}, start.natural_duration or scenario.duration)
 
 
 def _of_plan(scenario: Scenario, start: Plan) -> Deviation | None:
     """Return a plan's own deviation, stretched to this scenario's duration."""
     if start.deviation is None:
-        return None
+        return None if start.law is None else _of_law(scenario, start.law)
     theirs = start.deviation
     if start.scenario.owners() != scenario.owners() or theirs.tensions.shape[1] != scenario.robot.m:
         raise InputError(
@@ -59,18 +57,16 @@ def _of_plan(scenario: Scenario, start: Plan) -> Deviation | None:
     return _lasting(scenario, theirs)
 
 
-def _of_timing(scenario: Scenario, start: Timing) -> Deviation | None:
-    robot = start.parametrised.robot
+def _of_law(scenario: Scenario, law: FastestLaw) -> Deviation | None:
+    robot = law.parametrised.robot
+    if not law.exists:
+        raise InputError("start must be a plan with a time law, got one of time_along without")
     if robot.name != scenario.robot.name or robot.m != scenario.robot.m:
-        raise InputError(f"start must be a timing of robot {scenario.robot.name!r}, got one of {robot.name!r}")
+        raise InputError(f"start must be a plan of robot {scenario.robot.name!r}, got one of {robot.name!r}")
     carriers: dict[int, AnyPath] = {
-        index: start.timed(path) for index, path in start.parametrised.carriers.items() if _moves(path)
+        index: path for index, path in law.carrier_paths.items() if not isinstance(path, RestPath)
     }
-    return _along(scenario, start.path, carriers, start.duration or scenario.duration)
-
-
-def _moves(path: AnyPath) -> bool:
-    return not isinstance(path, RestPath)
+    return _along(scenario, law.path, carriers, law.path.natural_duration or scenario.duration)
 
 
 def _along(scenario: Scenario, path: AnyPath, carriers: dict[int, AnyPath], seconds: float) -> Deviation | None:

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from ...base.errors import InputError, SolverError
 from ...base.text import quantity
+from ..plan import Plan
 from ..tasks.paths import LinePath, RestPath, WaypointPath
 from ..tasks.scenario import Scenario
 from ..tasks.task import Tube
 from ..tasks.task_limits import TaskLimits
-from ..timing.fastest_law import KNOWN_LIMITS, time_along
-from ..timing.timing import Timing
+from ..timing.time_along import KNOWN_LIMITS, time_along
 
 __all__ = ["BOUND", "fastest"]
 
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
 
 
-def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
+def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
     """Return the fastest law along the path of a scenario whose duration alone is free, or None, and the message.
 
     Limits of the task that `time_along` does not know are left out: its time is a lower bound even so.
@@ -37,9 +37,10 @@ def fastest(scenario: Scenario) -> tuple[Timing | None, str]:
     hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
     alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}
     try:
-        timing = time_along(scenario.robot, task.model_copy(update=alone))
+        found = time_along(scenario.robot, task.model_copy(update=alone))
     except (InputError, SolverError) as error:
         return None, f"not computed: {str(error).removeprefix('time_along: ')}"
-    if timing.feasible:
-        return timing, f"the fastest law takes {quantity(timing.duration, 's', 6)}"
-    return timing, f"{timing.status.value} at {quantity(100 * (timing.at or 0.0), '%', 3)} of the path"
+    if found.feasible:
+        return found, f"the fastest law takes {quantity(found.duration, 's', 6)}"
+    at = 0.0 if found.law is None else found.law.at or 0.0
+    return found, f"{found.status.value} at {quantity(100 * at, '%', 3)} of the path"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
@@ -13,7 +14,7 @@ from typing_extensions import override
 
 from ...base.errors import InputError
 from ...base.inputs import file_path, number
-from ...models.parsing import read_yaml, validate
+from ...models.parsing import read_yaml, save_yaml, validate
 from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3, Whole
 from ...models.ranges import PositiveRange
 from ..costs.cost import Cost
@@ -259,6 +260,16 @@ class Task(Part):
             return self
         objective = self.objective.model_copy(update={"own": ()})
         return self.model_copy(update={"limits": self.limits.without_own(), "objective": objective})
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the task as a task file (YAML) atomically: `towline plan` and `plan` read an equal task from it.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written, or the task has limits or costs of its own, which only Python can hold.
+        """
+        return save_yaml(self, file)
 
     @property
     def seconds(self) -> float:

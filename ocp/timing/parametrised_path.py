@@ -29,7 +29,7 @@ LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 SIDES = 64  # of the polygon inside the circle of accelerations: it gives away 0.12 %
 LEAST = 40  # intervals between two rests, or between a rest and a bend
 SHARE_OF_BEND = 0.5  # of all intervals, that each bend has: there the limits of speed change at once
-MOST_IN_BEND = 400
+MOST_IN_BENDS = 6400  # in all together, if that is more than LEAST in each
 CLOSE = 1e-9  # of s
 LOOKS = 2001  # points at which the geometry is checked
 
@@ -110,17 +110,17 @@ class ParametrisedPath:
         bends = np.vstack([path.bends() for path in (self.path, *self.carriers.values())])
         rests = np.array(sorted(self.dwell))
         edges = np.concatenate([[0.0], rests[(rests > 0) & (rests < 1)], [1.0]])
-        in_bend = max(LEAST, min(round(SHARE_OF_BEND * intervals), MOST_IN_BEND))
+        in_bend = max(LEAST, min(round(SHARE_OF_BEND * intervals), MOST_IN_BENDS // max(len(bends), 1)))
         grids = []
         for start, end in pairwise(edges):
             inner = np.unique(bends[(bends > start + CLOSE) & (bends < end - CLOSE)])
             inner = inner[np.diff(inner, prepend=start) > CLOSE]  # one bend may begin where another ends
             parts = np.concatenate([[start], inner, [end]])
             middle = (parts[1:] + parts[:-1]) / 2
-            bent = ((bends[:, :1] < middle) & (middle < bends[:, 1:])).any(axis=0)
+            bent = np.any((bends[:, :1] < middle) & (middle < bends[:, 1:]), axis=0)
             least = np.where(bent, in_bend, LEAST if len(edges) > 2 or inner.size else 1)
             counts = np.maximum(np.ceil(intervals * np.diff(parts) - 1e-9).astype(int), least)
-            points = [np.linspace(*ends, n + 1)[:-1] for ends, n in zip(pairwise(parts), counts, strict=True)]
+            points = [_grid(*its)[:-1] for its in zip(parts[:-1], parts[1:], counts, bent, strict=True)]
             grids.append(np.append(np.concatenate(points), end))
         return grids
 
@@ -220,6 +220,12 @@ class ParametrisedPath:
         )
         still = speed <= max(STILL * speed.max(), SAME)
         _refuse(s, still, "path must move platform or carriers everywhere, as lines, circles and waypoints do", "rest")
+
+
+def _grid(start: float, end: float, intervals: int, bent: bool) -> np.ndarray:
+    """Return a grid from start to end: uniform, or in a bend densest at its ends, where its curvature changes most."""
+    at = np.linspace(0.0, 1.0, intervals + 1)
+    return start + (end - start) * ((1 - np.cos(np.pi * at)) / 2 if bent else at)
 
 
 def _refuse(s: np.ndarray, bad: np.ndarray, must: str, got: str) -> None:

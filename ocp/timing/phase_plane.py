@@ -6,7 +6,7 @@ available wrench set (`solvers.available_wrench`) is a half-plane, as is each li
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,9 +87,17 @@ class Proof(Displayed):
 
 
 def phase_plane(
-    parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, shrink: float = 0.0
+    parametrised: ParametrisedPath,
+    limits: PathLimits,
+    s: np.ndarray,
+    margin: float,
+    reserve: np.ndarray | float = 0.0,
+    shrink: float = 0.0,
 ) -> PhasePlane:
-    """Return the limits at the places s (N,): tensions less `margin` [N], the others reduced by the share `shrink`.
+    """Return the limits at the places s (N,).
+
+    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other limits
+    reduced by the share `shrink`.
 
     Raises
     ------
@@ -102,10 +110,12 @@ def phase_plane(
     scale = robot.wrench_scale[rows]
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     wrench = Wrench(*(part[:, rows] * scale for part in parametrised.wrench(platform)))
-    middle = (robot.t_min + robot.t_max) / 2
-    # The distance that the audit requires must not turn a cable's only tension into none.
-    available = facets(A, np.minimum(robot.t_min + margin, middle), np.maximum(robot.t_max - margin, middle))
+    available = facets(A, robot.t_min + margin, robot.t_max - margin)
     _check_span(s, wrench, available)
+    # The reserve must not turn the only wrench into none.
+    low, high, inside = available.low, available.high, np.reshape(reserve, (-1, 1))
+    middle = (low + high) / 2
+    available = replace(available, low=np.minimum(low + inside, middle), high=np.maximum(high - inside, middle))
     x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
     lowered = [(a, b, c * (1 - shrink)) for a, b, c in parametrised.acceleration_rows(carriers, limits)]
     return PhasePlane(wrench, available, x_max, lowered)

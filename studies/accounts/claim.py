@@ -1,23 +1,30 @@
 """`Claim`: one statement of a paper beside the result of computing it.
 
-A verdict follows from numbers, never from opinion: `compared` compares numbers with the printed ones, `stated` records
-whether a statement holds, `undetermined` records what the paper does not print, `repaired` what is possible in place of
-an impossible statement. Each verdict comes with one sentence of its own.
+A verdict follows from numbers, never from opinion: a `Statement` becomes a claim by what is computed. `compared`
+compares numbers with the printed ones, `stated` records whether a statement holds, `undetermined` records what the
+paper does not print, `repaired` what is possible in place of an impossible statement. Each verdict has one sentence of
+its own.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from ruamel.yaml import YAML
 
 from ...base.text import quantity, quantity_row
 
-__all__ = ["Claim", "Value", "Verdict", "compared", "repaired", "stated", "undetermined", "value_text"]
+__all__ = ["Claim", "Statement", "Value", "Verdict", "statements", "value_text"]
 
 Value: TypeAlias = float | tuple[float, ...] | str | None
+FIELD = re.compile(r"\{(?P<name>[a-z]\w*)(:(?P<format>[^}]*))?\}")  # {G} is a frame
 DIGITS = 5  # of values in reports: one more than papers print
 
 
@@ -88,89 +95,92 @@ class Claim:
         }
 
 
-def compared(
-    id: str,
-    place: str,
-    statement: str,
-    printed: float | tuple[float, ...],
-    computed: float | tuple[float, ...],
-    *,
-    within: float,
-    agrees: str,
-    differs: str,
-    unit: str = "",
-    figure: str | None = None,
-) -> Claim:
-    """Compare computed numbers with printed ones: reproduced if they differ by `within` at most.
+@dataclass(frozen=True)
+class Statement:
+    """A statement of a paper, and the sentences of the verdicts on it, as `claims.yaml` of a study has them.
 
-    Parameters
+    All texts may have fields such as `{least:.1f}`, whose names begin with a small letter; whoever computes the claim
+    gives their values.
+
+    Attributes
     ----------
     within
         The allowed difference in `unit`: the precision of the printed digits, or of the lines of a figure.
     agrees, differs
-        The reason for either verdict.
-    """
-    apart = np.abs(np.asarray(computed, dtype=float) - np.asarray(printed, dtype=float))
-    same = bool((apart <= within).all())
-    verdict, why = (Verdict.REPRODUCED, agrees) if same else (Verdict.DIFFERS, differs)
-    return Claim(id, place, statement, printed, computed, verdict, why, unit, figure)
-
-
-def stated(
-    id: str,
-    place: str,
-    statement: str,
-    printed: Value,
-    computed: Value,
-    *,
-    holds: bool,
-    agrees: str,
-    differs: str,
-    otherwise: Verdict = Verdict.DIFFERS,
-    unit: str = "",
-    figure: str | None = None,
-) -> Claim:
-    """Return a claim that is reproduced if the statement holds, else `otherwise`; other arguments as in `compared`."""
-    verdict, why = (Verdict.REPRODUCED, agrees) if holds else (otherwise, differs)
-    return Claim(id, place, statement, printed, computed, verdict, why, unit, figure)
-
-
-def undetermined(
-    id: str,
-    place: str,
-    statement: str,
-    printed: Value,
-    computed: Value,
-    *,
-    missing: str,
-    unit: str = "",
-    figure: str | None = None,
-) -> Claim:
-    """Return a claim that the paper does not decide; `missing` states what it does not print and what was assumed."""
-    return Claim(id, place, statement, printed, computed, Verdict.NOT_DETERMINED, missing, unit, figure)
-
-
-def repaired(
-    id: str,
-    place: str,
-    statement: str,
-    computed: Value,
-    *,
-    holds: bool,
-    works: str,
-    fails: str,
-    unit: str = "",
-    figure: str | None = None,
-) -> Claim:
-    """Return something else than the paper has, in the place of what is impossible there; not determined if it fails.
-
-    Parameters
-    ----------
+        The reason for either verdict, reproduced or another.
+    missing
+        What the paper does not print, and what was assumed.
     works, fails
-        The reason for either verdict.
+        The reason why something possible stands in the place of what is impossible, or why not.
     """
-    verdict, why = (Verdict.REPAIRED, works) if holds else (Verdict.NOT_DETERMINED, fails)
-    return Claim(id, place, statement, None, computed, verdict, why, unit, figure)
+
+    id: str
+    place: str
+    statement: str
+    printed: Value = None
+    within: float = 0.0
+    unit: str = ""
+    figure: str | None = None
+    agrees: str = ""
+    differs: str = ""
+    missing: str = ""
+    works: str = ""
+    fails: str = ""
+
+    def compared(
+        self,
+        computed: float | tuple[float, ...],
+        printed: float | tuple[float, ...] | None = None,
+        within: float | None = None,
+        **fields: Any,
+    ) -> Claim:
+        """Compare computed numbers with printed ones: reproduced if they differ by `within` at most."""
+        expected = self.printed if printed is None else printed
+        apart = np.abs(np.asarray(computed, dtype=float) - np.asarray(expected, dtype=float))
+        same = bool((apart <= (self.within if within is None else within)).all())
+        return self.stated(computed, same, expected, **fields)
+
+    def stated(
+        self,
+        computed: Value,
+        holds: bool,
+        printed: Value = None,
+        otherwise: Verdict = Verdict.DIFFERS,
+        **fields: Any,
+    ) -> Claim:
+        """Return a claim that is reproduced if the statement holds, else `otherwise`."""
+        verdict, why = (Verdict.REPRODUCED, self.agrees) if holds else (otherwise, self.differs)
+        return self._claim(computed, printed, verdict, why, fields)
+
+    def undetermined(self, computed: Value, printed: Value = None, **fields: Any) -> Claim:
+        """Return a claim that the paper does not decide."""
+        return self._claim(computed, printed, Verdict.NOT_DETERMINED, self.missing, fields)
+
+    def repaired(self, computed: Value, holds: bool, **fields: Any) -> Claim:
+        """Return something else than the paper has, in the place of what is impossible; not determined if it fails."""
+        verdict, why = (Verdict.REPAIRED, self.works) if holds else (Verdict.NOT_DETERMINED, self.fails)
+        return self._claim(computed, None, verdict, why, fields)
+
+    def _claim(self, computed: Value, printed: Value, verdict: Verdict, why: str, fields: Mapping[str, Any]) -> Claim:
+        texts = (self.id, self.place, self.statement, why, self.unit, self.figure or "")
+        id, place, statement, why, unit, figure = (FIELD.sub(lambda at: _filled(at, fields), text) for text in texts)
+        expected = self.printed if printed is None else printed
+        return Claim(id, place, statement, expected, computed, verdict, why, unit, figure or None)
+
+
+def _filled(field: re.Match[str], fields: Mapping[str, Any]) -> str:
+    return format(fields[field["name"]], field["format"] or "")
+
+
+@cache
+def statements(file: Path) -> dict[str, Statement]:
+    """Return the statements of a YAML file by their names in it, which are their ids unless these have fields."""
+    entries = YAML(typ="safe", pure=True).load(file.read_text(encoding="utf-8"))
+    listed = {name: {"id": name, **entry} for name, entry in entries.items()}
+    for entry in listed.values():
+        if isinstance(entry.get("printed"), list):
+            entry["printed"] = tuple(entry["printed"])
+    return {name: Statement(**entry) for name, entry in listed.items()}
 
 
 def value_text(value: Value, unit: str = "") -> str:

@@ -6,11 +6,11 @@ import numpy as np
 
 from ...models import Dynamics, load
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared
+from ..accounts.claim import Claim
+from .claims import claim
 from .instants import Instants, instants
 from .rotations import body_rates, printed_acceleration
 
-ROUNDING = 1e-11
 WIND = np.array([5.0, 6.0, 2.0])  # the paper's strongest [m/s]
 INCREMENTS = np.array([0.3, -0.2, 0.1, 0.4, -0.1, 0.2])  # dT of the six cables, any [N]
 
@@ -55,19 +55,7 @@ def _newton(dynamics: Dynamics, samples: Instants) -> Claim:
     T = np.linalg.solve(A, w[..., None])[..., 0]
     wind = dynamics.aerodynamic_wrench(pose, velocity, WIND)[:, :3]
     left = newton_euler(dynamics, samples)[:, :3] - _turn(A[:, :3], T) - wind
-    return compared(
-        "eq-24",
-        "Eq. 24",
-        "m ddx_B = m g + [u] (T + dT) + F_e in {G} (largest force left over, with the tensions that the motion "
-        "requires in the strongest wind).",
-        0.0,
-        float(np.linalg.norm(left, axis=1).max()),
-        within=ROUNDING,
-        agrees="The equation is in balance, with F_e of the air relative to the platform; the wind alone has "
-        f"{np.linalg.norm(wind, axis=1).max():.1f} N at most.",
-        differs="The equation is not in balance.",
-        unit="N",
-    )
+    return claim("eq-24").compared(float(np.linalg.norm(left, axis=1).max()), wind=np.linalg.norm(wind, axis=1).max())
 
 
 def _euler(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -76,17 +64,7 @@ def _euler(dynamics: Dynamics, samples: Instants) -> Claim:
     inertia = whole.R @ I_b @ whole.R.transpose(0, 2, 1)
     omega, alpha = _turn(whole.R, whole.rate), _turn(whole.R, whole.acceleration)
     printed = _turn(inertia, alpha) + np.cross(omega, _turn(inertia, omega))
-    return compared(
-        "eq-29",
-        "Eq. 29",
-        "I_B alpha + omega x I_B omega in {G}, I_B = R I_b R^T (difference from the derivative of L = R I_b Omega).",
-        0.0,
-        float(np.abs(printed - newton_euler(dynamics, samples)[:, 3:]).max()),
-        within=ROUNDING,
-        agrees="It is the derivative of the angular momentum.",
-        differs="It is not the derivative of the angular momentum.",
-        unit="N m",
-    )
+    return claim("eq-29").compared(float(np.abs(printed - newton_euler(dynamics, samples)[:, 3:]).max()))
 
 
 def _last_term(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -94,17 +72,7 @@ def _last_term(dynamics: Dynamics, samples: Instants) -> Claim:
     accelerations = samples.R_A.acceleration, samples.R_B.acceleration
     off = _moment_off(dynamics, samples, *accelerations, last=samples.R_B.rate)
     rest = float(_moment_off(dynamics, samples, *accelerations).max())
-    return compared(
-        "eq-33",
-        "Eqs. 33, 36",
-        "The left side of Eq. 33 ends in P_b dTheta_b x R_B I_b P_b dTheta_b (median relative difference from dL/dt).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="The moment is the derivative of the angular momentum.",
-        differs=f"The first factor must be P_a dTheta_a, as in Eq. 36, with which the difference is {rest:.0e}; one "
-        "letter may be an error of the recognition.",
-    )
+    return claim("eq-33").compared(float(np.median(off)), rest=rest)
 
 
 def _right_side(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -113,18 +81,7 @@ def _right_side(dynamics: Dynamics, samples: Instants) -> Claim:
     T = np.linalg.solve(J, dynamics.relative.required_wrench(*samples.body, *samples.base)[..., None])[..., 0]
     twice, once = (_turn(J[:, 3:], T + count * INCREMENTS) for count in (2, 1))
     off = np.linalg.norm(twice - once, axis=1) / np.linalg.norm(once, axis=1)
-    return compared(
-        "eq-33-right",
-        "Eqs. 29, 33, 34",
-        "The right side of Eq. 33 has the moments of T' + F' (median relative difference from those of T + dT, with "
-        "T' = dT, as step 7 needs it, F' = F = T + dT, and increments of 0.1 N to 0.4 N).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="The moments are the same.",
-        differs="Neither T' nor F' is defined, and dT counts twice if they are read like this. T + dT is meant, as in "
-        "Eqs. 29 and 34.",
-    )
+    return claim("eq-33-right").compared(float(np.median(off)))
 
 
 def _first_term(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -134,33 +91,14 @@ def _first_term(dynamics: Dynamics, samples: Instants) -> Claim:
     P = body_rates(samples.body.pose, printed)
     true = _turn_back(samples.R_A.R, newton_euler(dynamics, samples)[:, 3:])
     off = np.linalg.norm(_turn(R, P @ I_b.T), axis=1) / np.linalg.norm(true, axis=1)
-    return compared(
-        "eq-34",
-        "Eqs. 34, 37",
-        "Eq. 34 begins with R_B I_b P_b dTheta_b, first derivatives (median relative difference from dL/dt).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="The moment is the derivative of the angular momentum.",
-        differs="It must be ddTheta_b, as in Eq. 37; a dot may be an error of the recognition, as may the letters F_o "
-        "and D_o there, which are the F_M and D_M of Eqs. 35 and 36.",
-    )
+    return claim("eq-34").compared(float(np.median(off)))
 
 
 def _turned_increments(dynamics: Dynamics, samples: Instants) -> Claim:
     """Compare R_A [R_B b x u] dT of Eq. 34 with [R_B b x u] dT, which stands beside the same matrix times T."""
     moments = dynamics.relative.wrench_matrix(samples.body.pose)[:, 3:] @ INCREMENTS
     off = np.linalg.norm(_turn(samples.R_A.R, moments) - moments, axis=1) / np.linalg.norm(moments, axis=1)
-    return compared(
-        "eq-34-dT",
-        "Eqs. 33, 34, 37",
-        "In Eq. 34 the moments of dT have R_A in front, those of T have not (median relative difference).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="The rotation changes nothing.",
-        differs="Eq. 33 times R_A^T has no R_A in front of either, as in Eq. 37.",
-    )
+    return claim("eq-34-dT").compared(float(np.median(off)))
 
 
 def _force(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -174,48 +112,20 @@ def _force(dynamics: Dynamics, samples: Instants) -> Claim:
     felt = samples.base.acceleration[:, :3] + _turn(ddR, x) - g
     printed, meant = (m * _turn_back(R, felt + 2 * term) for term in (_turn(R, ddx), _turn(dR, dx)))
     ours = dynamics.relative.base_disturbance(samples.body.pose, samples.body.velocity, *samples.base)[:, :3]
-    return compared(
-        "eq-26",
-        "Eq. 26",
-        "D_F ends in 2 R_A ddx_b, with one bar for each second derivative (median relative difference from the force "
-        "of the base's motion).",
-        0.0,
+    return claim("eq-26").compared(
         float(np.median(np.linalg.norm(printed - ours, axis=1) / np.linalg.norm(ours, axis=1))),
-        within=ROUNDING,
-        agrees="The printed D_F is the force of the base's motion.",
-        differs="The last term must be 2 dR_A dx_b, with which the difference is at most "
-        f"{np.abs(meant - ours).max():.0e} N. Bars for dots may be an error of the recognition.",
+        apart=np.abs(meant - ours).max(),
     )
 
 
 def _moment(dynamics: Dynamics, samples: Instants) -> Claim:
     off = _moment_off(dynamics, samples, samples.R_A.acceleration, samples.R_B.acceleration)
-    return compared(
-        "eq-36",
-        "Eqs. 34, 35, 36",
-        "F_M and D_M with the true angular accelerations (largest relative difference from dL/dt in {A}).",
-        0.0,
-        float(off.max()),
-        within=ROUNDING,
-        agrees="The four terms of D_M, with F_M, are the derivative of the angular momentum.",
-        differs="The printed terms are not the derivative of the angular momentum.",
-    )
+    return claim("eq-36").compared(float(off.max()))
 
 
 def _moment_printed(dynamics: Dynamics, samples: Instants) -> Claim:
     off = _moment_off(dynamics, samples, printed_acceleration(*samples.base), printed_acceleration(*samples.body))
-    return compared(
-        "eq-36-alpha",
-        "Eqs. 31, 32, 35, 36",
-        "F_M and D_M with alpha as printed in Eqs. 31 and 32 (median relative difference from dL/dt).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="The printed alpha gives the moment.",
-        differs=f"The P that Eqs. 31 and 32 leave out changes the moment by up to {off.max():.0%} here; D_B is "
-        "computed "
-        "with it.",
-    )
+    return claim("eq-36-alpha").compared(float(np.median(off)), off=off.max())
 
 
 def _moment_off(
@@ -251,17 +161,7 @@ def _whole(dynamics: Dynamics, samples: Instants) -> Claim:
     in_A = dynamics.relative.required_wrench(*samples.body, *samples.base)
     in_G = newton_euler(dynamics, samples)
     turned = np.hstack([_turn(samples.R_A.R, in_A[:, :3]), _turn(samples.R_A.R, in_A[:, 3:])])
-    return compared(
-        "eq-38",
-        "Eqs. 37, 38",
-        "M_B ddX_b + F_B + D_B with alpha corrected (difference from m ddx_B - m g and dL/dt in {G}).",
-        0.0,
-        float(np.abs(turned - in_G).max()),
-        within=ROUNDING,
-        agrees="Paper F's form, with D_B, is Newton's and Euler's equations, rotated.",
-        differs="Paper F's form is not Newton's and Euler's equations.",
-        unit="N, N m",
-    )
+    return claim("eq-38").compared(float(np.abs(turned - in_G).max()))
 
 
 def _directions(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -270,36 +170,14 @@ def _directions(dynamics: Dynamics, samples: Instants) -> Claim:
     in_G = u @ samples.R_A.R.transpose(0, 2, 1)
     apart = np.degrees(np.arccos(np.clip((u * in_G).sum(axis=-1), -1, 1)))
     tilt = float(np.degrees(np.abs(samples.base.pose[:, 3:]).max()))
-    return compared(
-        "eq-26-frame",
-        "Eqs. 4, 26, 37",
-        "u_i = L_i / l_i, in {G} by Eq. 4, multiplies T in an equation in {A} (largest angle between u_i in {G} and in "
-        "{A}).",
-        0.0,
-        float(apart.max()),
-        within=1e-6,
-        agrees="Both directions are the same.",
-        differs=f"The directions of the cables must be rotated into {{A}} too, R_A^T L_i / l_i; the quadrotor's angles "
-        f"are up to {tilt:.0f} degrees here.",
-        unit="degrees",
-    )
+    return claim("eq-26-frame").compared(float(apart.max()), tilt=tilt)
 
 
 def _wind_frame(dynamics: Dynamics, samples: Instants) -> Claim:
     force = dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), WIND)[:3]
     felt = _turn_back(samples.R_A.R, np.tile(force, (len(samples.base.pose), 1)))
     off = np.linalg.norm(felt - force, axis=1) / np.linalg.norm(force)
-    return compared(
-        "eq-26-wind",
-        "Eqs. 26, 37",
-        "F_e, the force of the wind in {G}, is subtracted in {A} without rotation (largest relative difference from "
-        "R_A^T F_e).",
-        0.0,
-        float(off.max()),
-        within=ROUNDING,
-        agrees="The force needs no rotation.",
-        differs="F_e must be rotated into {A}, as Eq. 34 does with M_e.",
-    )
+    return claim("eq-26-wind").compared(float(off.max()))
 
 
 def _arms(dynamics: Dynamics, samples: Instants) -> Claim:
@@ -310,18 +188,7 @@ def _arms(dynamics: Dynamics, samples: Instants) -> Claim:
     twice = arms @ R.transpose(0, 2, 1)
     true, printed = np.cross(arms, u), np.cross(twice, u)
     off = np.linalg.norm(printed - true, axis=-1) / np.linalg.norm(true, axis=-1)
-    return compared(
-        "eq-37-J",
-        "Eqs. 34, 37",
-        "J contains R_B r_B,i x u_i, where r_B,i = R_B b_i (median relative difference from R_B b_i x u_i).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="The second rotation changes nothing.",
-        differs="r_B,i is rotated twice; J must contain R_B b_i x u_i, as in Eq. 33. Where the platform is level, both "
-        "are "
-        "the same.",
-    )
+    return claim("eq-37-J").compared(float(np.median(off)))
 
 
 def _turn(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -7,7 +7,8 @@ import numpy as np
 from ...models import Dynamics, Robot, load
 from ...models.cables import ElementChain
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated
+from ..accounts.claim import Claim
+from .claims import claim
 from .motion import RADIUS, circle, steady_tensions
 
 ELEMENTS = (1, 2, 5, 16, 64)
@@ -44,16 +45,13 @@ def _elongation(robot: Robot) -> Claim:
     assert stiffness is not None
     largest = float(steady_tensions(Dynamics(robot), circle(RADIUS)).max())
     share = largest / stiffness
-    return stated(
-        "eq-6",
-        "Eq. 6",
-        "F l / (E A) goes to 0 and the elongation can be ignored (l_e / l at the largest tension of the circle).",
-        0.0,
+    return claim("eq-6").stated(
         share,
-        holds=share < NEGLIGIBLE,
-        agrees=f"{largest:.1f} N (crossed pairs) on E A = {stiffness:g} N is less than {NEGLIGIBLE:.0%}, which is "
-        f"taken as negligible: {NEGLIGIBLE * stiffness / robot.weight:.0f} times the weight on one cable would do.",
-        differs=f"{largest:.1f} N on E A = {stiffness:g} N is more than {NEGLIGIBLE:.0%}.",
+        share < NEGLIGIBLE,
+        largest=largest,
+        stiffness=stiffness,
+        negligible=NEGLIGIBLE,
+        weights=NEGLIGIBLE * stiffness / robot.weight,
     )
 
 
@@ -64,16 +62,11 @@ def _one_element(robot: Robot) -> Claim:
     spring = whole.stiffness / whole.length * STRETCH
     spread = max(increments.values()) - min(increments.values())
     alike = spread < 1e-9 * spring
-    return stated(
-        "eq-21",
-        "section III.C, Eqs. 12, 21",
-        "The elastic force cannot be studied with the whole cable as a unit: n elements give another force.",
-        "n matters",
+    return claim("eq-21").stated(
         f"{increments[1]:.4g} N for n = 1, {increments[ELEMENTS[-1]]:.4g} N for n = {ELEMENTS[-1]}",
-        holds=not alike,
-        agrees="The increment depends on the number of elements.",
-        differs="A cable without mass has the same tension everywhere: E A / l times the elongation for every n "
-        f"(n = {', '.join(map(str, ELEMENTS))} differ by {spread:.0e} N).",
+        not alike,
+        each=", ".join(map(str, ELEMENTS)),
+        spread=spread,
     )
 
 
@@ -84,17 +77,7 @@ def _stiffness_of_winding(robot: Robot) -> Claim:
     nodes = np.zeros((elements + 1, 3))
     held = float(cable.node_forces(nodes, WINDING)[-1] @ cable.direction)
     printed = cable.stiffness / WINDING * WINDING
-    return compared(
-        "eq-15",
-        "Eq. 15",
-        f"k_l = E A / de (force increment of an element that is lengthened by de = {WINDING * 1e6:g} um).",
-        printed,
-        held,
-        within=1e-6 * cable.stiffness,
-        agrees="The force increment is E A.",
-        differs="With de as the divisor every lengthening, however small, gives E A; k_l is E A / e, as in Eq. 12.",
-        unit="N",
-    )
+    return claim("eq-15").compared(held, printed=printed, within=1e-06 * cable.stiffness, winding=WINDING * 1000000.0)
 
 
 def _axis(robot: Robot) -> Claim:
@@ -102,17 +85,7 @@ def _axis(robot: Robot) -> Claim:
     cable = chain(robot, 1)
     vector = robot.anchors[0] - robot.home_attachments[0]  # L by Eq. 4
     u = vector / np.linalg.norm(vector)
-    return compared(
-        "eq-17",
-        "Eqs. 4, 17, 18",
-        "x_c, from the pulley along the cable, is u = L / l in {G} (cosine of the angle between them).",
-        1.0,
-        float(u @ cable.direction),
-        within=1e-9,
-        agrees="They have the same direction.",
-        differs="By Eq. 4 L points from the platform to the pulley, so dX, dE and the forces of Eq. 18 have the wrong "
-        "sign; k_n does not depend on it, and the norm of Eq. 22 hides it.",
-    )
+    return claim("eq-17").compared(float(u @ cable.direction))
 
 
 def _assembled(robot: Robot) -> Claim:
@@ -125,17 +98,7 @@ def _assembled(robot: Robot) -> Claim:
     printed[:6, :6] += element
     printed[3:, 3:] += element
     off = float(np.abs(printed - cable.K_n().toarray()).max())
-    return compared(
-        "eq-19",
-        "Eqs. 18, 19, 21, figure 4",
-        "k_1 to k_4 are S(j) u u^T with signs, and K_n is assembled from them (largest difference for two elements).",
-        0.0,
-        off,
-        within=1e-6,
-        agrees="K_n is the stiffness matrix of the chain.",
-        differs="K_n is not the stiffness matrix of the chain.",
-        unit="N/m",
-    )
+    return claim("eq-19").compared(off)
 
 
 def _switch(robot: Robot) -> Claim:
@@ -147,35 +110,11 @@ def _switch(robot: Robot) -> Claim:
     printed = ((along[:-1] > 0) & (along[1:] > 0)).astype(float)
     forces = (cable.K_n(printed) @ nodes.ravel()).reshape(-1, 3) @ cable.direction
     true = cable.node_forces(nodes) @ cable.direction
-    return compared(
-        "eq-16",
-        "Eq. 16",
-        "sgn(j) = 1 if both nodes of element j move away from the pulley (force of a stretched cable on the pulley).",
-        float(abs(forces[0])),
-        float(abs(true[0])),
-        within=1e-9,
-        agrees="The force on the pulley is the tension of the stretched cable.",
-        differs="Node 0 is fixed at the pulley, so by this rule element 1 never pulls and the force on the pulley is "
-        "zero, "
-        "the printed value. An element pulls as long as it is longer than at rest, its earlier elongation included.",
-        unit="N",
-    )
+    return claim("eq-16").compared(float(abs(true[0])), printed=float(abs(forces[0])))
 
 
 def _sign(robot: Robot) -> Claim:
     """Check the sign of the increment of a taut cable whose end comes nearer: its tension falls, a norm never does."""
     cable = chain(robot, 8)
     shorter = cable.end_increment(-STRETCH * cable.direction)
-    return stated(
-        "eq-22",
-        "Eqs. 7, 22, 23",
-        "dT_K is the norm of the force at B_i, also where the platform comes nearer to the anchor.",
-        abs(shorter),
-        shorter,
-        holds=shorter >= 0,
-        agrees="The increment is not negative.",
-        differs=f"A taut cable whose end comes {STRETCH * 1e6:g} um nearer pulls less, so the increment needs its sign "
-        "in "
-        "F = T + dT.",
-        unit="N",
-    )
+    return claim("eq-22").stated(shorter, shorter >= 0, printed=abs(shorter), stretch=STRETCH * 1000000.0)

@@ -16,7 +16,8 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, stated, undetermined
+from ..accounts.claim import Claim
+from .claims import claim
 from .helix import flight
 from .motion import FEASIBLE, TIMES, circle, steady_tensions
 from .plans import NOT_READ, PITCH, SECONDS, pitching_flight
@@ -69,57 +70,20 @@ def pitching_on_the_line() -> Motion:
 
 
 def _motion() -> Claim:
-    return undetermined(
-        "fig-12-13",
-        "figures 12 and 13",
-        "The quadrotor moves and pitches (largest pitch).",
-        None,
-        float(np.degrees(PITCH)),
-        missing=f"{NOT_READ} Assumed: VI.A's line, a sine of pitch, its surge along x.",
-        unit="degrees",
-        figure="disturbance-flight",
-    )
+    return claim("fig-12-13").undetermined(float(np.degrees(PITCH)), not_read=NOT_READ)
 
 
 def _error(error: np.ndarray, worse: np.ndarray) -> Claim:
-    return undetermined(
-        "fig-15",
-        "figures 14 and 15",
-        "Without D_B the tension of cable 1 has a relative error (its largest value).",
-        None,
-        float(error[:, 0].max()),
-        missing=f"{NOT_READ} With the assumed surge the load pulls mostly along the quadrotor's own axis; "
-        f"the same pitch on a straight line would give {worse[:, 0].max():.0f} %.",
-        unit="%",
-        figure="disturbance",
-    )
+    return claim("fig-15").undetermined(float(error[:, 0].max()), not_read=NOT_READ, worse=worse[:, 0].max())
 
 
 def _felt(error: np.ndarray) -> Claim:
     most = float(error.max())
-    return stated(
-        "conclusion-D_B",
-        "abstract, conclusion 3",
-        "The motion of the quadrotor affects the tensions apparently (largest relative error of any cable without "
-        "D_B).",
-        "apparently",
-        f"{most:.1f} %",
-        holds=most > 1.0,
-        agrees="It is more than 1 % with the assumed motion.",
-        differs="It is less than 1 % with the assumed motion.",
-        figure="disturbance",
-    )
+    return claim("conclusion-D_B").stated(f"{most:.1f} %", most > 1.0)
 
 
 def _mobility(spans: np.ndarray) -> Claim:
-    return stated(
-        "conclusion-mobility",
-        "conclusion 3",
-        "The higher the quadrotor's mobility, the wider the range between the largest and the smallest tension.",
-        "wider",
+    return claim("conclusion-mobility").stated(
         f"{spans[0]:.2f} N at rest, {spans[-1]:.2f} N pitching by {np.degrees(PITCHES[-1]):.0f} degrees",
-        holds=bool((np.diff(spans) > 0).all()),
-        agrees="The range grows with every step of the largest pitch of the assumed flight.",
-        differs="The range does not grow with every step of the largest pitch of the assumed flight.",
-        figure="mobility",
+        bool((np.diff(spans) > 0).all()),
     )

@@ -16,13 +16,13 @@ from ...figures.drawing import Drawing
 from ...models import load
 from ...models.cables import ElementChain
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated
+from ..accounts.claim import Claim
 from .cable import STRETCH, chain
+from .claims import claim
 
 ELEMENTS = 8
 OFFSETS = np.array([1e-6, 3e-6])  # of the nodes j - 1 and j along the cable, away from the pulley [m]
 WOUND = 2e-6  # de [m]
-SAME = 1e-12  # [N]
 UNDEFINED = "undefined"
 
 
@@ -61,17 +61,8 @@ def product(*shapes: tuple[int, int]) -> str:
 def _nodes() -> Claim:
     """List the nodes j - 1 and j of the elements 1 to n, which Eqs. 12, 13 and 21 use."""
     used = {node for j in range(1, ELEMENTS + 1) for node in (j - 1, j)}
-    return compared(
-        "fig-3",
-        "section III.C, figure 3",
-        f"Node 1 is at the pulley, node n + 1 at the platform, and element j lies between the nodes j - 1 and j "
-        f"(first and last node, n = {ELEMENTS}).",
-        (1.0, ELEMENTS + 1.0),
-        (float(min(used)), float(max(used))),
-        within=0.0,
-        agrees="The elements join these nodes.",
-        differs="The elements 1 to n join the nodes 0 to n, as Eq. 21 counts them: node 0 is at the pulley.",
-        figure="elements",
+    return claim("fig-3").compared(
+        (float(min(used)), float(max(used))), printed=(1.0, ELEMENTS + 1.0), elements=ELEMENTS
     )
 
 
@@ -82,19 +73,7 @@ def _increment() -> Claim:
     forces = by_13(OFFSETS, WOUND)
     energy = stiffness() / 2 * (np.array([after - before + WOUND + step for step in (STRETCH, -STRETCH)]) ** 2)
     pull = float(energy[0] - energy[1]) / (2 * STRETCH)  # the derivative of the strain energy by the elongation
-    return compared(
-        "eq-12-13-sign",
-        "Eqs. 12, 13",
-        "The increment d tau of an element (by Eq. 12, and by the first line of Eq. 13).",
-        float(by_12),
-        float(forces[0]),
-        within=SAME,
-        agrees="Both are the same.",
-        differs=f"They have opposite signs. An element that gets longer pulls more, by {pull:.4f} N here, as in Eq. "
-        "12; the forces on its nodes on the right of Eq. 13 are minus and plus that, where d tau and - d tau is "
-        "printed.",
-        unit="N",
-    )
+    return claim("eq-12-13-sign").compared(float(forces[0]), printed=float(by_12), pull=pull)
 
 
 def _winding() -> Claim:
@@ -102,18 +81,8 @@ def _winding() -> Claim:
     printed = stiffness() * np.array([1.0, -1.0]) * WOUND
     by_18 = stiffness() * np.array([-1.0, 1.0]) * WOUND  # k_5 = -S u, k_6 = S u
     forces = by_13(np.zeros(2), WOUND)
-    return compared(
-        "eq-15-sign",
-        "Eqs. 13, 15, 18",
-        "k_l has the entries +1 and -1 (forces of an element that is lengthened by de alone, by Eq. 15 with E A / e, "
-        "and by Eq. 13).",
-        tuple(printed.tolist()),
-        tuple(forces.tolist()),
-        within=SAME,
-        agrees="The signs agree.",
-        differs="By Eq. 13 they are -1 and +1, and Eq. 18 has the same with k_5 = -S u and k_6 = S u (difference "
-        f"{np.abs(by_18 - forces).max():.0e} N).",
-        unit="N",
+    return claim("eq-15-sign").compared(
+        tuple(forces.tolist()), printed=tuple(printed.tolist()), apart=np.abs(by_18 - forces).max()
     )
 
 
@@ -125,78 +94,29 @@ def _in_world() -> Claim:
     k_l = stiffness() * np.concatenate([-u, u])
     given = k_n @ np.concatenate([OFFSETS[0] * u, OFFSETS[1] * u]) + k_l * WOUND
     along = by_13(OFFSETS, WOUND)
-    return compared(
-        "eq-20",
-        "Eqs. 18, 19, 20",
-        "dt = k_n dx + k_l de in {G}, with de as a number (difference from the forces of Eq. 13 along u).",
-        0.0,
-        float(np.abs(given - np.concatenate([along[0] * u, along[1] * u])).max()),
-        within=SAME,
-        agrees="The forces in {G} are those of Eq. 13, along the cable.",
-        differs="The forces in {G} are not those along the cable.",
-        unit="N",
-    )
+    return claim("eq-20").compared(float(np.abs(given - np.concatenate([along[0] * u, along[1] * u])).max()))
 
 
 def _brackets() -> Claim:
     """Form [k_5 k_6]^T of Eq. 18 from its two columns; 6 x 1 is printed beside the bracket."""
     column = np.zeros((3, 1))
     size = "{} x {}".format(*np.concatenate([column, column]).shape)
-    return stated(
-        "eq-18-size",
-        "Eqs. 17, 18",
-        "[k_5 k_6]^T, [dx u dx u]^T and [de u de u]^T, where u is a column, are 6 x 1.",
-        "6 x 1",
-        size,
-        holds=size == "6 x 1",
-        agrees="They are, with one column below the other, as the size printed beside each bracket implies.",
-        differs="The sizes do not fit.",
-    )
+    return claim("eq-18-size").stated(size, size == "6 x 1")
 
 
 def _sizes() -> list[Claim]:
     """Form the products of Eqs. 14, 20 and 21 with the printed sizes."""
     nodes = 3 * (ELEMENTS + 1)
-    rows = [
-        (
-            "eq-14-size",
-            "Eqs. 14, 15",
-            "k_l (2 x 1) times de = [de de]^T (2 x 1) is a vector of two node forces",
-            "2 x 1",
-            product((2, 1), (2, 1)),
-            f"de must be a number, with which the product is {product((2, 1), (1, 1))}.",
-        ),
-        (
-            "eq-20-size",
-            "Eqs. 18, 20",
-            "k_l (6 x 1) times de (6 x 1) is a vector of two node forces in {G}",
-            "6 x 1",
-            product((6, 1), (6, 1)),
-            f"de must be a number, with which the product is {product((6, 1), (1, 1))}.",
-        ),
-        (
-            "eq-21-size",
-            "Eq. 21",
-            f"K_l and dE are both vectors of 3 (n + 1), and K_l dE is one too (n = {ELEMENTS})",
-            f"{nodes} x 1",
-            product((nodes, 1), (nodes, 1)),
-            f"K_l must have one column for each element, {nodes} x {ELEMENTS}, and dE one number: then the product is "
-            f"{product((nodes, ELEMENTS), (ELEMENTS, 1))}.",
-        ),
-    ]
-    return [
-        stated(
-            name,
-            place,
-            f"{statement} (size of the product).",
-            printed,
-            computed,
-            holds=computed == printed,
-            agrees="The sizes fit.",
-            differs=f"The sizes do not fit. {instead}",
-        )
-        for name, place, statement, printed, computed, instead in rows
-    ]
+    claims = []
+    for name, size, meant in (
+        ("eq-14-size", (2, 1), ((2, 1), (1, 1))),
+        ("eq-20-size", (6, 1), ((6, 1), (1, 1))),
+        ("eq-21-size", (nodes, 1), ((nodes, ELEMENTS), (ELEMENTS, 1))),
+    ):
+        printed, computed = "{} x {}".format(*size), product(size, size)
+        fields = {"elements": ELEMENTS, "nodes": nodes, "meant": product(*meant)}
+        claims.append(claim(name).stated(computed, computed == printed, printed, **fields))
+    return claims
 
 
 def _figure() -> Drawing:

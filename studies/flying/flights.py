@@ -24,7 +24,8 @@ from ...ocp.tasks.paths import CirclePath, Motion
 from ...simulation import Simulation, simulate
 from ...simulation.trajectory import read_trajectory
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, repaired, stated, undetermined
+from ..accounts.claim import Claim
+from .claims import claim
 from .motion import FEASIBLE, TIMES
 from .plans import BELOW, NOT_READ, RATE, SECONDS, Name, planned
 from .repair import ON_CIRCLE
@@ -129,60 +130,44 @@ def _off(flown: Flown, run: Wound) -> float:
 
 def _lengths(flown: dict[Name, Flown]) -> Claim:
     off = tuple(_off(part, part.calm) for part in flown.values())
-    return compared(
-        "eq-6-flown",
-        "section II.B, Eqs. 5, 6",
-        "The lengths of Eq. 5, without elongation, give the motion (largest distances, of a platform on the elastic "
-        "cables of Table 1 with these lengths commanded and no air, from the plans with a free quadrotor for VI.B and "
-        "VI.A, and from that assumed for figures 12 to 15).",
-        (0.0,) * len(off),
-        off,
-        within=ON_CIRCLE,
-        agrees="The platform sags by about a millimetre.",
-        differs=f"The platform sags by more than {1e3 * ON_CIRCLE:g} mm.",
-        unit="m",
-    )
+    return claim("eq-6-flown").compared(off, printed=(0.0,) * len(off), within=ON_CIRCLE, near=1000.0 * ON_CIRCLE)
 
 
-def _followed(claim: str, name: Name, flown: dict[Name, Flown]) -> Claim:
+def _followed(id: str, name: Name, flown: dict[Name, Flown]) -> Claim:
     part = flown[name]
     most = float(part.gives.error.max())
     low, high = (float(edge) for edge in (part.gives.record.tensions.min(), part.gives.record.tensions.max()))
     floor = float(part.gives.robot.t_min.max())
     below = float((part.gives.record.tensions.min(axis=1) < floor).mean())
-    return repaired(
-        claim,
-        PLACES[name],
-        f"Not in the paper: the platform follows {WHAT[name]} that gives way to the wind (largest distance in a "
-        "simulation on elastic cables, in the wind of figure 5).",
+    return claim("flown-free").repaired(
         most,
-        holds=part.gives.lasted == len(part.gives.references) and most <= ON_CIRCLE,
-        works=f"The quadrotor, prescribed and level at up to {accelerated(part.gives):.1f} m/s^2 across, gives way by "
-        f"up to {100 * moved(part.gives):.0f} cm. Tensions are from {low:.2f} N to {high:.2f} N, {below:.1%} of the "
-        f"time below the assumed t_min = {floor:g} N. Under a quadrotor that stays on the plan, which knows no air, "
-        f"the distance is up to {100 * float(part.stays.error.max()):.0f} cm.",
-        fails=f"The distance is more than {1e3 * ON_CIRCLE:g} mm, which is no proof that no other control is nearer.",
-        unit="m",
-        figure=f"flown-{name}",
+        part.gives.lasted == len(part.gives.references) and most <= ON_CIRCLE,
+        id=id,
+        place=PLACES[name],
+        what=WHAT[name],
+        name=name,
+        acceleration=accelerated(part.gives),
+        moved=100 * moved(part.gives),
+        low=low,
+        high=high,
+        below=below,
+        floor=floor,
+        stays=100 * float(part.stays.error.max()),
+        near=1000.0 * ON_CIRCLE,
     )
 
 
 def _pitching(part: Flown) -> Claim:
     worst = int(part.gives.error.argmax())
     short = float(np.nanmax(part.gives.record.shortfall, initial=0.0))
-    return undetermined(
-        "VI.C-flown",
-        PLACES["pitching"],
-        f"The platform follows {WHAT['pitching']} (largest distance in a simulation on elastic cables, in the wind of "
-        "figure 5).",
-        None,
+    return claim("VI.C-flown").undetermined(
         float(part.gives.error.max()),
-        missing=f"{NOT_READ} With the assumed flight and pitch the distance is largest at "
-        f"{part.gives.times[worst]:.1f} s: the drag sets in before a quadrotor that gives way has left "
-        f"its plan, and tensions inside the limits are short by up to {short:.1f} N. Under one that stays on the plan "
-        f"it is {100 * float(part.stays.error.max()):.0f} cm.",
-        unit="m",
-        figure="flown-pitching",
+        place=PLACES["pitching"],
+        what=WHAT["pitching"],
+        not_read=NOT_READ,
+        time=part.gives.times[worst],
+        short=short,
+        stays=100 * float(part.stays.error.max()),
     )
 
 
@@ -190,37 +175,21 @@ def _positive(flown: dict[Name, Flown]) -> Claim:
     least = tuple(float(part.gives.record.tensions.min()) for part in flown.values())
     slack = max(float((part.windy.tensions <= 0).any(axis=1).mean()) for part in flown.values())
     most = max(float(part.windy.tensions.max()) for part in flown.values())
-    return repaired(
-        "flown-positive",
-        "sections II.B, VI",
-        "Not in the paper: cables pull, F > 0, under a quadrotor that is free and gives way to the wind of figure 5 "
-        "(smallest tensions in the flights in the place of VI.B and VI.A, and in that assumed for figures 12 to 15).",
-        f"{', '.join(f'{value:.2f}' for value in least)} N",
-        holds=min(least) > 0,
-        works="All cables are taut. Without control, with the lengths of Eq. 5 "
-        f"commanded under a quadrotor on its plan, cables are slack for up to {slack:.0%} of the time, and pull with "
-        f"up to {most:.0f} N.",
-        fails="Some cable gets slack.",
-        figure="flown-circle",
+    return claim("flown-positive").repaired(
+        f"{', '.join(f'{value:.2f}' for value in least)} N", min(least) > 0, slack=slack, most=most
     )
 
 
 def _wind(robot: Robot, part: Flown) -> Claim:
     without, windy = required(robot, part), required(robot, part, gust(FLIGHT, 0))
     change = float(100 * np.abs((windy - without) / without).max())
-    return stated(
-        "conclusion-wind",
-        "sections I, VI, conclusion 1",
-        "The wind is a disturbance of the tensions (largest change of the tensions that the circle of 1 m requires).",
-        "a disturbance",
+    return claim("conclusion-wind").stated(
         f"{change:.0f} %",
-        holds=change > 1.0,
-        agrees="It is more than 1 %. Along the circle the wind would make cables push, with "
-        f"{windy.min():.1f} N, if the quadrotor stayed on its plan."
+        change > 1.0,
+        pushing=f" Along the circle the wind would make cables push, with {windy.min():.1f} N, if the quadrotor stayed "
+        "on its plan."
         if windy.min() < 0
-        else "It is more than 1 %.",
-        differs="It is less than 1 %.",
-        figure="flown-circle",
+        else "",
     )
 
 
@@ -230,39 +199,23 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
     drag = dynamics.aerodynamic_wrench(part.body.pose, part.body.velocity, np.zeros(3))[:, :2]
     strongest = dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[:2]
     along = (part.carriers.pose[-1, 0, :3] - part.carriers.pose[0, 0, :3]) / SECONDS
-    return compared(
-        "eq-25-flight",
-        "Eq. 25, VI.A",
-        "F_e depends on the velocity of the wind alone: no wind, no force (largest horizontal force along the helix, "
-        "in still air).",
-        0.0,
+    return claim("eq-25-flight").compared(
         float(np.linalg.norm(drag, axis=1).max()),
-        within=1e-9,
-        agrees="There is no force.",
-        differs=f"The platform flies at {np.linalg.norm(along):.1f} m/s, {np.linalg.norm(along[:2]):.1f} m/s of it "
-        "horizontally, through air at rest. For comparison: the strongest wind of figure 5 gives "
-        f"{np.linalg.norm(strongest):.1f} N on a platform at rest.",
-        unit="N",
+        speed=np.linalg.norm(along),
+        horizontal=np.linalg.norm(along[:2]),
+        strongest=np.linalg.norm(strongest),
     )
 
 
 def _stability(stays: Simulation, gives: Simulation) -> Claim:
     unanswered = 1 - stays.answered["as planned"] / len(stays.references)
     off = tuple(float(flight.error.max()) for flight in (stays, gives))
-    return undetermined(
-        "conclusion-stability",
-        "conclusion 3",
-        "To keep the tensions in their range, the quadrotor should be as stable as possible (largest error on a circle "
-        f"of radius {FEASIBLE:g} m in the wind of figure 5, under a quadrotor that hovers, and under one that gives "
-        "way).",
-        None,
+    return claim("conclusion-stability").undetermined(
         f"{1e3 * off[0]:.0f} mm hovering, {1e3 * off[1]:.1f} mm giving way",
-        missing="The paper does not define stable. If it means little motion of its own, see the sentence before it, "
-        "which holds. If it means not to yield to the wind: under a quadrotor that hovers, no tensions in their range "
-        f"give the wrench in {unanswered:.0%} of the steps, and one that moves with the wind by up to "
-        f"{100 * moved(gives):.0f} cm relieves the cables, with tensions in their range in "
-        f"{gives.answered['as planned'] / len(gives.references):.0%} of the steps.",
-        figure="flown-hovering",
+        feasible=FEASIBLE,
+        unanswered=unanswered,
+        moved=100 * moved(gives),
+        answered=gives.answered["as planned"] / len(gives.references),
     )
 
 

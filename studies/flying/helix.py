@@ -11,7 +11,8 @@ from ...models import Dynamics, load
 from ...ocp.tasks.paths import LinePath, Motion
 from ...solvers import TensionProblem, solve
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 from .every_pairing import PAIRINGS, TURN, at_centre, pull_inward
 from .every_pairing import tensions as tensions_of
 from .instants import instants
@@ -72,16 +73,9 @@ def _turns(world: Motion, base: Motion) -> Claim:
     """Check the radius about the line of the flight, and the number of turns."""
     arm = world.pose[:, :2] - base.pose[:, :2]
     angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
-    return compared(
-        "fig-6",
-        "VI.A, figure 6",
-        "In {G} the platform follows a helix of r = 1 m once in 10 s, at 0.2 pi rad/s (radius in m, turns).",
-        (1.0, 0.2 * SECONDS / 2),
+    return claim("fig-6").compared(
         (float(np.linalg.norm(arm, axis=1).mean()), float(np.ptp(angle) / (2 * np.pi))),
-        within=1e-9,
-        agrees="It does, 1 m below the quadrotor, which flies at constant speed.",
-        differs="The composed motion has another radius or another number of turns.",
-        figure="helix",
+        printed=(1.0, 0.2 * SECONDS / 2),
     )
 
 
@@ -92,18 +86,7 @@ def _independent(dynamics: Dynamics) -> Claim:
     world = dynamics.relative.motion_in_world(body, zero, zero, samples.base.pose, zero, zero)[0]
     lengths = dynamics.cable_lengths(world, samples.base.pose[:, None])
     change = float(np.ptp(lengths, axis=0).max())
-    return stated(
-        "eq-5",
-        "Eqs. 4, 5",
-        "The lengths depend on the quadrotor's attitude, not on its position (change with the attitude).",
-        "they change",
-        f"{change:.0e} m",
-        holds=change > 1e-9,
-        agrees="At one pose in {A} they change with the attitude.",
-        differs="R_A rotates the whole vector and does not change its norm. With x_b and R_B given in {A}, as here, "
-        "the "
-        "lengths depend neither on attitude nor on position.",
-    )
+    return claim("eq-5").stated(f"{change:.0e} m", change > 1e-9)
 
 
 def off_sine(times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -117,52 +100,21 @@ def _sine_of_lengths(crossed: np.ndarray) -> Claim:
     """Compare lengths with a sine, of the printed pairing, which has lengths though its J has no inverse."""
     printed = Dynamics(load("wang-flying-printed")).cable_lengths(circle(RADIUS).pose)
     off, others = (float(off_sine(TIMES, lengths).max()) for lengths in (printed, crossed))
-    return undetermined(
-        "fig-7-lengths",
-        "VI.A, figure 7",
-        "The lengths vary as a sine or cosine, because the motion is a spiral (distance from a sine over its "
-        "amplitude, printed pairing).",
-        0.0,
-        off,
-        missing="The squares of the lengths are sines, the lengths are not, but a figure without printed values may "
-        f"not show this distance. With crossed pairs it is {others:.1%}.",
-        figure="helix-cables",
-    )
+    return claim("fig-7-lengths").undetermined(off, others=others)
 
 
 def _sine_of_tensions() -> Claim:
     """Compare tensions with a sine, of every pairing that holds the platform at the centre."""
     held = tensions_of(circle(RADIUS, TURN), PAIRINGS[at_centre().taut])
     most = off_sine(TURN, held.reshape(len(TURN), -1)).reshape(held.shape[1:]).max(axis=1)
-    return stated(
-        "fig-7-tensions",
-        "VI.A, figure 7",
-        "The tensions vary as a sine or cosine, because the motion is a spiral (distance from a sine over its "
-        "amplitude, of the best pairing).",
-        0.0,
-        float(most.min()),
-        holds=bool(most.min() <= LIKE_A_SINE),
-        agrees=f"With the best pairing it is at most {LIKE_A_SINE:.0%}, which is taken as invisible in a figure.",
-        differs=f"With each of the {len(most)} pairings that hold the platform at the centre some cable's tension is "
-        f"farther from a sine than {LIKE_A_SINE:.0%}, which is taken as visible in a figure.",
-        figure="helix-cables",
+    return claim("fig-7-tensions").stated(
+        float(most.min()), bool(most.min() <= LIKE_A_SINE), like_a_sine=LIKE_A_SINE, count=len(most)
     )
 
 
 def _undisturbed(dynamics: Dynamics, body: Motion, tensions: np.ndarray) -> Claim:
     hovering = steady_tensions(dynamics, body)
-    return compared(
-        "VI.A-flight",
-        "VI.A",
-        "Ideally only the winding moves the platform (change of the tensions in straight flight).",
-        0.0,
-        float(np.abs(hovering - tensions).max()),
-        within=1e-9,
-        agrees="A level flight without acceleration is no disturbance: the tensions are those under a hovering "
-        "quadrotor.",
-        differs="The flight disturbs the tensions.",
-        unit="N",
-    )
+    return claim("VI.A-flight").compared(float(np.abs(hovering - tensions).max()))
 
 
 def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndarray) -> Claim:
@@ -178,19 +130,13 @@ def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndar
     shortfall = proof.shortfall if proof is not None and proof.verify(problem) else 0.0
     pull = pull_inward(RADIUS)
     excluded = pull.least > pull.needed
-    return stated(
-        "fig-7-positive",
-        "VI.A, figure 7, section II",
-        "Cables pull, F > 0, along the whole helix of r = 1 m (smallest tension of its only solution).",
-        "> 0 N",
+    return claim("fig-7-positive").stated(
         f"{tensions.min():.1f} N",
-        holds=shortfall <= 0 and not excluded,
+        shortfall <= 0 and not excluded,
         otherwise=Verdict.IMPOSSIBLE if excluded else Verdict.NOT_DETERMINED,
-        agrees="Tensions above zero exist, at the worst instant too.",
-        differs=f"With any pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
+        why=f"With any pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
         f"{pull.needed:.2f} N is needed. With crossed pairs, tensions are short by {shortfall:.2f} N at "
         f"{TIMES[row]:.1f} s, along a verified direction."
         if excluded
         else "With crossed pairs no tensions give the wrench, which excludes no other pairing.",
-        figure="helix-cables",
     )

@@ -14,7 +14,8 @@ from ...figures.from_above import from_above
 from ...models import load
 from ...models.diagnosis import diagnose
 from ..accounts.account import Chapter
-from ..accounts.claim import Verdict, stated
+from ..accounts.claim import Verdict
+from .claims import claim
 
 ROWS = 6  # of J, whose inverse step 7 of section V takes
 LEVEL = 200  # positions and yaws at which the coordinates are formed
@@ -25,27 +26,22 @@ def chapter() -> Chapter:
     robot = load("wang-flying")
     printed, crossed = diagnose(load("wang-flying-printed")), diagnose(robot)
     values = ", ".join(f"{value:.3g}" for value in crossed.singular_values)
-    claim = stated(
-        "pairing",
-        "Eqs. 2, 3, 38, section V step 7",
-        "Cable i joins A_i to B_i, neighbours are separated by 60 degrees, and T = J^-1 (...) (rank of J).",
-        float(ROWS),
+    rank = claim("pairing").stated(
         float(printed.rank_level),
-        holds=printed.rank_level == ROWS,
+        printed.rank_level == ROWS,
+        printed=float(ROWS),
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="J has full rank at level poses.",
-        differs="While the platform is level, at every position and yaw, the Pluecker coordinates of the six lines are "
-        f"affine in the cosine and sine of 60 degrees (i - 1), here to {off_affine():.0e} of the largest, so the rank "
-        f"is 3 at most. At yaw 0 {printed.reason}. Crossed pairs of the same points (A1-B2, A2-B1, ...) have rank "
-        f"{crossed.rank} and singular values {values} (moments over "
-        f"{robot.length:.3g} m); all other chapters use them.",
-        figure="pairing",
+        affine=off_affine(),
+        reason=printed.reason,
+        rank=crossed.rank,
+        values=values,
+        length=robot.length,
     )
     pairs = {
         f"as printed: rank {printed.rank}": _points("wang-flying-printed"),
         f"crossed: rank {crossed.rank}": _points("wang-flying"),
     }
-    return Chapter([claim], {"pairing": Drawing("The numbered cables from above", from_above(pairs))})
+    return Chapter([rank], {"pairing": Drawing("The numbered cables from above", from_above(pairs))})
 
 
 def off_affine(seed: int = 0) -> float:

@@ -6,7 +6,8 @@ import numpy as np
 
 from ...models import Robot, load
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated
+from ..accounts.claim import Claim
+from .claims import claim
 from .plans import BELOW
 
 # As printed, in the paper's own units.
@@ -74,15 +75,12 @@ def _used(robot: Robot) -> list[Claim]:
         ),
     ]
     return [
-        compared(
-            f"table-1-{name}",
-            "Table 1",
-            f"{statement}.",
-            printed,
+        claim("table-1-{name}").compared(
             tuple(float(value) for value in computed),
-            within=1e-9 * max(printed),
-            agrees="The robot file of this run has the same numbers; they are its input, no result.",
-            differs="The robot file of this run has other numbers.",
+            printed=printed,
+            within=1e-09 * max(printed),
+            name=name,
+            statement=statement,
         )
         for name, statement, printed, computed in groups
     ]
@@ -100,17 +98,7 @@ def _ring(points: np.ndarray) -> tuple[float, float, float]:
 
 def _rigid() -> Claim:
     others = PRINTED["I_x"] + PRINTED["I_y"]
-    return stated(
-        "table-1-rigid",
-        "Table 1",
-        "The moments of inertia are those of a rigid body (largest moment, sum of the others).",
-        PRINTED["I_z"],
-        others,
-        holds=PRINTED["I_z"] <= others,
-        agrees="I_z is not larger than I_x + I_y, the computed value.",
-        differs="I_z is larger than I_x + I_y, the computed value, which is impossible for a rigid body.",
-        unit="kg m^2",
-    )
+    return claim("table-1-rigid").stated(others, PRINTED["I_z"] <= others, printed=PRINTED["I_z"])
 
 
 def _gyration() -> Claim:
@@ -118,35 +106,19 @@ def _gyration() -> Claim:
     reach = max(PRINTED["r_B"], float(np.sqrt(PRINTED["S"] / np.pi)))
     most = PRINTED["m_B"] * reach**2
     radius = float(np.sqrt(PRINTED["I_z"] / PRINTED["m_B"]))
-    return stated(
-        "table-1-gyration",
-        "Table 1",
-        "A platform of 1.2 kg with attachments at r_B = 0.25 m and a cross section of 0.16 m^2 has this I_z.",
-        PRINTED["I_z"],
-        most,
-        holds=PRINTED["I_z"] <= most,
-        agrees="A body within that radius can have it.",
-        differs=f"The whole mass at {reach:.2f} m from the axis has the computed I_z; the printed I_z requires a "
-        "radius of "
-        f"gyration of {radius:.2f} m. All chapters use the printed I_z.",
-        unit="kg m^2",
+    return claim("table-1-gyration").stated(
+        most, PRINTED["I_z"] <= most, printed=PRINTED["I_z"], reach=reach, radius=radius
     )
 
 
 def _height(robot: Robot) -> Claim:
     """Compare the signs of z in {A} with the heights in {G}."""
     centre = CIRCLE - QUADROTOR
-    return compared(
-        "eq-2-height",
-        "Eq. 2, VI.A, VI.B",
-        "a_i has z = +H_1 and the centre of the circle z = +1 in {A}, whose axes at zero angles are those of {G}, z "
-        "up.",
-        (PRINTED["H_1"], CENTRE),
+    return claim("eq-2-height").compared(
         (float(np.sign(centre)) * PRINTED["H_1"], centre),
-        within=1e-9,
-        agrees="The heights in {G} agree.",
-        differs=f"The circle is at {CIRCLE:g} m under a quadrotor at {QUADROTOR:g} m, so points below it have z < 0 in "
-        f"{{A}}: "
-        f"the anchors {robot.anchors[0, 2]:g} m, the centre {-BELOW:g} m.",
-        unit="m",
+        printed=(PRINTED["H_1"], CENTRE),
+        circle=CIRCLE,
+        quadrotor=QUADROTOR,
+        anchor=robot.anchors[0, 2],
+        below=-BELOW,
     )

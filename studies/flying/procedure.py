@@ -23,7 +23,8 @@ from ...models.diagnosis import diagnose
 from ...models.rotation import rotation
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 from .motion import FEASIBLE, TIMES, circle
 from .vibration import ELEMENTS, STEP, vibration
 
@@ -97,30 +98,15 @@ def _instant(robot: Robot, pose: np.ndarray, shake: np.ndarray) -> tuple[np.ndar
 
 
 def _given() -> Claim:
-    return undetermined(
-        "step-1",
-        "section V, step 1",
-        "The points A_i and B_i, the time step dt, E, A, C, the number n of elements and the vibration are given.",
-        None,
-        f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um",
-        missing="Points, E, A and C are in Table 1; dt, n and the vibration are not printed, and assumed.",
-    )
+    return claim("step-1").undetermined(f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um")
 
 
 def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, unit: str) -> Claim:
     """Report how far one step and `driving_force` are apart, which is no verdict on the paper."""
     off = float(np.abs(run - own).max())
     agree = f"agree to {off:.0e} {unit}" if off <= SAME else f"differ by up to {off:.2g} {unit}"
-    return undetermined(
-        name,
-        f"section V, step {step}",
-        f"The {what} (largest value in the first second of a circle of {FEASIBLE:g} m).",
-        None,
-        float(np.abs(run).max()),
-        missing="The paper prints no result of this step to compare. Two computations of this toolkit, step by step "
-        f"and in one pass, {agree}: they interpret the step in the same way.",
-        unit=unit,
-        figure="procedure",
+    return claim("one-step").undetermined(
+        float(np.abs(run).max()), name=name, step=step, what=what, feasible=FEASIBLE, unit=unit, agree=agree
     )
 
 
@@ -131,51 +117,19 @@ def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
     dT = run.dT_C + run.dT_K
     slope = np.gradient(run.T, run.times, axis=0)
     meant, literal = (float(np.abs(np.einsum("nij,nj->ni", A, run.T + part) - w).max()) for part in (dT, slope))
-    return compared(
-        "step-7",
-        "section V, step 7",
-        "T = J^-1 (M ddX_b + F_B + D_B - W_e - J T') (error of the platform's balance if T' is dT/dt).",
-        0.0,
-        literal,
-        within=SAME,
-        agrees="The derivative balances the platform.",
-        differs="T' is not defined in the paper. With dT, the increment of step 6, in its place the error is "
-        f"{meant:.0e} N.",
-        unit="N",
-        figure="procedure",
-    )
+    return claim("step-7").compared(literal, within=SAME, meant=meant)
 
 
 def _inverse() -> Claim:
     rank = diagnose(load("wang-flying-printed")).rank_level
-    return stated(
-        "step-7-inverse",
-        "section V, step 7",
-        "J^-1 exists for the printed pairing at the level poses of section VI (rank of J).",
-        6.0,
-        float(rank),
-        holds=rank == 6,
-        otherwise=Verdict.IMPOSSIBLE,
-        agrees="J has an inverse.",
-        differs="There is no inverse at any level pose, by the claim `pairing`; step 7 is run with the crossed pairs.",
-    )
+    return claim("step-7-inverse").stated(float(rank), rank == 6, otherwise=Verdict.IMPOSSIBLE)
 
 
 def _clock() -> Claim:
     """Compare the times of t = t + k dt for k = 1, 2, 3, ... with those of a constant step."""
     count = 4
     printed = tuple(accumulate(k * STEP for k in range(count)))
-    return compared(
-        "step-8",
-        "section V, step 8",
-        "Let k = k + 1, then t = t + k dt (first times of the loop).",
-        printed,
-        tuple(k * STEP for k in range(count)),
-        within=1e-12,
-        agrees="The time step is constant.",
-        differs="Taken literally the steps grow with k; t = k dt is meant.",
-        unit="s",
-    )
+    return claim("step-8").compared(tuple(k * STEP for k in range(count)), printed=printed)
 
 
 def _figure(run: Run, own: DrivingForce) -> Drawing:

@@ -14,7 +14,8 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...solvers import solve_batch
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, stated
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 from .every_pairing import PAIRINGS, at_centre, hold, pull_inward
 from .motion import RADIUS, TIMES, circle, steady_tensions
 from .plans import BELOW
@@ -69,41 +70,23 @@ def _largest(best: float, crossed: float, kept: str) -> Claim:
     beyond = [radius for radius in (*BEYOND, RADIUS) if radius > best]
     holding = sum(len(hold(radius)) for radius in beyond)
     taut = int(at_centre().taut.sum())
-    return stated(
-        "radius",
-        "VI.A, VI.B",
-        "The platform follows a circle of this radius, 1 m below the hovering quadrotor, on cables that only pull "
-        "(largest radius with any pairing of the twelve points).",
-        RADIUS,
+    return claim("radius").stated(
         best,
-        holds=best >= RADIUS or holding > 0,
+        best >= RADIUS or holding > 0,
+        printed=RADIUS,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="Some pairing holds the platform there.",
-        differs=f"Of the {len(PAIRINGS)} pairings {taut} have rank 6 and hold the platform at the centre with every "
-        "cable taut. The best of all reaches the computed radius, and none holds the platform at "
-        f"{', '.join(f'{radius:g}' for radius in beyond)} m. Crossed pairs reach {crossed:.4f} m, {kept}.",
-        unit="m",
-        figure="radius",
+        pairings=len(PAIRINGS),
+        taut=taut,
+        beyond=", ".join(f"{radius:g}" for radius in beyond),
+        crossed=crossed,
+        kept=kept,
     )
 
 
 def _inward() -> Claim:
     pull = pull_inward(RADIUS)
-    return stated(
-        "circle-any-pairing",
-        "VI.A, VI.B",
-        "With the pairing that the figures use, cables that carry the weight pull inward with the force that a "
-        f"circle of {RADIUS:g} m requires (that force; the least that any pairing gives).",
-        pull.needed,
-        pull.least,
-        holds=pull.least <= pull.needed,
-        otherwise=Verdict.IMPOSSIBLE,
-        agrees="The weight does not exclude it.",
-        differs="The platform is outside the ring, so each of the 36 lines from an anchor to an attachment leads "
-        "inward: cables that pull and carry the weight pull inward with at least the computed force, whatever they "
-        "join. No wind is in it.",
-        unit="N",
-        figure="radius",
+    return claim("circle-any-pairing").stated(
+        pull.least, pull.least <= pull.needed, printed=pull.needed, otherwise=Verdict.IMPOSSIBLE, radius=RADIUS
     )
 
 

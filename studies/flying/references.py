@@ -10,7 +10,8 @@ import numpy as np
 
 from ...models import load
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared
+from ..accounts.claim import Claim
+from .claims import claim
 from .element import ELEMENTS
 from .motion import RADIUS, circle
 
@@ -62,30 +63,18 @@ def chapter() -> Chapter:
 
 
 def _in_steps() -> Claim:
-    return compared(
-        "section-V-references",
-        "section V, steps 2, 4, 5, 6 and 7",
-        "l_i, dB, dT_C, dT_K, dT and T are computed by the equations with these numbers.",
-        tuple(float(number) for number in IN_STEPS),
+    return claim("section-V-references").compared(
         by_order(IN_STEPS),
-        within=0.0,
-        agrees="These are the numbers of the equations.",
-        differs="They are the places of the equations in the text, whose numbers are one less, as Eq. 2 is printed "
-        f"twice: the {len(TAGS)} equations end with Eq. {TAGS[-1]}, so there is no Eq. {IN_STEPS[-1]}.",
+        printed=tuple(float(number) for number in IN_STEPS),
+        tags=len(TAGS),
+        last=TAGS[-1],
+        in_steps=IN_STEPS[-1],
     )
 
 
 def _outside() -> Claim:
-    return compared(
-        "section-II-IV-references",
-        "sections II, III and IV",
-        "The text refers to equations with these numbers, from the length of a cable to the last grouping.",
-        tuple(float(number) for number in OUTSIDE),
-        by_order(OUTSIDE),
-        within=0.0,
-        agrees="These are the numbers of the equations.",
-        differs='They are places in the text too, and the numbers are one less: "from (6)" the length does not depend '
-        'on the quadrotor\'s position (Eq. 5), "(28), (29), (31), (32) and (33) into (30)" gives Eq. 33.',
+    return claim("section-II-IV-references").compared(
+        by_order(OUTSIDE), printed=tuple(float(number) for number in OUTSIDE)
     )
 
 
@@ -95,16 +84,8 @@ def by_order(references: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def _figures() -> Claim:
-    return compared(
-        "section-VI-references",
-        "VI.A, VI.B",
-        "The text refers to figures with these numbers for the helix, for lengths and tensions, and for trajectories, "
-        "length, force and ratio of cable 1.",
-        tuple(float(number) for number in SHOWN.values()),
-        tuple(float(CAPTIONS[what]) for what in SHOWN),
-        within=0.0,
-        agrees="These are the numbers of the captions.",
-        differs="By their captions these figures have the computed numbers, which the claims of this account use.",
+    return claim("section-VI-references").compared(
+        tuple(float(CAPTIONS[what]) for what in SHOWN), printed=tuple(float(number) for number in SHOWN.values())
     )
 
 
@@ -112,18 +93,7 @@ def _frames() -> Claim:
     """Transform the platform's circle into its own frame."""
     motion = circle(RADIUS)
     in_own = motion.pose[:, :3] - motion.pose[:, :3]  # O_B from O_B; the level platform's axes are those of {A}
-    return compared(
-        "frames",
-        "IV.B, VI.A, VI.B",
-        "The platform moves on a circle in {B}, where X_b is its position (radius of the path of its centre in {B}).",
-        RADIUS,
-        float(np.linalg.norm(in_own, axis=1).max()),
-        within=1e-9,
-        agrees="The centre moves in {B}.",
-        differs="{B} is fixed to the platform, whose centre does not move in it: {A} is meant, in which the circle's "
-        "centre is given. In the same way X_a, the position of the quadrotor, is in {G} and not in its own frame {A}.",
-        unit="m",
-    )
+    return claim("frames").compared(float(np.linalg.norm(in_own, axis=1).max()), printed=RADIUS)
 
 
 def _angle() -> Claim:
@@ -135,27 +105,10 @@ def _angle() -> Claim:
         before, after = (r_B * np.array([np.cos(angle), np.sin(angle)]) for angle in (alpha_B, alpha_B + of_b))
         return float(np.linalg.norm(after - before) / TURN)
 
-    return compared(
-        "eq-3-alpha",
-        "Eq. 3",
-        "b_i has the angle alpha_A (shift of B_2 as the angle between the anchors changes, per radian).",
-        moved(TURN),
-        moved(0.0),
-        within=1e-9,
-        agrees="The attachments do not depend on it.",
-        differs="alpha_B, the angle between the attachments, is meant. Both are 60 degrees, so no number changes.",
-        unit="m",
-    )
+    return claim("eq-3-alpha").compared(moved(0.0), printed=moved(TURN))
 
 
 def _cables() -> Claim:
-    return compared(
-        "eq-23-cables",
-        "text below Eq. 23",
-        f"The number of the cable is i = 1, 2, ..., n + 1, where n is the number of elements (last i, n = {ELEMENTS}).",
-        float(ELEMENTS + 1),
-        float(load("wang-flying-printed").m),
-        within=0.0,
-        agrees="There are as many cables.",
-        differs="There are six cables, however many elements each has; n + 1 is the number of its nodes.",
+    return claim("eq-23-cables").compared(
+        float(load("wang-flying-printed").m), printed=float(ELEMENTS + 1), elements=ELEMENTS
     )

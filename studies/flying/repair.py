@@ -12,9 +12,10 @@ from ...figures.drawing import Drawing
 from ...models import load
 from ...ocp import Plan, plan
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, repaired, stated
+from ..accounts.claim import Claim, Verdict
 from . import plans
 from .circle import tasks
+from .claims import claim
 from .every_pairing import pull_inward
 from .motion import RADIUS
 
@@ -57,17 +58,12 @@ def _hovering(planned: Plan) -> Claim:
         if excluded
         else " That excludes crossed pairs alone."
     )
-    return stated(
-        "circle",
-        "VI.B, figures 8, 9 and 10",
-        f"Under a quadrotor hovering at [50, 50, 100] m the platform follows a circle of radius {RADIUS:g} m at 99 m.",
-        "tensions are drawn",
+    return claim("circle").stated(
         planned.status.value,
-        holds=planned.feasible,
+        planned.feasible,
         otherwise=Verdict.IMPOSSIBLE if proof is not None and excluded else Verdict.NOT_DETERMINED,
-        agrees="Every tension is inside its limits, audited at 1 kHz.",
-        differs=why,
-        figure="circle-tensions",
+        radius=RADIUS,
+        why=why,
     )
 
 
@@ -78,16 +74,15 @@ def _repaired(name: str, place: str, what: str, planned: Plan, figure: str) -> C
     tensions = "" if low is None or high is None else f"tensions from {low:.2f} N to {high:.2f} N"
     apart = planned.trajectory["carrier_pose"].values[:, 0, :2] - planned.trajectory["pose"].values[:, :2]
     away = float(np.linalg.norm(apart, axis=1).max())
-    return repaired(
-        name,
-        place,
-        f"Not in the paper: the quadrotor is free to move, and the platform follows the {what} of {RADIUS:g} m in "
-        "{G} (largest distance from it).",
+    return claim("free-quadrotor").repaired(
         planned.tracking_error_max,
-        holds=followed,
-        works=f"The quadrotor, level all the time, is at most {100 * away:.0f} cm beside the platform: {tensions}, "
-        f"audited at {planned.audit.rate:.0f} Hz.",
-        fails="The planner has no feasible plan, which is no proof that there is none.",
-        unit="m",
+        followed,
+        name=name,
+        place=place,
+        what=what,
+        radius=RADIUS,
         figure=figure,
+        away=100 * away,
+        tensions=tensions,
+        rate=planned.audit.rate,
     )

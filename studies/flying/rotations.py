@@ -9,7 +9,8 @@ import numpy as np
 
 from ...models import rotation
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated
+from ..accounts.claim import Claim
+from .claims import claim
 from .instants import Instants, Turning, instants
 
 ROUNDING = 1e-12
@@ -33,18 +34,7 @@ def _matrix(samples: Instants) -> Claim:
     off = min(float(np.abs(np.sqrt(squares) - 1).max()) for squares in lengths)
     R = samples.R_A.R
     ours = float(np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max())
-    return stated(
-        "eq-1",
-        "Eqs. 1, 2",
-        "R of roll, pitch and yaw, where phi stands for two of them (difference of the norm of its third row from 1).",
-        0.0,
-        off,
-        holds=off < ROUNDING,
-        agrees="One reading of the letters gives a rotation.",
-        differs="Whether each phi is read as roll or as yaw, the third row is no unit vector (computed: the best "
-        "reading "
-        f"at its worst angles); R = Rz(yaw) Ry(pitch) Rx(roll) is meant, orthogonal to {ours:.0e}.",
-    )
+    return claim("eq-1").stated(off, off < ROUNDING, ours=ours)
 
 
 def _small_angle() -> Claim:
@@ -58,17 +48,7 @@ def _small_angle() -> Claim:
         Rz = identity + sy * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]])
         sizes.append(float(np.abs(Rz @ Ry @ Rx - identity).max()))
     printed, meant = sizes
-    return compared(
-        "eq-9-small",
-        "section III.B, above Eq. 9",
-        "For a small u, sin u = 0 and cos u = 1 (largest entry of the matrix of Eq. 9, for angles up to "
-        f"{SMALL:g} rad).",
-        printed,
-        meant,
-        within=SMALL**2,
-        agrees="The matrix is that of Eq. 9.",
-        differs="With sin u = 0 there is no rotation and the matrix of Eq. 9 is zero; sin u = u is meant.",
-    )
+    return claim("eq-9-small").compared(meant, printed=printed, within=SMALL**2, small=SMALL)
 
 
 def _small_turn() -> Claim:
@@ -76,33 +56,13 @@ def _small_turn() -> Claim:
     angles = SMALL * np.array([0.6, -0.8, 1.0])
     turned = rotation.rotation(ca.DM(angles)).full()
     off = float(np.abs(turned - np.eye(3) - ca.skew(ca.DM(angles)).full()).max())
-    return stated(
-        "eq-9",
-        "Eqs. 9, 10",
-        "A small rotation moves B_i by [dTheta]x (R b_i), with the yaw in row one and the roll in row two of the "
-        "matrix.",
-        0.0,
-        off,
-        holds=off < SMALL**2,
-        agrees=f"At {SMALL:g} rad the matrix is R - 1 up to terms of second order.",
-        differs=f"At {SMALL:g} rad the matrix differs from R - 1 by more than terms of second order.",
-    )
+    return claim("eq-9").stated(off, off < SMALL**2, small=SMALL)
 
 
 def _rate(samples: Instants) -> Claim:
     ours = _each(rotation.body_rate, samples.base.pose, samples.base.velocity)
     off = float(np.abs(ours - samples.R_A.rate).max())
-    return compared(
-        "eq-27-28",
-        "Eqs. 27, 28",
-        "omega = P dTheta (difference from the angular velocity in R^T dR).",
-        0.0,
-        off,
-        within=ROUNDING,
-        agrees="P as printed gives the angular velocity to rounding.",
-        differs="P as printed does not give the angular velocity.",
-        unit="rad/s",
-    )
+    return claim("eq-27-28").compared(off, within=ROUNDING)
 
 
 def printed_acceleration(motion_pose: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
@@ -124,16 +84,12 @@ def _acceleration(samples: Instants) -> Claim:
     bent = _each(lambda a, r: rotation.rate_matrix_derivative(a, r) @ r, samples.base.pose, samples.base.velocity)
     ours = bent + _each(rotation.body_rate, samples.base.pose, samples.base.acceleration)
     rounding = float((np.linalg.norm(ours - true, axis=1) / size).max())
-    return compared(
-        "eq-31-32",
-        "Eqs. 31, 32",
-        "alpha = dP dTheta + ddTheta (median relative difference from the derivative of omega).",
-        0.0,
+    return claim("eq-31-32").compared(
         float(np.median(off)),
         within=ROUNDING,
-        agrees="The printed form is the derivative of P dTheta.",
-        differs=f"alpha = dP dTheta + P ddTheta holds to {rounding:.0e}; without the P the error grows with the angles "
-        f"(here up to {np.abs(samples.base.pose[:, 3:]).max():.1f} rad) and reaches {off.max():.0%}.",
+        rounding=rounding,
+        angle=np.abs(samples.base.pose[:, 3:]).max(),
+        off=off.max(),
     )
 
 
@@ -148,34 +104,14 @@ def _composed(samples: Instants) -> Claim:
         + np.cross(samples.R_A.rate, _turn(R, samples.R_B.rate))
     )
     off = float(np.abs(_turn(samples.R_A.R, inner) - in_world).max())
-    return compared(
-        "eq-30",
-        "Eq. 30",
-        "alpha of the platform in {G} from those of {A} and of {B} in {A} (difference from that of R_A R_B).",
-        0.0,
-        off,
-        within=ROUNDING,
-        agrees="Eq. 30 holds to rounding, with the correct alpha_A and alpha_B.",
-        differs="Eq. 30 is not the angular acceleration of the product of both rotations.",
-        unit="rad/s^2",
-    )
+    return claim("eq-30").compared(off, within=ROUNDING)
 
 
 def _relative_to(samples: Instants) -> Claim:
     """Compare the derivative of omega_BA with the angular acceleration of {B} relative to {G}, both in {B}."""
     whole, own = samples.R_A.then(samples.R_B).acceleration, samples.R_B.acceleration
     off = np.linalg.norm(whole - own, axis=1) / np.linalg.norm(whole, axis=1)
-    return compared(
-        "eq-32-frame",
-        "text below Eq. 30, Eq. 32",
-        "alpha_BA, the derivative of omega_BA, is the angular acceleration of {B} relative to {G} (median relative "
-        "difference).",
-        0.0,
-        float(np.median(off)),
-        within=ROUNDING,
-        agrees="Both are the same.",
-        differs="It is the one relative to {A}, with which Eq. 30 holds.",
-    )
+    return claim("eq-32-frame").compared(float(np.median(off)), within=ROUNDING)
 
 
 def _each(function, pose: np.ndarray, rates: np.ndarray) -> np.ndarray:

@@ -22,7 +22,8 @@ from ...models.air import trapezoid
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...plant import Plant
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated, undetermined
+from ..accounts.claim import Claim
+from .claims import claim
 from .motion import FEASIBLE, circle
 from .vibration import ELEMENTS, HERTZ, PHASES, RATIO
 from .wind import NOISE, PEAK
@@ -158,86 +159,32 @@ def _rms(values: np.ndarray) -> float:
 
 def _superposed(seen: Shaken) -> Claim:
     off = np.abs(seen.dT - seen.elastic - seen.damping)[BEGUN].max() / np.abs(seen.dT)[BEGUN].max()
-    return compared(
-        "eq-7-plant",
-        "Eq. 7, conclusion 1",
-        "The tension is that of the steady winding and that of the small vibration, superposed (tension of cable 1 in "
-        "the elastic plant, less that without vibration, less E A / l dl + C d(dl)/dt, over the largest dT).",
-        0.0,
-        float(off),
-        within=SAME,
-        agrees="What a vibration adds to the tension is linear in the length that it adds, and in its rate. The "
-        "plant is this toolkit's own.",
-        differs="The tension is no superposition.",
-        figure="shaken",
-    )
+    return claim("eq-7-plant").compared(float(off))
 
 
 def _elastic(seen: Shaken, given: DrivingForce) -> Claim:
-    return compared(
-        "eq-21-plant",
-        "Eqs. 12, 21, section V step 5",
-        "The chain of elements gives dT_K of the vibrating cable (its root mean square over that of dT in the elastic "
-        "plant less C d(dl)/dt, for the displacement from the steady motion).",
-        1.0,
-        _rms(given.dT_K[:, 0]) / _rms(seen.dT - seen.damping),
-        within=SAME,
-        agrees="It does if cables stay taut, as they are here. Chain and plant are both this toolkit's own.",
-        differs="The elastic increments are others.",
-        figure="shaken",
-    )
+    return claim("eq-21-plant").compared(_rms(given.dT_K[:, 0]) / _rms(seen.dT - seen.damping))
 
 
 def _switch(robot: Robot, seen: Shaken) -> Claim:
     paper = driving_force(robot, *circle(FEASIBLE, SHAKEN), seen.vibration, USED * PERIOD, ELEMENTS)
-    return compared(
-        "eq-16-plant",
-        "Eqs. 15, 16",
-        "A cable whose attachment moves towards the anchor carries no increment (smallest dT_K of cable 1 by this "
-        "rule, and in the elastic plant).",
-        float(paper.dT_K[BEGUN, 0].min()),
+    return claim("eq-16-plant").compared(
         float((seen.dT - seen.damping)[BEGUN].min()),
+        printed=float(paper.dT_K[BEGUN, 0].min()),
         within=SAME * float(np.abs(seen.elastic[BEGUN]).max()),
-        agrees="The tension never decreases.",
-        differs="A cable that pulls with the steady tension T loses tension when it gets shorter. It is slack only "
-        "where that takes all of T.",
-        unit="N",
-        figure="shaken",
     )
 
 
 def _damping(seen: Shaken, displaced: dict[int, DrivingForce]) -> Claim:
     ratios = tuple(_rms(given.dT_C[:, 0]) / _rms(seen.damping) for given in displaced.values())
-    return compared(
-        "eq-11-plant",
-        "Eq. 11, section V step 4",
-        "dT_C = C (l(B_new) - l(B)) / dt, where B_new is displaced from the steady B (its root mean square over that "
-        f"of the damping in the elastic plant, for dt = {_milliseconds()} ms).",
-        (1.0,) * len(ratios),
-        ratios,
-        within=SAME,
-        agrees="They are the same.",
-        differs="A displacement over a time step is no rate. It grows without bound as the step gets smaller, and is "
-        "in phase with dl, where damping is in phase with d(dl)/dt.",
-        figure="shaken",
-    )
+    return claim("eq-11-plant").compared(ratios, printed=(1.0,) * len(ratios), milliseconds=_milliseconds())
 
 
 def _stepped(seen: Shaken, stepped: dict[int, DrivingForce]) -> Claim:
     elastic = tuple(_rms(given.dT_K[:, 0]) / _rms(seen.elastic) for given in stepped.values())
     damping = ", ".join(f"{_rms(given.dT_C[:, 0]) / _rms(seen.damping):.2f}" for given in stepped.values())
-    return compared(
-        "eq-10-plant",
-        "Eqs. 8, 10, 11",
-        "The displacement dB is the change of one sampling time dt (dT_K with it, its root mean square over that of "
-        f"the elastic plant, for dt = {_milliseconds()} ms).",
-        (1.0,) * len(elastic),
-        elastic,
-        within=SAME,
-        agrees="They are the same.",
-        differs=f"With it dT_C is right for short steps ({damping} of the damping in the plant), but dT_K is the "
-        "change of the elastic force in one step, not the force. No dB gives both.",
-        figure="shaken",
+    return claim("eq-10-plant").compared(
+        elastic, printed=(1.0,) * len(elastic), milliseconds=_milliseconds(), damping=damping
     )
 
 
@@ -248,35 +195,19 @@ def _slow(free: np.ndarray) -> Claim:
     periods = np.array([float(wave[-1]) if len(wave) else np.inf for wave in waves])
     slowest = int(left.argmax())
     taken = float((left / periods)[slowest])
-    return stated(
-        "section-III-vibration",
-        "section III.A",
-        "The platform makes low-frequency and slow-decay vibration, because cables have low stiffness and small "
-        "damping (time until a tenth is left of the vibration after a push along x, y, z, roll, pitch and yaw).",
-        "slow decay",
+    return claim("section-III-vibration").stated(
         f"{', '.join(f'{value:.2f}' for value in left)} s",
-        holds=taken > SLOW,
-        agrees=f"It takes more than {SLOW:g} periods.",
-        differs=f"The longest takes {taken:.1f} periods at {1 / periods[slowest]:.1f} Hz; more than {SLOW:g} would "
-        "count as slow here. Table 1's C = 0.2 N/(mm/s) damps all of them strongly.",
-        figure="released",
+        taken > SLOW,
+        slow=SLOW,
+        taken=taken,
+        slowest=1 / periods[slowest],
     )
 
 
 def _noise(strongest: dict[str, np.ndarray]) -> Claim:
     given = ", ".join(f"{values[0]:.1%} with {name}" for name, values in strongest.items())
     others = max(float(values.max()) for values in strongest.values())
-    return undetermined(
-        "fig-11-wind",
-        "III.A, VI.B, figure 11",
-        "Wind is a cause of the vibration, whose largest dT / T of cable 1 is 12.47 % (largest dT / T by the noise of "
-        "figure 5 in the elastic plant, platform at rest 1 m below a hovering quadrotor).",
-        f"{RATIO:.2%}",
-        given,
-        missing="Neither the cause of the vibration nor the time between samples of the noise is printed. The noise "
-        f"alone gives cable 1 values of this size, and other cables up to {others:.0%}.",
-        figure="blown",
-    )
+    return claim("fig-11-wind").undetermined(given, printed=f"{RATIO:.2%}", others=others)
 
 
 def _milliseconds() -> str:

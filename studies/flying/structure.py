@@ -12,7 +12,8 @@ from ...figures.robot import RobotSketch, draw
 from ...models import Dynamics, load
 from ...models.rotation import rotation
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated
+from ..accounts.claim import Claim
+from .claims import claim
 from .instants import Instants, instants
 
 ROUNDING = 1e-12  # [m]
@@ -39,20 +40,7 @@ def _suspended() -> Claim:
         tensions = np.linalg.pinv(A, rcond=RANK) @ w
         pulls.append(tensions.min())
         left.append(np.abs(A @ tensions - w).max())
-    return stated(
-        "fig-1",
-        "section II.A, figure 1",
-        "Six cables suspend the platform under the quadrotor, and its weight keeps them taut (smallest tension at "
-        "home, printed pairing and crossed pairs).",
-        "> 0",
-        tuple(float(value) for value in pulls),
-        holds=min(pulls) > 0 and max(left) < ROUNDING,
-        agrees="With either pairing cables that pull balance the weight at the centre of the circle. Crossed pairs "
-        "have these tensions alone; the printed pairing, of rank 3, has others too, and these have the least norm.",
-        differs="Pulling cables do not balance the weight.",
-        unit="N",
-        figure="structure",
-    )
+    return claim("fig-1").stated(tuple(float(value) for value in pulls), min(pulls) > 0 and max(left) < ROUNDING)
 
 
 def _points(samples: Instants) -> Claim:
@@ -61,17 +49,7 @@ def _points(samples: Instants) -> Claim:
     world, _, _ = dynamics.relative.motion_in_world(*samples.body, *samples.base)
     own = np.concatenate(dynamics.points(world, samples.base.pose[:, None]), axis=1)
     off = float(np.abs(np.concatenate(_anchors_and_ends(samples), axis=1) - own).max())
-    return compared(
-        "eq-3",
-        "Eqs. 2, 3",
-        "A_i = R_A a_i + x_A and B_i = R_A x_b + R_A R_B b_i + x_A (difference from the points of the model in {G}).",
-        0.0,
-        off,
-        within=ROUNDING,
-        agrees="The points are the same at random poses of both bodies.",
-        differs="The points are others.",
-        unit="m",
-    )
+    return claim("eq-3").compared(off, within=ROUNDING)
 
 
 def _anchors_and_ends(samples: Instants) -> tuple[np.ndarray, np.ndarray]:
@@ -88,18 +66,7 @@ def _loop(samples: Instants) -> Claim:
     anchors, ends = _anchors_and_ends(samples)
     R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)
     L = (robot.anchors - samples.body.pose[:, None, :3] - robot.attachments @ R_B) @ R_A
-    return compared(
-        "fig-2",
-        "Eq. 4, figure 2",
-        "The vectors of figure 2 close: B_i + L_i = A_i (largest gap).",
-        0.0,
-        float(np.linalg.norm(ends + L - anchors, axis=-1).max()),
-        within=ROUNDING,
-        agrees="They do, at random poses of both bodies.",
-        differs="They leave a gap.",
-        unit="m",
-        figure="frames",
-    )
+    return claim("fig-2").compared(float(np.linalg.norm(ends + L - anchors, axis=-1).max()), within=ROUNDING)
 
 
 def _displaced(samples: Instants) -> Claim:
@@ -116,19 +83,7 @@ def _displaced(samples: Instants) -> Claim:
     by_angles = small[:3] + np.einsum("nij,mj->nmi", change, robot.attachments)
     by_vector = small[:3] + np.cross(small[3:], robot.attachments @ samples.R_A.R.transpose(0, 2, 1))
     share = float((np.linalg.norm(by_angles - by_vector, axis=-1) / np.linalg.norm(by_angles, axis=-1)).max())
-    return stated(
-        "eq-8",
-        "Eqs. 8, 10",
-        "B_new = B + dB, where dB follows from small changes of position, roll, pitch and yaw in {G} (largest error "
-        "over the displacement, at random poses).",
-        0.0,
-        share,
-        holds=share < SMALL,
-        agrees="The error is of second order.",
-        differs=f"Eq. 10 holds to {np.linalg.norm(moved - linear, axis=-1).max():.0e} m at {SMALL:g} m and rad, of "
-        "second order, if dTheta is a small rotation about the axes of {G}. Changes of roll, pitch and yaw are that "
-        "only where these angles are zero.",
-    )
+    return claim("eq-8").stated(share, share < SMALL, apart=np.linalg.norm(moved - linear, axis=-1).max(), small=SMALL)
 
 
 def _rotated(angles: np.ndarray) -> np.ndarray:

@@ -20,7 +20,8 @@ from ...models import Dynamics, Robot, load
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, stated, undetermined
+from ..accounts.claim import Claim
+from .claims import claim
 from .every_pairing import PAIRINGS, at_centre, hold, printed
 from .every_pairing import tensions as tensions_of
 from .motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
@@ -98,15 +99,8 @@ def _length(lengths: np.ndarray) -> Claim:
     opposite = np.roll(turn, -(len(turn) // 2))
     start = int(turn.argmin())
     share = float((opposite > turn).mean())
-    return undetermined(
-        "fig-9-length",
-        "VI.B, figure 9",
-        "Over the turn cable 1 is short, long, short (length at the start, after half a turn and at the end).",
-        "short, long, short",
-        f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m",
-        missing="Where the turn starts is not printed. Assumed: where cable 1 is shortest. For "
-        f"{share:.0%} of all starts it is longer after half a turn.",
-        figure="turn",
+    return claim("fig-9-length").undetermined(
+        f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m", share=share
     )
 
 
@@ -125,20 +119,7 @@ def _tension() -> Claim:
     taut = PAIRINGS[at_centre().taut]
     flying = hold(FEASIBLE, taut)
     low, high = (float(edge(together(flying, FEASIBLE))) for edge in (np.min, np.max))
-    return stated(
-        "fig-10-tension",
-        "VI.B, figure 10",
-        "The longer cable 1 is, the larger is its tension (correlation of both over a turn of radius "
-        f"{FEASIBLE:g} m, lowest and highest of the pairings whose cables all pull on it).",
-        1.0,
-        (low, high),
-        holds=low > 0,
-        agrees="Length and tension rise together.",
-        differs=f"The opposite holds with each of the {len(flying)} pairings whose cables all pull on that circle: a "
-        "long cable is on the far side of the platform, and the near cables carry the load. On the printed circle "
-        "there is no pairing whose cables all pull.",
-        figure="turn",
-    )
+    return claim("fig-10-tension").stated((low, high), low > 0, feasible=FEASIBLE, flying=len(flying))
 
 
 def _winding(robot: Robot, span: float) -> Claim:
@@ -147,33 +128,11 @@ def _winding(robot: Robot, span: float) -> Claim:
     literal, paid_out = (
         float(driving_force(robot, *motion, still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max()) for how in WINDINGS
     )
-    return compared(
-        "eq-13",
-        "Eqs. 12, 13",
-        f"The winding of each step adds E A / e de to the tension (largest in {STEP * 1e3:g} ms, without vibration).",
-        literal,
-        paid_out,
-        within=0.01 * span,
-        agrees="Both are the same beside the variation of the tension.",
-        differs="Cable that the winch pays out does not stretch. Taken literally, steady winding alone would add the "
-        "printed "
-        f"value in each step, while the steady tension varies by {span:.0f} N over the whole turn.",
-        unit="N",
-    )
+    return claim("eq-13").compared(paid_out, printed=literal, within=0.01 * span, step=STEP * 1000.0, span=span)
 
 
 def _superimposed() -> Claim:
-    return undetermined(
-        "fig-8",
-        "VI.B, figures 8 and 9",
-        "The vibrating trajectory and length oscillate about the expected ones with a small amplitude.",
-        None,
-        tuple(float(value) for value in HERTZ),
-        missing="Neither amplitude nor frequency is printed. Assumed: sines along x, y and z with these frequencies, "
-        "level.",
-        unit="Hz",
-        figure="vibration",
-    )
+    return claim("fig-8").undetermined(tuple(float(value) for value in HERTZ))
 
 
 def _no_ratio(tensions: np.ndarray) -> Claim:
@@ -181,34 +140,18 @@ def _no_ratio(tensions: np.ndarray) -> Claim:
     crossing = TIMES[np.flatnonzero(np.diff(np.sign(tensions)))]
     pulls = tensions_of(circle(RADIUS, COARSE), PAIRINGS[at_centre().full_rank])[..., 0]
     changing = int((np.ptp(np.sign(pulls), axis=0) > 0).sum())
-    return undetermined(
-        "fig-11-circle",
-        "VI.B, figure 11",
-        f"On the circle of radius {RADIUS:g} m dT / T of cable 1 has a largest value (pairings of rank 6 whose steady "
-        "T of cable 1 does not pass through zero).",
-        "a largest value",
+    return claim("fig-11-circle").undetermined(
         f"{pulls.shape[1] - changing} of {pulls.shape[1]}",
-        missing="The printed pairing has no inverse, so its T is not determined. Where T passes through zero, dT / T "
-        "has no bound for any vibration: with crossed pairs "
-        f"at {', '.join(f'{time:.1f} s' for time in crossing)}. With "
-        "every pairing some cable would have to push.",
+        radius=RADIUS,
+        crossing=", ".join(f"{time:.1f} s" for time in crossing),
     )
 
 
 def _ratio(robot: Robot, amplitudes: dict[float, float]) -> Claim:
     steps = ", ".join(f"{amplitude * 1e6:.3g} um at {step * 1e3:g} ms" for step, amplitude in amplitudes.items())
     ratio = float(largest_ratios(robot, np.array([amplitudes[STEP]]))[0])
-    return undetermined(
-        "fig-11",
-        "VI.B, figure 11, conclusion 2",
-        "The largest dT / T of cable 1 is 12.47 % (amplitude of the vibration for it, on a circle of radius "
-        f"{FEASIBLE:g} m).",
-        f"{RATIO:.2%}",
-        f"{ratio:.2%} at {amplitudes[STEP] * 1e6:.2f} um",
-        missing="Amplitude, frequency and time step are not printed, and the ratio grows with the amplitude from zero. "
-        "It "
-        f"has the printed value at {steps} per step.",
-        figure="ratio",
+    return claim("fig-11").undetermined(
+        f"{ratio:.2%} at {amplitudes[STEP] * 1e6:.2f} um", printed=f"{RATIO:.2%}", feasible=FEASIBLE, steps=steps
     )
 
 

@@ -11,7 +11,8 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...models.air import trapezoid
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, compared, undetermined
+from ..accounts.claim import Claim
+from .claims import claim
 from .motion import TIMES
 
 PEAK = (5.0, 6.0, 2.0)  # printed in section VI [m/s]
@@ -34,48 +35,19 @@ def chapter() -> Chapter:
 def _top(wind: np.ndarray) -> Claim:
     share = TIMES / TIMES[-1]
     top = wind[(share > STEADY[0]) & (share < STEADY[1])].mean(axis=0)
-    return undetermined(
-        "fig-5-peak",
-        "section VI, figure 5",
-        "The largest wind speed along x, y and z without the noise (mean over the top of the trapezoid).",
-        PEAK,
-        tuple(float(value) for value in top),
-        missing="The values of the curves in figure 5 are not printed. This run draws its wind from the printed "
-        "speeds, so it has them.",
-        unit="m/s",
-        figure="wind",
-    )
+    return claim("fig-5-peak").undetermined(tuple(float(value) for value in top), printed=PEAK)
 
 
 def _noise(noise: np.ndarray) -> Claim:
     """Report how many samples of a Gaussian sequence with this deviation are outside of the printed amplitudes."""
     deviation = NOISE / DEVIATIONS
     outside = erfc(NOISE / deviation / sqrt(2))
-    return undetermined(
-        "fig-5-noise",
-        "section VI, figure 5",
-        "A Gaussian sequence with amplitudes in [-0.5, 0.5] m/s is added (largest sample of this run).",
-        NOISE,
-        float(np.abs(noise).max()),
-        missing="A Gaussian sequence has no largest amplitude, and its standard deviation is not printed. Assumed: a "
-        f"third of the amplitude, beyond which {outside:.1%} of the samples would be; they are clipped.",
-        unit="m/s",
-        figure="wind",
-    )
+    return claim("fig-5-noise").undetermined(float(np.abs(noise).max()), printed=NOISE, outside=outside)
 
 
 def _shape() -> Claim:
     corners = (0.1, 0.3, 0.7, 0.9)
-    return undetermined(
-        "fig-5-shape",
-        "figure 5",
-        "The times at which the wind rises, is steady and falls are drawn only.",
-        None,
-        tuple(corner * TIMES[-1] for corner in corners),
-        missing="The corners of the trapezoid and the seed are not printed. Assumed: 2 s of rise and 2 s of fall.",
-        unit="s",
-        figure="wind",
-    )
+    return claim("fig-5-shape").undetermined(tuple(corner * TIMES[-1] for corner in corners))
 
 
 def _sign(dynamics: Dynamics) -> Claim:
@@ -83,18 +55,8 @@ def _sign(dynamics: Dynamics) -> Claim:
     aero = dynamics.robot.platform.aero
     assert aero is not None
     printed = 0.5 * aero.drag * aero.air_density * AGAINST[0] ** 2 * aero.area
-    return compared(
-        "eq-25-drag",
-        "Eq. 25",
-        f"F_ex = C_d rho V_x^2 S / 2 in a wind of {AGAINST[0]:g} m/s along x.",
-        printed,
-        float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), AGAINST)[0]),
-        within=1e-9,
-        agrees="The force has the direction of the wind.",
-        differs="The printed force is never negative, so a wind towards -x would pull the platform towards +x. It must "
-        "be "
-        "V |V|, where V is the air's velocity relative to the platform.",
-        unit="N",
+    return claim("eq-25-drag").compared(
+        float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), AGAINST)[0]), printed=printed, against=AGAINST[0]
     )
 
 
@@ -105,16 +67,7 @@ def _lift(dynamics: Dynamics) -> Claim:
     printed = 0.5 * aero.lift * aero.air_density * (PEAK[0] ** 2 + PEAK[1] ** 2) * aero.area
     lift = float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[2])
     used = "as printed" if np.isclose(lift, printed) else "another one"
-    return undetermined(
-        "eq-25-lift",
-        "Eq. 25",
-        "F_ez = C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind, upwards.",
-        printed,
-        lift,
-        missing=f"The lift of this run is {used}. The paper does not explain why a horizontal "
-        "wind lifts the platform, nor why the wind along z, drawn in figure 5, causes no force.",
-        unit="N",
-    )
+    return claim("eq-25-lift").undetermined(lift, printed=printed, used=used)
 
 
 def _figure(wind: np.ndarray, force: np.ndarray) -> Drawing:

@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from ...models import Dynamics, load
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, compared, stated
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 
 ANGLES = np.array([0.3, -0.4, 0.5])  # roll, pitch, yaw [rad], inside the paper's (-1, 1)
 RATES = np.array([1.0, 1.0, 1.0])  # their time derivatives [rad/s]
@@ -33,31 +34,16 @@ def _rotation() -> Claim:
     robot = load("wang-ctmrts")
     turn = Rotation.from_euler("ZYX", ANGLES[::-1]).as_matrix()
     ends = turned_home()[:3] + robot.attachments @ turn.T
-    return compared(
-        "eq-3-rotation",
-        "Eqs. 1, 2, 3",
-        "The lengths follow from a rotation about Z by phi_3, then Y by phi_2, then X by phi_1.",
-        tuple(np.linalg.norm(robot.carrier_home[:, :3] - ends, axis=1).tolist()),
+    return claim("eq-3-rotation").compared(
         tuple(Dynamics(robot).cable_lengths(turned_home()).tolist()),
-        within=1e-12,
-        agrees="An independent rotation, by the paper's equations at one posture, gives the same lengths.",
-        differs="An independent rotation gives other lengths.",
-        unit="m",
+        printed=tuple(np.linalg.norm(robot.carrier_home[:, :3] - ends, axis=1).tolist()),
     )
 
 
 def _rigid() -> Claim:
     moments = np.sort(np.diag(load("wang-ctmrts").inertia))
-    return stated(
-        "section-5-rigid",
-        "section 5",
-        "The moments of inertia are those of a rigid body (largest moment, sum of the others).",
-        float(moments[2]),
-        float(moments[:2].sum()),
-        holds=bool(moments[2] <= moments[:2].sum() + 1e-12),
-        agrees="The largest is the sum of the others, as in a flat body: just possible.",
-        differs="The largest exceeds the sum of the others, which is impossible for a rigid body.",
-        unit="kg m^2",
+    return claim("section-5-rigid").stated(
+        float(moments[:2].sum()), bool(moments[2] <= moments[:2].sum() + 1e-12), printed=float(moments[2])
     )
 
 
@@ -76,17 +62,7 @@ def _inertia() -> Claim:
     points = masses() @ turn.T
     summed = (points**2).sum() * np.eye(3) - points.T @ points
     off = np.abs(turn @ robot.inertia @ turn.T - robot.platform.mass / len(points) * summed).max()
-    return compared(
-        "eq-10",
-        "Eq. 10",
-        "I' = R I R^T is the inertia in {O} (largest difference from six point masses with this inertia, rotated).",
-        0.0,
-        float(off),
-        within=1e-12,
-        agrees="At an arbitrary posture both are the same.",
-        differs="The inertia of the rotated masses is another.",
-        unit="kg m^2",
-    )
+    return claim("eq-10").compared(float(off))
 
 
 def _weight() -> Claim:
@@ -99,17 +75,7 @@ def _weight() -> Claim:
         return float(-share * (places @ np.array(robot.gravity)).sum())
 
     slope = [(energy(row) - energy(-row)) / (2 * step) for row in step * np.eye(6)]
-    return compared(
-        "eq-8",
-        "Eq. 8",
-        "G = [0, 0, -M g, 0, 0, 0]^T (minus the slope of the potential energy of six point masses).",
-        (0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0),
-        tuple(-part for part in slope),
-        within=1e-6,
-        agrees="The weight is a force without a moment about the mass centre.",
-        differs="The slope of the potential energy is another.",
-        unit="N, N m",
-    )
+    return claim("eq-8").compared(tuple(-part for part in slope), printed=(0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0))
 
 
 def _turning() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -136,18 +102,7 @@ def _gyroscopic() -> Claim:
     left_out = moment - inertia @ alpha
     gyroscopic = np.cross(omega, inertia @ omega)
     apart = float(np.abs(left_out - gyroscopic).max())
-    return compared(
-        "eq-4-gyroscopic",
-        "Eqs. 4, 9",
-        "The moments of the cables need to give no more than M ddX (moment that is left out).",
-        0.0,
-        float(np.linalg.norm(left_out)),
-        within=1e-3,
-        agrees="At the tested posture and rates no moment is left out.",
-        differs="omega x I' omega is left out, which has the computed norm at rates of 1 rad/s (difference "
-        f"{apart:.0e} N m).",
-        unit="N m",
-    )
+    return claim("eq-4-gyroscopic").compared(float(np.linalg.norm(left_out)), apart=apart)
 
 
 def _direction() -> Claim:
@@ -155,19 +110,7 @@ def _direction() -> Claim:
     robot = load("wang-ctmrts")
     A = Dynamics(robot).wrench_matrix(robot.home)[:3]
     tensions = np.linalg.solve(-A, [0.0, 0.0, robot.weight])
-    return stated(
-        "eq-6-direction",
-        "Eq. 6",
-        "e_i, from the robot-end to the load, is the direction of the force of a cable with T_i > 0.",
-        "T_i > 0",
-        tuple(tensions.tolist()),
-        holds=bool((tensions > 0).all()),
-        agrees="Tensions above zero hold the load at home.",
-        differs="With this direction the computed tensions would hold the load at home: the cables would push. The "
-        "force "
-        "points from the load to the robot-end.",
-        unit="N",
-    )
+    return claim("eq-6-direction").stated(tuple(tensions.tolist()), bool((tensions > 0).all()))
 
 
 def _second_form() -> Claim:
@@ -178,33 +121,18 @@ def _second_form() -> Claim:
     lines = pose[:3] + arms - robot.carrier_home[:, :3]  # P_i - b_i
     e = lines / np.linalg.norm(lines, axis=1)[:, None]
     first, second = np.cross(arms, e), turn.apply(e)
-    return compared(
-        "eq-6-second",
-        "Eq. 6",
-        "The moments (R_p P_i) x e_i of the first form are R_p x (P_i - b_i) / |P_i - b_i| of the second (largest norm "
-        "of either, where R_p x is read as R_p times).",
-        float(np.linalg.norm(second, axis=1).max()),
-        float(np.linalg.norm(first, axis=1).max()),
-        within=1e-9,
-        agrees="Both forms are the same.",
-        differs="A vector product of a matrix and a vector is not defined, and read as a matrix product it has no arm: "
-        "P_i in {P} is missing after R_p.",
-        unit="m",
+    return claim("eq-6-second").compared(
+        float(np.linalg.norm(first, axis=1).max()), printed=float(np.linalg.norm(second, axis=1).max())
     )
 
 
 def _shape() -> Claim:
     A = Dynamics(load("wang-ctmrts")).wrench_matrix(load("wang-ctmrts").home)
     printed = A.T.shape
-    return stated(
-        "eq-5-shape",
-        "Eqs. 4, 5",
-        "J = [J_1 ... J_m]^T, and J T is a wrench (shape of J for m = 3).",
-        f"{printed[0]} x {printed[1]}",
+    return claim("eq-5-shape").stated(
         f"{A.shape[0]} x {A.shape[1]}",
-        holds=printed[1] == A.shape[1] and printed[0] == 6,
-        agrees="The product is defined.",
-        differs="With the transpose the product J T is not defined; each cable is a column of J, not a row.",
+        printed[1] == A.shape[1] and printed[0] == 6,
+        printed=f"{printed[0]} x {printed[1]}",
     )
 
 
@@ -218,18 +146,7 @@ def _summed() -> Claim:
         pulls = np.arange(1.0, m + 1)[:, None] * lines / np.linalg.norm(lines, axis=1)[:, None]
         summed = np.concatenate([pulls.sum(axis=0), np.cross(arms, pulls).sum(axis=0)])
         off.append(np.abs(Dynamics(robot).wrench_matrix(pose) @ np.arange(1.0, m + 1) - summed).max())
-    return compared(
-        "eq-7",
-        "Eqs. 6, 7",
-        "T = [T_1 ... T_m]^T, and J T is the wrench of all cables (largest difference from the sum over the cables, "
-        "m = 3, 4, 5, 6).",
-        0.0,
-        float(max(off)),
-        within=1e-9,
-        agrees="With the columns of J, as corrected in Eqs. 5 and 6, it is.",
-        differs="The sum over the cables is another.",
-        unit="N, N m",
-    )
+    return claim("eq-7").compared(float(max(off)))
 
 
 def _symbols() -> Claim:
@@ -239,49 +156,22 @@ def _symbols() -> Claim:
     before = np.linalg.norm(end - (place + arm))
     change = np.linalg.norm(end - (place + shift + arm)) - before
     inside = np.linalg.norm((end - place + place + shift) - (place + shift + arm)) - before  # b_1 moves too
-    return compared(
-        "table-1",
-        "Table 1, Eq. 1",
-        "b_i is a point in the local coordinate system (change of L_1 when the load moves by 0.1 m along x).",
-        float(inside),
-        float(change),
-        within=1e-9,
-        agrees="The length changes alike.",
-        differs="A point of the local coordinate system moves with the load. b_i is in the global one, as section 3 "
-        "states.",
-        unit="m",
-    )
+    return claim("table-1").compared(float(change), printed=float(inside))
 
 
 def _angular_acceleration() -> Claim:
     _, alpha, _ = _turning()
-    return compared(
-        "eq-12-angular-acceleration",
-        "Eq. 12",
-        "The second derivatives of the angles are the angular acceleration about X, Y and Z.",
-        tuple(SECOND.tolist()),
-        tuple(alpha.tolist()),
-        within=1e-3,
-        agrees="They are the same at the tested posture and rates.",
-        differs="At angles of (0.3, -0.4, 0.5) rad and rates of 1 rad/s the angular acceleration is the computed one, "
-        "dP dphi + P ddphi.",
-        unit="rad/s^2",
-    )
+    return claim("eq-12-angular-acceleration").compared(tuple(alpha.tolist()), printed=tuple(SECOND.tolist()))
 
 
 def _inverse() -> Claim:
     ranks = {m: rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER}
-    return stated(
-        "eq-13-inverse",
-        "Eq. 13",
-        "T = J^-1 (M ddX - G - W_e) for m = 3, 4, 5 cables (rank of J).",
-        (6.0,) * len(ranks),
+    return claim("eq-13-inverse").stated(
         tuple(float(size) for size in ranks.values()),
-        holds=all(size == 6 for size in ranks.values()),
+        all(size == 6 for size in ranks.values()),
+        printed=(6.0,) * len(ranks),
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="J has rank 6 for each m.",
-        differs="An inverse needs six independent columns, and J has m. With six cables it depends on the geometry, "
-        f"which the paper does not print: {six_cables()}.",
+        six=six_cables(),
     )
 
 
@@ -301,16 +191,7 @@ def six_cables() -> str:
 
 def _references() -> Claim:
     dynamic = MEANT["the dynamic equations"]
-    return compared(
-        "equation-references",
-        "Eqs. 3, 4, 13, 17",
-        "T is expressed by Eq. 3 (above Eq. 13), and least squares solve Eq. 3 (above Eq. 17).",
-        (3.0, 3.0),
-        (dynamic, dynamic),
-        within=0.0,
-        agrees="These are the numbers of the equations.",
-        differs="Eq. 3 is the rotation matrix; both are about Eq. 4, in which T is.",
-    )
+    return claim("equation-references").compared((dynamic, dynamic))
 
 
 def rank(A: np.ndarray) -> int:

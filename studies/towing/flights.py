@@ -12,7 +12,8 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...simulation import Simulation, simulate
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, stated
+from ..accounts.claim import Claim
+from .claims import claim
 from .equations import SIZES
 from .modes import CHANGES, SECTIONS
 from .plans import DRIVES, SECONDS, Drive, planned, robot
@@ -46,19 +47,15 @@ def in_boxes(flight: Simulation) -> bool:
 
 def _towed(drive: Drive, flights: dict[int, Simulation]) -> Claim:
     most, left = (max(float(flight.error[rows].max()) for flight in flights.values()) for rows in (slice(None), [-1]))
-    return stated(
-        f"towed-{drive}",
-        f"sections 2, {SECTIONS[drive]}",
-        f"The load is towed {CHANGES[drive]}, for m = 3, 4, 5, 6 (largest distance from its plan in a flight).",
-        0.0,
+    return claim("towed-{drive}").stated(
         most,
-        holds=all(flight.passed and in_boxes(flight) for flight in flights.values()),
-        agrees=f"In each of {len(flights)} flights the load arrives, {1e3 * left:.1f} mm from its target at most, "
-        "and the robot-ends stay in their boxes.",
-        differs=f"Not every flight stays within {1e3 * ARRIVED:g} mm of its plan, with tensions inside their "
-        "limits and robot-ends in their boxes.",
-        unit="m",
-        figure=f"towed-{drive}",
+        all(flight.passed and in_boxes(flight) for flight in flights.values()),
+        drive=drive,
+        section=SECTIONS[drive],
+        changes=CHANGES[drive],
+        flights=len(flights),
+        left=1000.0 * left,
+        arrived=1000.0 * ARRIVED,
     )
 
 
@@ -70,17 +67,12 @@ def _positive(flights: dict[Drive, dict[int, Simulation]]) -> Claim:
     low, high = min(low for low, _ in ranges.values()), max(high for _, high in ranges.values())
     others = min(float(f.record.tensions.min()) for by_m in flights.values() for m, f in by_m.items() if m != PAPERS)
     limit = float(flights["both"][PAPERS].robot.t_max.max())
-    return stated(
-        "towed-tensions",
-        "Eq. 11, section 5",
-        f"0 < T_i < T_fmax = {limit:g} N with three robots (range of the tensions in the flights with each drive).",
-        f"0 N to {limit:g} N",
+    return claim("towed-tensions").stated(
         "; ".join(f"{least:.1f} N to {most:.1f} N, {drive}" for drive, (least, most) in ranges.items()),
-        holds=bool(low > 0 and high < limit),
-        agrees="All cables pull all the time. With four to six robots "
-        + ("they do too." if others > 0 else "some cables pull nothing at times, for the others can carry the load."),
-        differs="Some tension is outside.",
-        figure="towed-both",
+        bool(low > 0 and high < limit),
+        printed=f"0 N to {limit:g} N",
+        limit=limit,
+        others="they do too" if others > 0 else "some cables pull nothing at times, for the others can carry the load",
     )
 
 

@@ -17,7 +17,8 @@ from ...models import Dynamics, Robot, load
 from ...statics.equilibria import Equilibrium, equilibria
 from ...workspace import ForceBalance, Places
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 from .equations import MEANT, SIZES, rank
 from .plans import DRIVES, FIXED, robot
 from .workspace import POSTURE, PRINTED, loops, reach
@@ -26,7 +27,6 @@ SAMPLES = 6000
 BESIDE = 0.2  # the box of Eq. 15 is sampled with so much more on each side [m]
 STEP = 1e-6  # of differences [m, rad]
 EQUATIONS = 17  # the last number of an equation
-SAME = 1e-9  # [m]
 AT_REST = 1e-6  # of the weight: the largest residual of a balance
 
 
@@ -89,17 +89,11 @@ def _suspended(rests: dict[int, Equilibrium]) -> Claim:
         left.append(np.abs(np.concatenate([force, moment])).max() / mover.weight)
         pulling.append(float((found.tensions > AT_REST * mover.weight).sum()))
     below = all(found.pose[2] < robot(SIZES[m], "fixed-length").carrier_home[:, 2].min() for m, found in rests.items())
-    return stated(
-        "figure-1",
-        "section 2, figure 1",
-        "The object is suspended under m robots through cables, 3 <= m <= 6 (cables that pull at rest, 1.2 m long).",
-        tuple(float(m) for m in rests),
+    return claim("figure-1").stated(
         tuple(pulling),
-        holds=below and max(left) < AT_REST and tuple(pulling) == tuple(float(m) for m in rests),
-        agrees=f"Forces and moments balance to {max(left):.0e} of the weight, below the robot-ends. The joints and "
-        "links of the robots that figure 1 names are in no equation.",
-        differs="The load does not rest on all of its cables.",
-        figure="configuration",
+        below and max(left) < AT_REST and tuple(pulling) == tuple(float(m) for m in rests),
+        printed=tuple(float(m) for m in rests),
+        left=max(left),
     )
 
 
@@ -113,18 +107,7 @@ def _dimension(found: Equilibrium) -> Claim:
     ahead, behind = (dynamics.wrench_matrix(found.pose + sign * steps) @ found.tensions for sign in (1, -1))
     slopes = np.hstack([(ahead - behind).T / (2 * STEP), dynamics.wrench_matrix(found.pose)])
     size = slopes.shape[1] - int(np.linalg.matrix_rank(slopes, rtol=1e-6))
-    return stated(
-        "eq-14",
-        "Eq. 14",
-        "W is a set of poses in R^6 given by g_0 <= 0 (its dimension, three robot-ends at rest).",
-        None,
-        float(size),
-        holds=0 < size <= 6,
-        agrees="Where g_0 contains the residual of the balance it is. The set is thin: six coordinates and three "
-        "tensions in six equations leave the computed dimension, so that each position has its own posture. The "
-        "volumes and figures are those of the positions.",
-        differs="No poses are in balance.",
-    )
+    return claim("eq-14").stated(float(size), 0 < size <= 6)
 
 
 def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
@@ -133,18 +116,8 @@ def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
     held = poses[(forces > 0).all(axis=1), :2]
     outside = np.maximum(ends.min(axis=0) - held, held - ends.max(axis=0)).max(axis=1)
     share = float((outside < 0).mean())
-    return stated(
-        "eq-15-xy",
-        "Eq. 15",
-        "x and y of the load are between the smallest and the largest of the robot-ends (share of W2, forces in "
-        "balance).",
-        1.0,
-        share,
-        holds=share == 1.0,
-        agrees="All positions are.",
-        differs="It is the attachments, not the centre of the load, that are between the robot-ends. They are "
-        f"{np.linalg.norm(load('wang-ctmrts').attachments, axis=1).max():.3f} m from it, and positions up to "
-        f"{outside.max():.3f} m outside were drawn.",
+    return claim("eq-15-xy").stated(
+        share, share == 1.0, arm=np.linalg.norm(load("wang-ctmrts").attachments, axis=1).max(), outside=outside.max()
     )
 
 
@@ -161,35 +134,21 @@ def _heights() -> Claim:
     for drive, (least, most) in allowed.items():
         start, end = PRINTED[drive][2]
         shares.append(max(min(most, end) - max(least, start), 0.0) / (end - start))
-    return stated(
-        "eq-15-z",
-        "Eq. 15, third row",
-        "z of the load is between the smallest and the largest of the robot-ends (share of the printed ranges of W1, "
-        "W2 and W3 that this allows).",
-        (1.0, 1.0, 1.0),
+    return claim("eq-15-z").stated(
         tuple(shares),
-        holds=min(shares) == 1.0,
+        min(shares) == 1.0,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="The row allows the printed ranges.",
-        differs=f"All robot-ends of W2 are at {home[0]:g} m, so W2 would be empty; those of W1 and W3 are above "
-        f"{low[0, 2]:g} m, and the printed ranges begin at {PRINTED['fixed-length'][2][0]:g} m and "
-        f"{PRINTED['both'][2][0]:g} m. The loops of this run have z > 0 in its place.",
+        home=home[0],
+        low=low[0, 2],
+        fixed=PRINTED["fixed-length"][2][0],
+        both=PRINTED["both"][2][0],
     )
 
 
 def _scope() -> Claim:
     low, high = reach(robot("wang-ctmrts", "both"))
     half = (high - low).max(axis=0) / 2
-    return undetermined(
-        "step-a",
-        "step (a), figure 2",
-        "The space in which the robot-ends move is given first (half-widths along x, y and z).",
-        None,
-        tuple(float(width) for width in half),
-        missing="Its heights are printed, its widths only drawn. Those of this run are inferred from the ranges of W3 "
-        "by Eq. 15, so they cannot confirm these.",
-        unit="m",
-    )
+    return claim("step-a").undetermined(tuple(float(width) for width in half))
 
 
 def _drawn() -> Claim:
@@ -203,18 +162,7 @@ def _drawn() -> Claim:
     fixed_by_lengths = rank((slopes[0] + slopes[1]).T[:, :3])  # of the position, where lengths are given
     given = [robot("wang-ctmrts", drive).fixed_lengths is not None for drive in DRIVES]
     missing = tuple(float(3 - fixed_by_lengths if known else 3) for known in given)
-    return compared(
-        "step-b",
-        "step (b)",
-        "The robot-ends and the posture are drawn at random (coordinates of the load that are then still free, for W1, "
-        "W2, W3).",
-        (0.0, 0.0, 0.0),
-        missing,
-        within=0.0,
-        agrees="The lengths give the position.",
-        differs="Where no lengths are given, no position follows: it must be drawn too, and gives the lengths. "
-        "This run draws it uniformly in the box of Eq. 15, from the ground.",
-    )
+    return claim("step-b").compared(missing)
 
 
 def _placed() -> Claim:
@@ -223,34 +171,18 @@ def _placed() -> Claim:
     met = np.isfinite(samples.places.pose[:, 0])
     vectors, _ = lines(samples.robot, samples.places.pose[met], samples.places.carriers[met, :, :3])
     off = np.abs(np.linalg.norm(vectors, axis=-1) - FIXED).max()
-    return compared(
-        "step-c",
-        "step (c), Eqs. 1, 2",
-        f"The position follows from Eqs. 1 and 2 with lengths of {FIXED:g} m (largest difference of the lengths).",
-        0.0,
-        float(off),
-        within=SAME,
-        agrees=f"Three spheres meet for {met.mean():.0%} of the loops of W1, in two points, of which the lower is "
-        "used. For W2 and W3 there are six unknowns in three equations, see step (b).",
-        differs="The lengths are others.",
-        unit="m",
-    )
+    return claim("step-c").compared(float(off), fixed=FIXED, met=met.mean())
 
 
 def _solved() -> Claim:
     J = Dynamics(robot("wang-ctmrts", "both")).wrench_matrix(rest(3).pose)
     columns = J.shape[1]
-    return stated(
-        "step-e",
-        "step (e)",
-        "If rank(A) = rank(A, b) = m, Eq. 13 gives T, else Eq. 18 (size of J for m = 3).",
-        "6 x 6",
+    return claim("step-e").stated(
         f"{J.shape[0]} x {columns}",
-        holds=J.shape[0] == columns,
+        J.shape[0] == columns,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="J has an inverse.",
-        differs=f"J has rank {rank(J)} = m here, but no inverse, which Eq. 13 takes; Eq. 16 is meant. There is no Eq. "
-        f"18: the equations end with {EQUATIONS}, which is meant.",
+        rank=rank(J),
+        equations=EQUATIONS,
     )
 
 
@@ -260,27 +192,8 @@ def _bounded(poses: np.ndarray, forces: np.ndarray) -> list[Claim]:
     meets = ((forces > 0) & (forces < mover.t_max)).all(axis=1)
     recorded = ForceBalance().holds(mover, Places.at_home(mover, poses))
     too_much = float(((forces > 0).all(axis=1) & ~meets).sum() / (forces > 0).all(axis=1).sum())
-    reference = compared(
-        "step-f",
-        "step (f), Eq. 12",
-        "A position is recorded if all T meet Eq. 12.",
-        12.0,
-        MEANT["the bounds of the tensions"],
-        within=0.0,
-        agrees="Eq. 12 has the bounds.",
-        differs="Eq. 12 is the acceleration, which T cannot meet; the bounds are Eq. 11.",
-    )
-    bounds = compared(
-        "step-f-bounds",
-        "step (f), Eq. 11",
-        "A position is recorded if all T are inside the bounds of Eq. 11 (share of poses that are recorded if and "
-        "only if T, by a second computation, is inside).",
-        1.0,
-        float((meets == recorded).mean()),
-        within=0.0,
-        agrees=f"They are. Tensions above 500 N exclude {too_much:.1%} of the poses whose cables all pull.",
-        differs="Other poses are recorded.",
-    )
+    reference = claim("step-f").compared(MEANT["the bounds of the tensions"])
+    bounds = claim("step-f-bounds").compared(float((meets == recorded).mean()), too_much=too_much)
     return [reference, bounds]
 
 

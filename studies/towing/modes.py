@@ -8,7 +8,8 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...ocp import Plan
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, stated
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 from .equations import SIZES
 from .plans import DRIVES, FIXED, Drive, planned
 
@@ -34,34 +35,23 @@ def _carried(drive: Drive, plans: dict[int, Plan]) -> Claim:
     feasible = [one.feasible for one in plans.values()]
     most = max(float(np.nanmax(one.trajectory["tensions"].values)) for one in plans.values())
     least = min(float(np.nanmin(one.trajectory["tensions"].values)) for one in plans.values())
-    return stated(
-        f"drive-{drive}",
-        f"sections 2, {SECTIONS[drive]}",
-        f"A load moves {CHANGES[drive]}, for m = 3, 4, 5, 6 (number of audited plans).",
-        float(len(plans)),
+    return claim("drive-{drive}").stated(
         float(sum(feasible)),
-        holds=all(feasible),
+        all(feasible),
+        printed=float(len(plans)),
         otherwise=Verdict.NOT_DETERMINED,
-        agrees=f"Every plan passed its audit, with tensions from {least:.1f} N to {most:.1f} N.",
-        differs="Not every m has a plan that passed its audit, which is no proof that there is none.",
-        figure=f"drive-{drive}",
+        drive=drive,
+        section=SECTIONS[drive],
+        changes=CHANGES[drive],
+        least=least,
+        most=most,
     )
 
 
 def _kept(plans: dict[int, Plan]) -> Claim:
     """Check the lengths of the fixed drive on the dense grid of the audit."""
     off = max(float(np.abs(one.trajectory["cable_lengths"].values - FIXED).max()) for one in plans.values())
-    return stated(
-        "drive-fixed-kept",
-        "section 5.1",
-        "The lengths do not change (largest change along the motion).",
-        0.0,
-        off,
-        holds=off < 1e-4,
-        agrees="They change by less than 0.1 mm, between the nodes of the plan too.",
-        differs="They change by more than 0.1 mm between the nodes of the plan.",
-        unit="m",
-    )
+    return claim("drive-fixed-kept").stated(off, off < 1e-4)
 
 
 def _drawing(drive: Drive, planned: Plan) -> Drawing:

@@ -13,7 +13,8 @@ from ...figures.drawing import Drawing
 from ...statics.equilibria import equilibria
 from ...workspace import ExistsPlacement, ForceBalance, Places
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, stated, undetermined, value_text
+from ..accounts.claim import Claim, Verdict, value_text
+from .claims import claim
 from .plans import DRIVES, FIXED, Drive, robot
 from .workspace import PRINTED, SECTIONS, Loops, in_prism, loops, placed_as_both, reach, volume_of
 
@@ -54,17 +55,7 @@ def chapter() -> Chapter:
 def _boxes(both: Loops) -> Claim:
     low, high = reach(both.robot)
     half = (high - low).max(axis=0) / 2
-    return undetermined(
-        "figure-2",
-        "figure 2",
-        "The boxes of the robot-ends are drawn without numbers (half-widths along x and y).",
-        None,
-        (float(half[0]), float(half[1])),
-        missing="Centres and heights are printed, widths are not. With the computed ones, in steps of 0.01 m, Eq. 15 "
-        "permits the ranges of section 5.3. As the load can be outside its robot-ends, narrower boxes may do so too.",
-        unit="m",
-        figure="figure-2",
-    )
+    return claim("figure-2").undetermined((float(half[0]), float(half[1])))
 
 
 def _drawn_boxes(both: Loops) -> Drawing:
@@ -83,8 +74,7 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
     narrow = samples.ranges if drive == "variable-length" else loops(drive, widths=False).ranges  # W2 has no boxes
     claims = []
     for axis, printed, computed, least in zip("xyz", PRINTED[drive], samples.ranges, narrow, strict=True):
-        name, place = f"range-{NAMES[drive]}-{axis}", f"section 5, {FIGURES[drive].replace('-', ' ')}"
-        statement, own = f"Range of {axis} of {NAMES[drive]}.", drive == "both" and axis != "z"
+        own = drive == "both" and axis != "z"
         differs = not own and bool(least[0] < printed[0] - DIGIT or least[1] > printed[1] + DIGIT)
         not_printed = "The widths of the boxes are not printed, and those of this run are inferred from "
         if own:
@@ -98,18 +88,17 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
         else:
             why = f"{not_printed}section 5.3. With these the range is {_beside(computed, printed)}."
         claims.append(
-            stated(
-                name,
-                place,
-                statement,
-                printed,
+            claim("range").stated(
                 _pair(least if differs else computed),
-                holds=not own and bool((np.abs(computed - printed) <= READ).all()),
+                not own and bool((np.abs(computed - printed) <= READ).all()),
+                printed=printed,
                 otherwise=Verdict.DIFFERS if differs else Verdict.NOT_DETERMINED,
-                agrees=f"They agree to {READ:g} m, the precision of the boxes and of 60 000 points.",
-                differs=why,
-                unit="m",
+                motion=NAMES[drive],
+                axis=axis,
                 figure=FIGURES[drive],
+                place=FIGURES[drive].replace("-", " "),
+                read=READ,
+                why=why,
             )
         )
     return claims
@@ -135,18 +124,8 @@ def _least_height() -> Claim:
     lowest[:, 2] = least
     rest = equilibria(system, np.full(3, FIXED), lowest)[0].pose[2]
     printed = PRINTED["fixed-length"][2][0]
-    return stated(
-        "range-W1-least-height",
-        "section 5.1",
-        "No load on cables of 1.2 m is lower than the lowest z of W1.",
-        printed,
-        float(rest),
-        holds=bool(rest >= printed - 0.01),
-        agrees="With the robot-ends at the lowest printed height it is not lower.",
-        differs=f"With the robot-ends at the printed x and y and at z = {least.min():g} m, the lowest printed height, "
-        "the "
-        "load is at the computed height, for any widths of the boxes.",
-        unit="m",
+    return claim("range-W1-least-height").stated(
+        float(rest), bool(rest >= printed - 0.01), printed=printed, least=least.min()
     )
 
 
@@ -160,20 +139,15 @@ def _greatest_height() -> Claim:
     highest, pull = float(reach(system)[1][:, 2].max()), float(system.t_max.sum())
     bound = highest - FIXED * system.weight / pull
     printed = PRINTED["fixed-length"][2][1]
-    return stated(
-        "range-W1-greatest-height",
-        "section 5.1",
-        "Three cables of 1.2 m with up to 500 N hold the load at the highest z of W1.",
-        printed,
+    return claim("range-W1-greatest-height").stated(
         bound,
-        holds=bound >= printed,
+        bound >= printed,
+        printed=printed,
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="The vertical forces permit it.",
-        differs=f"Robot-ends are not above {highest:g} m, and cables that are nearly level carry little: 3 x 500 N "
-        f"carry {system.weight:.1f} N only if the attachments are, on average, {highest - bound:.4f} m lower, with any "
-        "boxes and any posture. The triangle is about P, the mass centre; for the printed height its centroid would "
-        f"have to be {printed - bound:.3f} m below P.",
-        unit="m",
+        highest=highest,
+        weight=system.weight,
+        gap=highest - bound,
+        excess=printed - bound,
     )
 
 
@@ -188,44 +162,26 @@ def _sections(fixed: Loops) -> list[Claim]:
         (SECTIONS[-1], shares[-1], "a rectangle", RECTANGLE),
     ):
         claims.append(
-            stated(
-                f"figure-4-{height:g}",
-                "figure 4",
-                f"The section at z = {height:g} m is approximately {shape} (its share of the smallest enclosing "
-                "rectangle).",
-                ideal,
+            claim("figure-4-{height:g}").stated(
                 filled,
-                holds=abs(filled - ideal) < abs(filled - (TRIANGLE + RECTANGLE - ideal)),
+                abs(filled - ideal) < abs(filled - (TRIANGLE + RECTANGLE - ideal)),
+                printed=ideal,
                 otherwise=Verdict.NOT_DETERMINED,
-                agrees=f"The share is nearer to that of {shape} than to that of the other shape.",
-                differs=f"{not_printed} the share is nearer to that of the other shape.",
-                figure="figure-4",
+                height=height,
+                shape=shape,
+                not_printed=not_printed,
             )
         )
     rising = all(lower < upper for lower, upper in pairwise(shares))
-    order = stated(
-        "figure-4-order",
-        "section 5.1, figure 4",
-        f"The higher the section, the closer it is to a rectangle (shares at {', '.join(map(str, SECTIONS))} m).",
-        "rising",
+    order = claim("figure-4-order").stated(
         tuple(shares),
-        holds=rising,
+        rising,
         otherwise=Verdict.NOT_DETERMINED,
-        agrees="The shares rise.",
-        differs=f"{not_printed} the shares do not rise.",
-        figure="figure-4",
+        heights=", ".join(map(str, SECTIONS)),
+        not_printed=not_printed,
     )
-    shape_of_all = undetermined(
-        "figure-3-shape",
-        "section 5.1, figure 3",
-        "The lower half of W1 is approximately an upside-down cone, the upper half a rectangular prism (areas of the "
-        f"sections at {', '.join(map(str, SECTIONS))} m).",
-        None,
-        tuple(areas),
-        missing=f"{not_printed} W1 has another height, so that its halves are others than the printed ones; a prism "
-        "would have equal areas.",
-        unit="m^2",
-        figure="figure-4",
+    shape_of_all = claim("figure-3-shape").undetermined(
+        tuple(areas), heights=", ".join(map(str, SECTIONS)), not_printed=not_printed
     )
     return [*claims, order, shape_of_all]
 
@@ -249,33 +205,16 @@ def share_of_rectangle(points: np.ndarray) -> float:
 def _prism(variable: Loops) -> Claim:
     inside = float(in_prism(variable.robot, variable.points).mean())
     arm = float(np.linalg.norm(variable.robot.attachments, axis=1).max())
-    return stated(
-        "section-5-prism",
-        "sections 5, 5.2",
-        "The load must be in the triangular prism below the robot-ends (share of W2 inside it).",
-        1.0,
-        inside,
-        holds=inside == 1.0,
-        agrees="Every point of W2 is inside.",
-        differs=f"Attachments are {arm:.3f} m from the centre of the load, so it can be outside by as much.",
-        figure="figure-5",
-    )
+    return claim("section-5-prism").stated(inside, inside == 1.0, arm=arm)
 
 
 def _volumes() -> Claim:
     sizes = [volume_of(drive, samples=8000) for drive in DRIVES]
     volumes = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
-    return stated(
-        "volumes",
-        "sections 5, 6",
-        "The volumes grow from W1 to W2 to W3.",
-        "W1 < W2 < W3",
+    return claim("volumes").stated(
         tuple(size.value for size in sizes),
-        holds=sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low,
-        agrees=f"With intervals, and boxes inferred from section 5.3: {volumes}. A search samples each workspace and "
-        "can miss poses, most of all in W1.",
-        differs=f"They do not, with intervals: {volumes}.",
-        unit="m^3",
+        sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low,
+        volumes=volumes,
     )
 
 
@@ -284,16 +223,7 @@ def _inside_both(samples: Mapping[str, Loops]) -> Claim:
     for drive in ("fixed-length", "variable-length"):
         places = samples[drive].places.only(samples[drive].held)
         shares.append(float(placed_as_both(places).mean()))
-    return stated(
-        "inclusion-W3",
-        "section 5.3",
-        "W1 and W2 lie inside W3 (shares of their points inside W3).",
-        (1.0, 1.0),
-        tuple(shares),
-        holds=min(shares) == 1.0,
-        agrees="Every point of both passes the test of W3, whatever the boxes: W3 moves what W1 and W2 move.",
-        differs="Not every point passes the test of W3.",
-    )
+    return claim("inclusion-W3").stated(tuple(shares), min(shares) == 1.0)
 
 
 def _fixed_inside_variable() -> Claim:
@@ -307,18 +237,14 @@ def _fixed_inside_variable() -> Claim:
     held = ExistsPlacement(condition=ForceBalance(), tries=64, turn=0.1).holds(fixed, Places.at_home(fixed, poses))
     there = ExistsPlacement(condition=ForceBalance(), tries=64, turn=1.0)
     also = there.holds(variable, Places.at_home(variable, poses[held]))
-    return stated(
-        "inclusion-W1-W2",
-        "sections 5, 6",
-        "W1 lies inside W2 (share in W2 of the poses of W1 above the robot-ends of W2).",
-        1.0,
+    return claim("inclusion-W1-W2").stated(
         float(also.mean()) if held.any() else 1.0,
-        holds=bool(also.all()),
+        bool(also.all()),
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="No sampled pose of W1 lies outside W2.",
-        differs=f"{held.sum()} sampled poses of W1 are above z = {highest:.3f} m, where all three cables of W2 would "
-        "pull down, with boxes inferred from section 5.3. With any boxes the printed ranges contradict the statement: "
-        f"z up to {PRINTED['fixed-length'][2][1]:g} m in W1, {PRINTED['variable-length'][2][1]:g} m in W2.",
+        held=held.sum(),
+        highest=highest,
+        fixed=PRINTED["fixed-length"][2][1],
+        variable=PRINTED["variable-length"][2][1],
     )
 
 
@@ -330,16 +256,4 @@ def _repeated(samples: Mapping[str, Loops]) -> Claim:
         parts = [system.places.pose[rows, :3][system.held[rows]] for rows in (slice(None, half), slice(half, None))]
         low, high = (np.abs(np.subtract(*(edge(part, axis=0) for part in parts))).max() for edge in (np.min, np.max))
         apart.append(float(max(low, high)))
-    return stated(
-        "step-g",
-        "step (g), section 5",
-        "60 000 loops determine the ranges to 0.01 m, the last printed digit (largest difference of an end of a range "
-        "between the first and the second half of the loops, W1, W2, W3).",
-        (DIGIT,) * len(apart),
-        tuple(apart),
-        holds=max(apart) <= DIGIT,
-        agrees="They do.",
-        differs="The ends of the ranges are corners of the workspaces, to which few loops come close; with more loops "
-        "the ranges still grow.",
-        unit="m",
-    )
+    return claim("step-g").stated(tuple(apart), max(apart) <= DIGIT, printed=(DIGIT,) * len(apart))

@@ -10,7 +10,8 @@ from ...models import Dynamics, Robot, load
 from ...solvers import TensionProblem, solve
 from ...workspace import EquilibriumPosture
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, compared, stated, undetermined
+from ..accounts.claim import Claim, Verdict
+from .claims import claim
 from .equations import FEWER, SIZES, rank, six_cables, turned_home
 from .workspace import in_prism, loops
 
@@ -36,15 +37,7 @@ def forces(robot: Robot, pose: np.ndarray | None = None) -> TensionProblem:
 
 def _limit() -> Claim:
     most = float(load("wang-ctmrts").t_max.max())
-    return undetermined(
-        "eq-11-limit",
-        "Eq. 11, section 5",
-        "T_fmax = T_lim / n with 1.5 <= n <= 2.",
-        most,
-        tuple(most * n for n in SAFETY),
-        missing="Neither T_lim nor n is printed. T_lim between the computed values gives T_fmax = 500 N.",
-        unit="N",
-    )
+    return claim("eq-11-limit").undetermined(tuple(most * n for n in SAFETY), printed=most)
 
 
 def _singular() -> Claim:
@@ -52,18 +45,12 @@ def _singular() -> Claim:
     for m in FEWER:
         J = Dynamics(load(SIZES[m])).wrench_matrix(turned_home())
         ranks.append(float(rank(J @ J.T)))
-    return stated(
-        "eq-16-inverse",
-        "Eq. 16",
-        "J^+ = J^T (J J^T)^-1 is the Moore-Penrose inverse for m = 3, 4, 5 (rank of J J^T).",
-        (6.0,) * len(ranks),
+    return claim("eq-16-inverse").stated(
         tuple(ranks),
-        holds=all(size == 6 for size in ranks),
+        all(size == 6 for size in ranks),
+        printed=(6.0,) * len(ranks),
         otherwise=Verdict.IMPOSSIBLE,
-        agrees="J J^T has rank 6 for each m.",
-        differs="J J^T is 6 x 6, and with fewer than six cables its rank is at most m, so it has no inverse. The "
-        "pseudo-inverse by singular values always exists. With six cables J J^T has an inverse where J has one: "
-        f"{six_cables()}.",
+        six=six_cables(),
     )
 
 
@@ -79,51 +66,24 @@ def _least_norm() -> Claim:
         assert solution.tensions is not None
         norms.append(float(np.linalg.norm(pseudo)))
         own.append(float(np.linalg.norm(solution.tensions)))
-    return compared(
-        "eq-16-least-norm",
-        "Eq. 16",
-        "J^+ b is the solution of least norm (norms for m = 4, 5, 6 at home, forces alone).",
-        tuple(norms),
-        tuple(own),
-        within=1e-9 * max(norms),
-        agrees="No tensions inside the limits that balance the weight have a smaller norm than |J^+ b|.",
-        differs="Inside the limits the least norm is another one.",
-        unit="N",
-    )
+    return claim("eq-16-least-norm").compared(tuple(own), printed=tuple(norms), within=1e-09 * max(norms))
 
 
 def _freedom() -> Claim:
     left = [m - rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER]
     of_forces = [m - rank(forces(load(name)).A) for m, name in SIZES.items()]
-    return stated(
-        "eq-17-null-space",
-        "Eq. 17",
-        "Null(J) lambda leaves a choice of tensions with m = 3, 4, 5 cables and six rows (size of the null space).",
-        "a choice",
+    return claim("eq-17-null-space").stated(
         tuple(float(size) for size in left),
-        holds=all(size > 0 for size in left[1:]),
-        agrees="There is a null space for m = 4, 5.",
-        differs="Independent columns leave no choice, and m columns are dependent only where the robot is singular. "
-        f"With six cables the null space has 6 less the rank of J: {six_cables()}. For the three rows of force "
-        f"alone the sizes for m = 3, 4, 5, 6 are {', '.join(str(int(size)) for size in of_forces)}.",
+        all(size > 0 for size in left[1:]),
+        six=six_cables(),
+        of_forces=", ".join(str(int(size)) for size in of_forces),
     )
 
 
 def _scalar() -> Claim:
     low, high, at = _choices()
-    return stated(
-        "eq-17-lambda",
-        "Eq. 17",
-        "Any scalar lambda in (0, 1) keeps the bounds of Eq. 11 (range that does, forces alone, m = 4 at home, "
-        "lambda in N for a null vector of length one).",
-        (0.0, 1.0),
-        (low, high),
-        holds=low <= 0.0 and high >= 1.0,
-        agrees="It does, where the load is in the middle: all lambda between the computed ends do, as the tensions T' "
-        f"are {', '.join(f'{tension:.1f}' for tension in at)} N. See `eq-17-workspace` for other positions.",
-        differs="Some lambda in (0, 1) exceed the bounds, as the tensions T' are "
-        f"{', '.join(f'{tension:.1f}' for tension in at)} N.",
-        unit="N",
+    return claim("eq-17-lambda").stated(
+        (low, high), low <= 0.0 and high >= 1.0, at=", ".join(f"{tension:.1f}" for tension in at)
     )
 
 
@@ -145,34 +105,13 @@ def _scalar_elsewhere() -> Claim:
         inside = [bool((t >= problem.t_min).all() and (t <= problem.t_max).all()) for t in ends]
         held += 1
         kept += all(inside[:2]) or all(inside[2:])  # what holds at both ends holds between them
-    return stated(
-        "eq-17-workspace",
-        "Eq. 17",
-        "Wherever tensions inside the bounds of Eq. 11 exist, any scalar lambda in (0, 1) gives such tensions (share "
-        "of random positions, forces alone, m = 4, level).",
-        1.0,
-        kept / held,
-        holds=kept == held,
-        agrees="At all positions it does.",
-        differs=f"At {held - kept} of {held} positions T' exceeds a bound or is within 1 N of one, and lambda must be "
-        "chosen so that the bounds hold.",
-    )
+    return claim("eq-17-workspace").stated(kept / held, kept == held, lost=held - kept, held=held)
 
 
 def _general() -> Claim:
     """Compare the number of directions along which one scalar moves the tensions with that of all solutions."""
     free = tuple(float(m - rank(forces(load(name)).A)) for m, name in SIZES.items() if m > 3)
-    return compared(
-        "eq-17-general",
-        "Eq. 17",
-        "T' + Null(J) lambda with one scalar lambda is the general solution (its dimension, forces alone, m = 4, 5, "
-        "6).",
-        (1.0,) * len(free),
-        free,
-        within=0.0,
-        agrees="One scalar gives all solutions.",
-        differs="Lambda must be a vector with one entry for each dimension of the null space.",
-    )
+    return claim("eq-17-general").compared(free, printed=(1.0,) * len(free))
 
 
 def _choices() -> tuple[float, float, np.ndarray]:
@@ -215,19 +154,8 @@ def _rank_test() -> Claim:
     left = w - (A @ (np.linalg.pinv(A) @ w)[..., None])[..., 0]
     relative = np.linalg.norm(left, axis=1) / robot.weight
     passed = float((relative < 1e-9).mean())
-    return stated(
-        "step-d-rank",
-        "step (d)",
-        "Random postures with rank(A) = rank(A, b) form the workspace (their share of the postures with forces in "
-        "balance).",
-        "some",
-        passed,
-        holds=passed > 0.0,
-        otherwise=Verdict.IMPOSSIBLE,
-        agrees="Some random postures have equal ranks.",
-        differs=f"None of {len(relative)} postures has equal ranks: three cables balance six rows only on a set "
-        f"without volume. For 1 % of them the residual is at most {np.quantile(relative, 0.01):.2f} of the weight. "
-        "The paper's figures show the balance of forces alone.",
+    return claim("step-d-rank").stated(
+        passed, passed > 0.0, otherwise=Verdict.IMPOSSIBLE, count=len(relative), quantile=np.quantile(relative, 0.01)
     )
 
 
@@ -242,17 +170,7 @@ def _cases() -> Claim:
         unsolved = np.linalg.norm(matrix @ np.linalg.pinv(matrix) @ wrench - wrench) > 1e-9 * level.weight
         free = matrix.shape[1] - rank(matrix)
         found.append("none" if unsolved else "one" if free == 0 else "infinitely many")
-    return stated(
-        "rank-cases",
-        "section 4",
-        "A T = b has no solution if rank(A) is not rank(A, b), one if both are m, infinitely many if both are less (a "
-        "level load with six rows, the same with forces alone, forces of four cables).",
-        "none, one, infinitely many",
-        ", ".join(found),
-        holds=found == ["none", "one", "infinitely many"],
-        agrees="These are the three cases of a linear system.",
-        differs="The systems have other solutions.",
-    )
+    return claim("rank-cases").stated(", ".join(found), found == ["none", "one", "infinitely many"])
 
 
 def _postures() -> Claim:
@@ -262,16 +180,7 @@ def _postures() -> Claim:
     pose, tensions = EquilibriumPosture().postures(samples.robot, samples.places)
     solved = np.isfinite(pose[:, 0])
     pull = (tensions > 0).all(axis=1)
-    return stated(
-        "step-e-unique",
-        "section 4",
-        "Where rank(A) = rank(A, b) = m the load is in balance (share of positions with a posture in balance; share of "
-        "these whose cables pull if and only if the position is in the prism).",
-        (1.0, 1.0),
+    return claim("step-e-unique").stated(
         (float(solved.mean()), float((pull == inside)[solved].mean())),
-        holds=bool(solved.mean() > 0.98 and (pull == inside)[solved].mean() > 0.98),
-        agrees="Solving for three angles and three tensions together gives one nearly everywhere, with cables that "
-        "pull "
-        "inside the prism below the robot-ends.",
-        differs="Solving for three angles and three tensions together gives fewer.",
+        bool(solved.mean() > 0.98 and (pull == inside)[solved].mean() > 0.98),
     )

@@ -53,6 +53,10 @@ class PathBase(Part):
         """Return s where sharp bends begin and end, (n, 2): a grid needs many places there."""
         return np.zeros((0, 2))
 
+    def jumps(self) -> np.ndarray:
+        """Return the times at which a time law of its own may change its acceleration at once, (n,) [s]."""
+        return np.zeros(0)
+
     def stations(self, duration: float) -> Stations:
         """Return the poses that it was given to pass in a task that lasts `duration` [s]; none by default."""
         return Stations()

@@ -51,6 +51,10 @@ class ReturnPath(PathBase):
         return self.duration - self.start
 
     @override
+    def jumps(self) -> np.ndarray:
+        return self.path.jumps() - self.start
+
+    @override
     def stations(self, duration: float) -> Stations:
         return self.path.stations(self.duration).since(self.start)
 

@@ -76,6 +76,11 @@ class SequencePath(PathBase):
         return float(self.boundaries[-1])
 
     @override
+    def jumps(self) -> np.ndarray:
+        parts = zip(self.parts, self.boundaries, strict=False)
+        return np.concatenate([start + part.path.jumps() for part, start in parts])
+
+    @override
     def stations(self, duration: float) -> Stations:
         parts = zip(self.parts, self.boundaries, strict=False)
         return Stations.joined(

@@ -99,6 +99,10 @@ class TimedPath(PathBase):
         return self.times[k] + self._dwell[k] * (since > 0) + since
 
     @override
+    def jumps(self) -> np.ndarray:
+        return np.unique(np.concatenate([self.times, self.times + self._dwell]))
+
+    @override
     def stations(self, duration: float) -> Stations:
         if not isinstance(self.along, WaypointPath):
             return Stations()

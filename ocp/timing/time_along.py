@@ -1,0 +1,293 @@
+"""Find the fastest time law along a given path that keeps every tension inside its limits: `time_along`.
+
+Along a path only s(t) is left to choose. The available wrench set at each s (`solvers.available_wrench`) and the wrench
+that the motion needs (`parametrised_path`) make half-planes in d2s/dt2 and (ds/dt)^2 (`phase_plane`), and toppra finds
+the fastest law inside all of them (`toppra_law`). It is audited as any plan is; violations between the grid points are
+removed by a finer grid and by a little distance from the limits.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base.errors import InputError, SolverError
+from ...base.inputs import whole_number
+from ...models import Robot
+from ...models.files import as_robot
+from ..audits.audit import Audit, audit
+from ..audits.tensions import TOLERANCE
+from ..limits.limits import Limits
+from ..plan import Plan
+from ..tasks.carrier_paths import carrier_paths
+from ..tasks.lay_out import lay_out
+from ..tasks.limit_list import limit_list
+from ..tasks.paths import CirclePath
+from ..tasks.status import MotionStatus
+from ..tasks.task import FreeBase, GivenBase, Task, read_task
+from ..tasks.task_checks import check_margin
+from ..tasks.wind_set import WindBox
+from .fastest_law import FastestLaw
+from .geometry import geometry
+from .parametrised_path import ParametrisedPath, PathLimits
+from .phase_plane import PhasePlane, phase_plane, proofs
+
+__all__ = ["KNOWN_LIMITS", "time_along"]
+
+KNOWN_LIMITS = ("platform_speed", "cable_speed", "carrier_speed", "carrier_acceleration")
+ATTEMPTS = 8
+MOST_INTERVALS = 6400
+FINER_TRIES = 2  # after a grid on which the search ended without a law
+RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
+LARGEST_RESERVE = 0.01  # of the weight
+LARGEST_SHRINK = 0.01
+COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if less a reserve there
+COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
+
+
+def time_along(
+    robot: Robot | str | os.PathLike[str],
+    task: Task | dict[str, Any] | str | os.PathLike[str],
+    *,
+    grid: int = 200,
+) -> Plan:
+    """Find the fastest motion along a task's path, from rest to lasting rest, with every tension inside its limits.
+
+    Only the geometry of the path matters, not its own time law. Legs rest at their points where the path has a corner
+    there (`blend: 0`), turns back or dwells; the time that it dwells is part of the duration. Circles end after the
+    task's duration by their own rate, or after one turn; any other duration is ignored. Carriers rest or follow given
+    paths, walked with the same s as the platform's.
+
+    Of the task's limits those named in `KNOWN_LIMITS` hold, and the robot file's of mobile carriers that move. The
+    tension limits, less the task's margin, are the facets of the available wrench set. The time law is that of TOPP-RA
+    (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE
+    T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    task
+        A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
+    grid
+        Intervals to start with, from 10 to `MOST_INTERVALS`; the audit may double them.
+
+    Returns
+    -------
+    Plan
+        Audited as every plan is. Its task has the time law in it, so `plan` audits the same motion again; `law` has the
+        limit that is active at each part of the path (`bottlenecks`). If infeasible, at `law.at` no tensions inside
+        their limits give the wrench that the path needs, whatever the speed and acceleration; at the ends, for the
+        platform to rest there. The motion is then one that shows the path in 10 s. If not-found, every place of the
+        grid allows some speed, but no law joins them, or none that passes the audit.
+
+    Raises
+    ------
+    InputError
+        If an argument is not valid, the task does not fit the robot or requires what a time law along a path cannot
+        do, or nothing limits the speed; in one line.
+    SolverError
+        If toppra is not installed; the message contains the command that installs it.
+    """
+    robot, task = as_robot(robot), read_task(task)
+    grid = whole_number("grid", grid, 10, MOST_INTERVALS)
+    _check(robot, task)
+    paths = carrier_paths(robot, task)
+    moving = {index: geometry(its, alone=False) for index, its in paths.items()}
+    until = task.duration if isinstance(task.path, CirclePath) and isinstance(task.duration, float) else None
+    still_air = None if task.wind is None else np.zeros(3)
+    parametrised = ParametrisedPath(robot, geometry(task.path, alone=not moving), moving, until, still_air)
+    return _search(task, parametrised, _limits(robot, task, parametrised.moving), grid)
+
+
+def _check(robot: Robot, task: Task) -> None:
+    """Refuse a task that does not fit the robot, or that requires more than a time law along its path.
+
+    Raises
+    ------
+    InputError
+        Naming the field and what is accepted.
+    """
+    where = f"task {task.name!r}"
+    if task.phases is not None:
+        raise InputError(
+            f"{where}: phases must be left out to time a path, got {len(task.phases)} phases; plan the task instead"
+        )
+    if isinstance(task.base, FreeBase):
+        raise InputError(f"{where}: base.kind must be hold or given to time a path, got 'free'")
+    if task.tube.radius or task.tube.turn:
+        raise InputError(f"{where}: tube must be left out to time a path, which is then followed exactly")
+    for name in type(task.limits).model_fields:
+        if name not in (*KNOWN_LIMITS, "soft") and getattr(task.limits, name):
+            raise InputError(
+                f"{where}: limits.{name} must be left out to time a path; a time law keeps {', '.join(KNOWN_LIMITS)}"
+            )
+    if task.limits.soft:
+        raise InputError(f"{where}: limits.soft must be left out to time a path, whose limits are all hard")
+    if task.robust is not None:
+        raise InputError(f"{where}: robust must be left out to time a path, got {task.robust:g}; plan the task instead")
+    if isinstance(task.wind, WindBox) or (task.wind is not None and any(task.wind)):
+        raise InputError(f"{where}: wind must be [0, 0, 0], still air, or left out to time a path")
+    if task.wind is not None and robot.platform.aero is None:
+        raise InputError(f"{where}: wind must be left out, since robot {robot.name!r} has no platform.aero")
+    check_margin(robot, task)
+
+
+def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
+    """Return the limits of the task, and those of the carriers that move."""
+    names = {robot.carriers[index].name for index in moving}
+    kept = [
+        limit
+        for limit in limit_list(robot, task)
+        if limit.name in KNOWN_LIMITS and (not limit.name.startswith("carrier") or limit.labels[0] in names)
+    ]
+    parts = [tuple(limit for limit in kept if limit.name.endswith(ending)) for ending in ("speed", "acceleration")]
+    return PathLimits(*(Limits(robot, part) for part in parts))
+
+
+def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, intervals: int) -> Plan:
+    """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
+    margin, weight = task.margin, parametrised.robot.force_scale
+    short, shrink, attempts, failures = list[_Stretches](), 0.0, 0, 0
+    while True:
+        attempts += 1
+        pieces = [
+            _piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink)
+            for s in parametrised.pieces(intervals)
+        ]
+        s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
+        law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
+        if failures == 0 and (proven := _proven(law, pieces)) is not None:
+            return _shown(task, proven)
+        if any(piece.law.unlimited for piece in pieces):
+            raise InputError(
+                f"limits must bound the speed along this path, by one of {', '.join(KNOWN_LIMITS)}, since its tensions "
+                "do not, got none that does"
+            )
+        stuck = next((piece for piece in pieces if piece.law.x is None), None)
+        if stuck is not None:
+            failures += 1
+            if failures > FINER_TRIES or attempts == ATTEMPTS:
+                return _shown(task, replace(law, at=float(stuck.s[stuck.law.stuck or 0])))
+            intervals = min(2 * intervals, MOST_INTERVALS)
+            continue
+        x = [piece.law.x for piece in pieces]
+        law = replace(law, sd=np.sqrt(np.concatenate([x[0][:1], *(each[1:] for each in x)])))
+        scenario = lay_out(parametrised.robot, _timed(task, law))
+        audited = audit(scenario, None)
+        if audited.passed:
+            return Plan(scenario, MotionStatus.FEASIBLE, None, audited, 0.0, 0.0, law=law)
+        if attempts == ATTEMPTS:
+            law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
+            reason = f"no time law passed the audit in {ATTEMPTS} attempts"
+            return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
+        missing, excess = _missing(law, audited), _excess(audited)
+        # A grid too coarse for a bend misses it by so much that as large a reserve would leave no tension at all.
+        if intervals < MOST_INTERVALS and (missing.newtons.max() > COARSE * weight or excess > COARSE_EXCESS):
+            intervals = min(2 * intervals, MOST_INTERVALS)
+        else:
+            short.append(missing)
+            shrink = min(shrink + 2 * excess, LARGEST_SHRINK)
+
+
+def _timed(task: Task, law: FastestLaw) -> Task:
+    """Return the task whose platform and carriers move by a time law."""
+    names = [carrier.name for carrier in law.parametrised.robot.carriers]
+    carriers = {names[index]: path for index, path in law.carrier_paths.items()}
+    base = GivenBase(kind="given", paths=carriers) if carriers else task.base
+    return task.model_copy(update={"path": law.path, "base": base, "duration": None})
+
+
+def _shown(task: Task, law: FastestLaw) -> Plan:
+    """Return the plan of a path without a time law: a motion that shows the path, and what is known of it."""
+    scenario = lay_out(law.parametrised.robot, _timed(task, law))
+    audited = replace(audit(scenario, None, to_show=True), excess=[], certificate=None)
+    if law.certificate is None:
+        reason = f"no time law joins the places of the path; the search ended at s = {law.at:.4g}"
+        return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
+    at = float(law.path.time_at(np.array([law.at]))[0])
+    audited = replace(audited, certificate=replace(law.certificate, time=at))
+    return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
+
+
+class _Stretches(NamedTuple):
+    """Stretches of s, from places of a grid to others, and the largest wrench that misses in each, (k,) [N]."""
+
+    start: np.ndarray
+    end: np.ndarray
+    newtons: np.ndarray
+
+
+def _missing(law: FastestLaw, audited: Audit) -> _Stretches:
+    """Return where an audit found no tensions, and all of s for tensions beyond their limits, if they are too few."""
+    beyond = [abs(each.value - each.bound) for each in audited.excess if each.limit == "tensions"]
+    rows = np.flatnonzero(audited.violation > TOLERANCE)
+    at = law.path.law(audited.times)[0]
+    first, last = np.searchsorted(law.s, [at[rows], at[np.minimum(rows + 1, len(at) - 1)]])
+    start, end = law.s[(first - 2).clip(0)], law.s[(last + 1).clip(max=len(law.s) - 1)]
+    whole = _Stretches(np.zeros(1), np.ones(1), np.array([max([0.0, *beyond])]))
+    return _Stretches(*map(np.append, (start, end, audited.violation[rows]), whole))
+
+
+def _reserve(s: np.ndarray, short: list[_Stretches], weight: float) -> np.ndarray:
+    """Return how far wrenches stay inside the available ones, (n,) [N]: twice what audits found missing there."""
+    reserve = np.full(len(s), RESERVE * weight)
+    for start, end, newtons in short:
+        for row in range(len(start)):
+            reserve[(s >= start[row]) & (s <= end[row])] += 2 * newtons[row]
+    return np.minimum(reserve, LARGEST_RESERVE * weight)
+
+
+def _excess(audited: Audit) -> float:
+    """Return the largest relative excess of a limit other than those of tensions."""
+    return max([0.0, *(each.value / each.bound - 1.0 for each in audited.excess if each.limit in KNOWN_LIMITS)])
+
+
+class _Piece(NamedTuple):
+    """A piece of the path from one rest to the next."""
+
+    s: np.ndarray
+    inside: np.ndarray  # the same places, the last one taken as the end of this piece, not as the start of the next
+    plane: PhasePlane
+    law: Any
+
+
+def _piece(
+    parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, reserve: np.ndarray, shrink: float
+) -> _Piece:
+    """Solve one piece."""
+    fastest, Rows = _toppra()
+    inside = s if s[-1] == 1 else np.append(s[:-1], np.nextafter(s[-1], 0.0))
+    plane = phase_plane(parametrised, limits, inside, margin, reserve, shrink)
+    return _Piece(s, inside, plane, fastest(s - s[0], Rows(*plane.rows(parametrised.robot.force_scale), plane.x_max)))
+
+
+def _proven(law: FastestLaw, pieces: list[_Piece]) -> FastestLaw | None:
+    """Return where no speed and acceleration are possible, with the proof of the worst place; None if nowhere."""
+    weight = law.parametrised.robot.force_scale
+    proven = [
+        proof
+        for piece in pieces
+        if piece.law.x is None or not piece.plane.rests_at_ends(weight)
+        for proof in proofs(law.parametrised, law.limits, piece.inside, law.margin)
+    ]
+    if not proven:
+        return None
+    worst = max(proven, key=lambda each: each.certificate.shortfall)
+    blocked = np.array([each.s for each in proven])
+    return replace(law, at=worst.s, certificate=worst.certificate, problem=worst.problem, blocked=blocked)
+
+
+def _toppra() -> tuple[Any, Any]:
+    try:
+        from .toppra_law import Rows, fastest
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "toppra":
+            raise
+        raise SolverError(
+            "time_along: toppra is not installed; install the extra timing: pip install 'towline[timing]'"
+        ) from None
+    return fastest, Rows

@@ -1,0 +1,52 @@
+"""`scene`: what figures draw in space of the dataset of a plan or a simulation, at given times."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.inputs import printable
+from ..figures.animation import Scene
+from ..figures.outlines import outlines_from
+from ..models.dynamics import dynamics_of
+from ..models.robot import Robot
+from ..models.rotor_discs import rotor_discs
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["scene"]
+
+TRAIL = 5000  # points of the trail at most
+LONGEST = 100  # letters of the title
+
+
+def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
+    """Return the robot at the saved instants nearest to `times` [s], which are from the first instant on.
+
+    Nothing is interpolated: every instant that is drawn was audited, or simulated.
+    """
+    saved = dataset["time"].to_numpy() - float(dataset["time"][0])
+    rows = np.searchsorted((saved[1:] + saved[:-1]) / 2, times)
+    poses, carriers = dataset["pose"].to_numpy(), dataset["carrier_pose"].to_numpy()[rows]
+    anchors, attachments = dynamics_of(robot).points(poses[rows], carriers)
+    trail = np.unique(np.linspace(0, len(saved) - 1, min(len(saved), TRAIL)).round().astype(int))
+    shown = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.body]
+    return Scene(
+        title=printable(str(dataset.attrs.get("title", robot.name)), LONGEST),
+        anchors=anchors,
+        attachments=attachments,
+        path=poses[trail, :3],
+        path_times=saved[trail],
+        carriers=carriers[:, shown, :3],
+        names=[robot.carriers[index].name for index in shown],
+        bodies=[np.flatnonzero(robot.carrier_of_cable == index) for index in shown],
+        boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
+        obstacles=outlines_from(dataset, "dataset"),
+        tensions=dataset["tensions"].to_numpy()[rows],
+        t_min=robot.t_min,
+        t_max=robot.t_max,
+        rotors=rotor_discs(robot, carriers),
+        cut=dataset["cut"].to_numpy()[rows] > 0 if "cut" in dataset else None,
+    )
