@@ -403,7 +403,9 @@ def test_every_state_is_answered_inside_limits_and_rates(name, reach):
         for part in (command.carrier_pose, command.carrier_velocity, command.carrier_acceleration):
             assert np.isfinite(part).all()
         answers.add(ANSWERS[command.answered])
-    assert {"as planned", "hold"} <= answers
+    # Carriers that fly lack thrust after such kicks, and say so.
+    usual = "soft wrench" if any(carrier.actuators for carrier in robot.carriers) else "as planned"
+    assert {usual, "hold"} <= answers
 
 
 def test_a_reference_that_is_not_announced_is_followed_too():

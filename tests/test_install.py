@@ -87,7 +87,7 @@ def data_files():
     """The files that packages read beside their modules, by their names in a wheel."""
     beside = (file for init in ROOT.glob("*/**/__init__.py") for file in init.parent.iterdir())
     files = [file.relative_to(ROOT) for file in beside if file.suffix in (".yaml", ".json", ".html", ".js")]
-    return {f"towline/{file.as_posix()}" for file in files if not {"tests", "build"} & set(file.parts)}
+    return {f"towline/{file.as_posix()}" for file in files if not {"tests", "build", ".venv"} & set(file.parts)}
 
 
 def test_a_wheel_has_the_core_and_what_packages_read(sources, tmp_path):
