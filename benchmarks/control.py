@@ -29,7 +29,7 @@ __all__ = ["Error", "Report", "Step", "markdown", "run"]
 
 Progress = Callable[[str, int, int], None]
 
-TIMED = ("casadi", "daqp", "osqp", "clarabel", "numpy")
+TIMED = ("casadi", "daqp", "osqp", "numpy")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Time paper F's circle with the base free: towline against CasADi by hand, Opti and rockit, in one run.
+"""Time paper F's circle with the base free: towline against CasADi by hand and rockit, in one run.
 
     python -m towline.benchmarks.planning [--steps 100] [--runs 5]
 

@@ -7,8 +7,9 @@ path, and again from their own solution and its multipliers. What only the secon
 taken.
 
 - towline: `Planner`, which makes its own guess.
-- CasADi, direct and mapped: the same inverse dynamics written out in CasADi, for this robot and this task alone.
-- Opti and rockit: as their manuals do it, multiple shooting with RK4 of the platform's forward dynamics, tensions and
+- CasADi: the same inverse dynamics written out for this robot and this task alone, as one function of a node that is
+  mapped over the nodes, so that it is differentiated only once.
+- rockit: as its manual does it, multiple shooting with RK4 of the platform's forward dynamics, tensions and
   base jerk constant in each interval. The step is an SX function: to expand the whole program makes an
   iteration a tenth faster and the first solve four times slower.
 """
@@ -77,17 +78,7 @@ def towline(steps: int) -> Run:
     return Run(*times, (first.audit, again.audit))
 
 
-def direct(steps: int) -> Run:
-    """Write the program in SX, node by node, as CasADi's examples do."""
-    return _direct(steps, mapped=False)
-
-
 def mapped(steps: int) -> Run:
-    """Write the same program with one SX function of a node, mapped over the nodes: it is differentiated only once."""
-    return _direct(steps, mapped=True)
-
-
-def _direct(steps: int, mapped: bool) -> Run:
     """Write inverse dynamics for this robot and this task alone: base motion and tensions at each node.
 
     The platform is level and does not turn, and neither does the base, so no rotation and no inertia is left. Position
@@ -102,14 +93,8 @@ def _direct(steps: int, mapped: bool) -> Run:
     needed = robot.platform.mass * (path.acceleration[:, :3] - np.array(robot.gravity)) / weight
     given = ca.DM(np.hstack([path.pose[:, :3], needed]).T)
 
-    node = _node(robot)
-    X: Any = (ca.MX if mapped else ca.SX).sym("X", 9 + m, steps + 1)
-    if mapped:
-        outputs: list[Any] = list(node.map(steps + 1)(X, given))
-    else:
-        columns = [node(X[:, k], given[:, k]) for k in range(steps + 1)]
-        outputs = [ca.horzcat(*parts) for parts in zip(*columns, strict=True)]
-    costs, balances = outputs
+    X: Any = ca.MX.sym("X", 9 + m, steps + 1)
+    costs, balances = _node(robot).map(steps + 1)(X, given)
     q, v, a = X[:3, :], X[3:6, :], X[6:9, :]
     here, there = a[:, :-1], a[:, 1:]
     position = q[:, 1:] - (q[:, :-1] + h * v[:, :-1] + h**2 / 6 * (2 * here + there))
@@ -139,11 +124,11 @@ def _direct(steps: int, mapped: bool) -> Run:
     guess[:3] = (path.pose[:, :3] - path.pose[:, :3].mean(axis=0)).T
     guess[3:6], guess[6:9] = path.velocity[:, :3].T, path.acceleration[:, :3].T
     guess[9:] = 1 / m
-    solver = ca.nlpsol("direct", "ipopt", problem, _options(FIRST))
+    solver = ca.nlpsol("mapped", "ipopt", problem, _options(FIRST))
     solution = solver(x0=guess.ravel("F"), **bounds)
     first = time.perf_counter() - start
 
-    warm = ca.nlpsol("direct", "ipopt", problem, _options(AGAIN))
+    warm = ca.nlpsol("mapped", "ipopt", problem, _options(AGAIN))
     start = time.perf_counter()
     repeated = warm(x0=solution["x"], lam_x0=solution["lam_x"], lam_g0=solution["lam_g"], **bounds)
     again = time.perf_counter() - start
@@ -172,7 +157,7 @@ def _node(robot: Robot) -> ca.Function:
 
 
 class _Shooting:
-    """Hold what both peers need: a step of the dynamics, the path, costs and a guess.
+    """The shooting that rockit is given: a step of the dynamics, the path, costs and a guess.
 
     x = (position, angles, velocity and body rates of the platform, position, velocity and acceleration of the base),
     u = (tensions over the weight, jerk of the base).
@@ -227,67 +212,42 @@ def _step(robot: Robot, h: float) -> ca.Function:
     return ca.Function("step", [x, u], [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)], {"cse": True})
 
 
-def opti(steps: int) -> Run:
-    """Write the shooting with CasADi's Opti."""
-
-    def write(problem: _Shooting, ipopt: dict[str, Any]) -> ca.Function:
-        nlp = ca.Opti()
-        X, U = nlp.variable(21, steps + 1), nlp.variable(9, steps)
-        cost = 0.0
-        for k in range(steps):
-            nlp.subject_to(X[:, k + 1] == problem.step(X[:, k], U[:, k]))
-            nlp.subject_to(nlp.bounded(problem.low, U[:6, k], problem.high))
-            nlp.subject_to(ca.sumsqr(X[18:, k]) / MOST**2 <= 1)
-            nlp.subject_to(X[:6, k + 1] == problem.path.pose[k + 1])
-            cost += problem.cost(U[:, k], X[:, k]) / steps
-        nlp.subject_to(X[:, 0] == X[:, -1])
-        nlp.minimize(cost)
-        nlp.solver("ipopt", _options(ipopt))
-        return nlp.to_function("opti", [X, U, nlp.lam_g], [X, U, nlp.lam_g])
-
-    return _shot(steps, write)
-
-
 def rockit(steps: int) -> Run:
-    """Write the shooting with rockit."""
-    from rockit import MultipleShooting, Ocp
-
-    def write(problem: _Shooting, ipopt: dict[str, Any]) -> Solve:
-        make: Any = Ocp  # by its types T is a whole number and a state may be None
-        ocp = make(T=problem.seconds)
-        x, u = ocp.state(21), ocp.control(9)
-        place = ocp.parameter(6, grid="control+")
-        ocp.set_value(place, problem.path.pose.T)
-        ocp.set_next(x, problem.step(x, u))
-        ocp.subject_to(problem.low <= (u[:6] <= problem.high))
-        ocp.subject_to(ca.sumsqr(x[18:]) / MOST**2 <= 1)
-        ocp.subject_to(x[:6] == place, include_first=False)
-        ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
-        ocp.add_objective(ocp.sum(problem.cost(u, x)) / steps)
-        ocp.solver("ipopt", _options(ipopt))
-        ocp.method(MultipleShooting(N=steps))
-        X, U = (ocp.sample(each, grid=grid)[1] for each, grid in ((x, "control"), (u, "control-")))
-        places = ocp.sample(place, grid="control")[1]
-        multipliers = ocp._method.opti.lam_g  # rockit's own code generator takes it from here too
-        solve = ocp.to_function("rockit", [X, U, multipliers, places], [X, U, multipliers])
-        return lambda X, U, multipliers: solve(X, U, multipliers, problem.path.pose.T)
-
-    return _shot(steps, write)
-
-
-def _shot(steps: int, write: Callable[[_Shooting, dict[str, Any]], Solve]) -> Run:
-    """Time a peer; `write` builds its solver with the given options of IPOPT."""
+    """Write the shooting with rockit, and solve it."""
     robot = load(ROBOT)
     start = time.perf_counter()
     problem = _Shooting(robot, steps)
-    solve = write(problem, FIRST)
-    solution = solve(*problem.guess(), 0)
+    solution = _write_rockit(problem, FIRST)(*problem.guess(), 0)
     first = time.perf_counter() - start
-    warm = write(problem, AGAIN)
+    warm = _write_rockit(problem, AGAIN)
     start = time.perf_counter()
     repeated = warm(*solution)
     again = time.perf_counter() - start
     return Run(first, again, (problem.audited(*solution[:2]), problem.audited(*repeated[:2])))
+
+
+def _write_rockit(problem: _Shooting, ipopt: dict[str, Any]) -> Solve:
+    """Return rockit's solver of the shooting with these options of IPOPT."""
+    from rockit import MultipleShooting, Ocp
+
+    make: Any = Ocp  # by its types T is a whole number and a state may be None
+    ocp = make(T=problem.seconds)
+    x, u = ocp.state(21), ocp.control(9)
+    place = ocp.parameter(6, grid="control+")
+    ocp.set_value(place, problem.path.pose.T)
+    ocp.set_next(x, problem.step(x, u))
+    ocp.subject_to(problem.low <= (u[:6] <= problem.high))
+    ocp.subject_to(ca.sumsqr(x[18:]) / MOST**2 <= 1)
+    ocp.subject_to(x[:6] == place, include_first=False)
+    ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
+    ocp.add_objective(ocp.sum(problem.cost(u, x)) / problem.steps)
+    ocp.solver("ipopt", _options(ipopt))
+    ocp.method(MultipleShooting(N=problem.steps))
+    X, U = (ocp.sample(each, grid=grid)[1] for each, grid in ((x, "control"), (u, "control-")))
+    places = ocp.sample(place, grid="control")[1]
+    multipliers = ocp._method.opti.lam_g  # rockit's own code generator takes it from here too
+    solve = ocp.to_function("rockit", [X, U, multipliers, places], [X, U, multipliers])
+    return lambda X, U, multipliers: solve(X, U, multipliers, problem.path.pose.T)
 
 
 def _options(ipopt: dict[str, Any]) -> dict[str, Any]:
@@ -297,8 +257,6 @@ def _options(ipopt: dict[str, Any]) -> dict[str, Any]:
 
 CONTENDERS: dict[str, Callable[[int], Run]] = {
     "towline": towline,
-    "CasADi, direct": direct,
     "CasADi, mapped": mapped,
-    "CasADi Opti": opti,
     "rockit": rockit,
 }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -20,7 +21,7 @@ __all__ = ["Flown", "Freed", "Moved", "Tethered"]
 SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
 
 
-class Moved(Protocol):
+class Moved(ABC):
     """Coordinates of carriers that a solution moves, with accelerations as its controls.
 
     Attributes
@@ -37,14 +38,15 @@ class Moved(Protocol):
     tethers: np.ndarray
     count: int
 
+    @abstractmethod
     def reset(self) -> None:
         """Forget all earlier steps."""
-        ...
 
+    @abstractmethod
     def along(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
         """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
-        ...
 
+    @abstractmethod
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return them and their rate, (2, f), `dt` [s] after the last step.
 
@@ -55,35 +57,34 @@ class Moved(Protocol):
         reference
             (3, f), what `along` returns of the reference.
         """
-        ...
 
     def under_way(self) -> np.ndarray:
         """Return the accelerations of the stages that earlier commands decide, (d, f), less the reference's.
 
-        What is commanded now comes after these.
+        What is commanded now comes after these. Default: no stages.
         """
-        ...
+        return np.zeros((0, self.count))
 
+    @abstractmethod
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         """Write how carriers should move, (c, 3, 6), with accelerations (f,), and the platform's (6,).
 
         The accelerations are those of the reference now, and what the solution adds to them.
         """
-        ...
 
+    @abstractmethod
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Write how carriers should move, (c, 3, 6), where there is no solution."""
-        ...
 
     def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
         """Return how far they are off the reference (c, 3, 6) now, and how fast, as `reaction` has it, (2, c, 6).
 
-        None where each follows commands wherever it is.
+        None, the default, where each follows commands wherever it is.
         """
-        ...
+        return None
 
 
-class Freed:
+class Freed(Moved):
     """Coordinates of carriers whose place is commanded: a solution starts where the last command left them."""
 
     def __init__(self, reach: np.ndarray, strongest: float, boxes: tuple[np.ndarray, np.ndarray] | None = None):
@@ -98,19 +99,18 @@ class Freed:
                 own[moves] = side[chosen[moves], coordinate[moves]]
         self.reset()
 
+    @override
     def reset(self) -> None:
-        """Forget all earlier steps."""
         self._placed = np.full((3, self.count), np.nan)  # place, rate and acceleration, as commanded
 
+    @override
     def along(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
-        """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
-        del platform
         chosen, coordinate = self.freed.T
         return carriers[:, chosen, :, coordinate].transpose(1, 2, 0)
 
+    @override
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return them and their rate, (2, f): the reference's at first, then as ordered."""
-        del measured
         place, rate, acceleration = self._placed
         if self.count and np.isfinite(self._placed).all():
             place += dt * rate + dt * dt / 2 * acceleration
@@ -123,24 +123,20 @@ class Freed:
             self._placed[:2], self._placed[2] = reference[:2], 0.0
         return self._placed[:2]
 
-    def under_way(self) -> np.ndarray:
-        """Return no stages, (0, f)."""
-        return np.zeros((0, self.count))
-
+    @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
-        """Write how carriers should move, (c, 3, 6), with the accelerations (f,)."""
-        del platform
         self._placed[2] = planned + more
         chosen, coordinate = self.freed.T
         carriers[chosen, :, coordinate] = self._placed.T
 
+    @override
     def rest(self, stage: float, carriers: np.ndarray) -> None:
-        """Write how carriers come to rest, (c, 3, 6)."""
+        """Let carriers come to rest."""
         slower = np.clip(-self._placed[1] / stage, -self._strongest, self._strongest)
         self.order(slower, np.zeros(self.count), np.zeros(6), carriers)
 
+    @override
     def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
-        """Return how far they are off the reference (c, 3, 6) now, and how fast, as `reaction` has it, (2, c, 6)."""
         result, (chosen, coordinate) = np.zeros((2, len(carriers), 6)), self.freed.T
         for order in range(2):
             result[order, chosen, coordinate] = self._placed[order] - carriers[chosen, order, coordinate]
@@ -190,7 +186,7 @@ class Flown(Freed):
         self._pending.add(np.zeros(self.count))
 
 
-class Tethered:
+class Tethered(Moved):
     """Coordinates that cables of fixed length leave to carriers: a solution starts where they are measured."""
 
     def __init__(self, robot: Robot, delay: float, stage: float):
@@ -202,33 +198,33 @@ class Tethered:
         self._pending = Pending(delay + stage)
         self.reset()
 
+    @override
     def reset(self) -> None:
-        """Forget all earlier steps."""
         self._now, self._measured = np.zeros((1, 3, self.count)), np.zeros((0, 12))
         self._pending.reset(self.count)
 
+    @override
     def along(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
-        """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
         result = np.zeros((len(platform), 3, self.count))
         motions = np.ascontiguousarray(np.concatenate([platform[:, None], carriers], axis=1))
         control_coordinates(self._robot, self.tethers, motions, result)
         return result
 
+    @override
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return them and their rate, (2, f), as measured."""
-        del reference
         self._pending.wait(dt)
         self._measured = measured
         motions = np.concatenate([measured, np.zeros((len(measured), 6))], axis=1)
         control_coordinates(self._robot, self.tethers, motions, self._now)
         return self._now[0, :2]
 
+    @override
     def under_way(self) -> np.ndarray:
-        """Return the accelerations of the stages that earlier commands decide, (d, f), less the reference's."""
         return self._pending.means(*self._under_way)
 
+    @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
-        """Write how carriers should move, (c, 3, 6), with accelerations (f,) and the platform's (6,)."""
         self._pending.add(more)
         motion = np.zeros((3, 6 + self.count))
         motion[:2, :6], motion[:2, 6:] = self._measured[0].reshape(2, 6), self._now[0, :2]
@@ -238,13 +234,10 @@ class Tethered:
         control_carriers(self._robot, self.tethers, motion, moving)
         carriers[:, :, :3] = moving[:, :, :3]
 
+    @override
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Leave carriers to their reference."""
         self._pending.add(np.zeros(self.count))
-
-    def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
-        """Return nothing: carriers follow commands wherever they are."""
-        return None
 
 
 def _tethers(robot: Robot) -> np.ndarray:

@@ -48,9 +48,9 @@ def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str])
     )
 
 
-def heading(text: str, level: int = 2, anchor: str = "") -> str:
-    """Return a heading of level 2 or 3; with an `anchor`, links lead to it."""
-    return f"<h{level}{_id(anchor)}>{_safe(text)}</h{level}>"
+def heading(text: str, anchor: str = "") -> str:
+    """Return a heading; with an `anchor`, links lead to it."""
+    return f"<h2{_id(anchor)}>{_safe(text)}</h2>"
 
 
 def paragraph(text: str) -> str:
@@ -68,15 +68,15 @@ def contents(links: Iterable[Link]) -> str:
     return "<nav><ul>\n" + "\n".join(f"<li>{one.html}</li>" for one in links) + "\n</ul></nav>"
 
 
-def facts(title: str, rows: Iterable[tuple[str, str]], level: int = 2) -> str:
+def facts(title: str, rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of named facts with a heading; a fact without a name continues the one before it."""
-    return f"{heading(title, level)}\n{_facts(rows)}"
+    return f"{heading(title)}\n{_facts(rows)}"
 
 
-def folded(title: str, rows: Iterable[tuple[str, str]], anchor: str, more: str = "") -> str:
-    """Return a table of named facts, and `more` below it, folded under a title; a link to `anchor` unfolds it."""
+def folded(title: str, rows: Iterable[tuple[str, str]], anchor: str) -> str:
+    """Return a table of named facts, folded under a title; a link to `anchor` unfolds it."""
     # The anchor is inside: browsers open what hides the target of a link.
-    return f"<details><summary>{_safe(title)}</summary>\n{_facts(rows, anchor)}{more}</details>"
+    return f"<details><summary>{_safe(title)}</summary>\n{_facts(rows, anchor)}</details>"
 
 
 def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str | Link]]) -> str:

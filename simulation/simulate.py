@@ -168,7 +168,6 @@ def simulate(
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
     if runs is None:
         where.check_alone()
-    if runs is None:
         return _one(plant, pilot, experiment, first, error)
     seeds = range(first, first + whole_number("runs", runs, 1, MOST_RUNS))
     return flights(the_robot, experiment, seeds, error, fly_many(plant, pilot, experiment, seeds, error, where))

@@ -221,19 +221,18 @@ def test_bench_refuses_in_one_line(arguments, told):
 
 
 def test_all_plan_the_same_circle():
-    """Everyone's plan passes the audit, and the three by inverse dynamics have the same optimum."""
+    """Everyone's plan passes the audit, and the two by inverse dynamics have the same optimum."""
     runs = planning.measure(8, 1)
-    assert list(runs) == ["towline", "CasADi, direct", "CasADi, mapped", "CasADi Opti", "rockit"]
+    assert list(runs) == ["towline", "CasADi, mapped", "rockit"]
     for name, (run,) in runs.items():
         assert run.first > 0 < run.again, name
         assert all(audit.passed and audit.violation.max() < 1e-9 for audit in run.audits), name
         moved = np.abs(run.audits[0].carriers.pose - run.audits[1].carriers.pose).max()
         assert moved < 1e-5, name
     ours = runs["towline"][0].audits[0]
-    for name in ("CasADi, direct", "CasADi, mapped"):
-        theirs = runs[name][0].audits[0]
-        np.testing.assert_allclose(theirs.carriers.pose, ours.carriers.pose, atol=1e-5)
-        np.testing.assert_allclose(theirs.tensions, ours.tensions, atol=1e-4)
+    theirs = runs["CasADi, mapped"][0].audits[0]
+    np.testing.assert_allclose(theirs.carriers.pose, ours.carriers.pose, atol=1e-5)
+    np.testing.assert_allclose(theirs.tensions, ours.tensions, atol=1e-4)
     lines = planning.table(runs)
     assert len(lines) == 2 + len(runs)
     assert lines[2].startswith("| towline | ")

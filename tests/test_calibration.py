@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
+from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate, next_poses
@@ -16,7 +17,6 @@ from towline.estimation.calibration.model import Model, State
 from towline.estimation.calibration.normal_equations import metric
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
 from towline.estimation.calibration.pose_track import PoseTrack
-from towline.estimation.calibration.rotations import from_vectors
 from towline.estimation.calibration.solving import length_of, model_of
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
@@ -230,7 +230,7 @@ def test_the_schur_complement_finds_what_a_sparse_solver_finds():
         x = model.parameters.first.copy()
         x[varies] += z[:p]
         q = z[p:].reshape(count, 6)
-        return State(x, q[:, :3], from_vectors(q[:, 3:]))
+        return State(x, q[:, :3], Rotation.from_rotvec(q[:, 3:]).as_matrix())
 
     def residuals(z):
         own = model.residuals(state(z))
@@ -551,8 +551,4 @@ def test_too_few_samples_are_refused():
 def test_rotations_and_points_agree():
     angles = np.random.default_rng(0).uniform(-1.5, 1.5, (50, 3))
     R = points.rotations(angles)
-    from towline.estimation.calibration.rotations import from_quaternions, quaternions_of, vectors_of
-
     np.testing.assert_allclose(points.angles(R), angles, atol=1e-12)
-    np.testing.assert_allclose(from_quaternions(quaternions_of(R)), R, atol=1e-12)
-    np.testing.assert_allclose(from_vectors(vectors_of(R)), R, atol=1e-12)

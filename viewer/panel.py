@@ -85,7 +85,7 @@ class Panel:
                     self._stage.show_bands(found[0].bands(most) if surface.value else [])
 
         def compute() -> None:
-            """Add the surface once it is computed; compiling the code for its margins may take seconds."""
+            """Add the surface once it is computed."""
             assert self._subject.cloud is not None
             try:
                 there = surface_of(self._subject.cloud.dataset, self._subject.robot, FARTHEST)

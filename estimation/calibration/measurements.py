@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from ...base.display import Displayed
 from ...base.errors import InputError
@@ -15,7 +16,6 @@ from ...base.netcdf import Contents, Variable, save_netcdf
 from ...models import points
 from ...models.part import COORDINATES, LARGEST
 from ...models.robot import Robot
-from .rotations import from_quaternions
 
 if TYPE_CHECKING:
     import os
@@ -244,7 +244,7 @@ def _angles(orientations: Any, count: int) -> np.ndarray:
             f"orientations must be quaternions of length 1, got {shown(array[row].tolist())} at sample {row}"
         )
     result = np.full((count, 3), np.nan)
-    result[known] = points.angles(from_quaternions(array[known]))
+    result[known] = points.angles(Rotation.from_quat(array[known]).as_matrix())
     return result
 
 

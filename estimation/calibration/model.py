@@ -20,11 +20,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ...base.display import Displayed
 from ...models import points
 from ...models.robot import Robot
-from . import rotations
 from .geometry import runs
 from .measurements import Measurements, measured_poses
 from .parameters import OF_CABLE, Parameters, prior_sigmas
@@ -222,7 +222,7 @@ class Model(Displayed):
         poses = np.zeros((len(position), 6))
         held = (sigmas > 0) & np.isfinite(sigmas)
         if held.any():
-            moved = np.concatenate([state.shift, rotations.vectors_of(state.turn)], axis=1)
+            moved = np.concatenate([state.shift, Rotation.from_matrix(state.turn).as_rotvec()], axis=1)
             poses[held] = moved[held] / sigmas[held]
         residuals = Residuals(readings, poses, (state.x - parameters.first) / self.prior_sigmas)
         if not derive:
@@ -263,4 +263,4 @@ class Model(Displayed):
         """Return the state after changes of parameters (P,) and of poses (N, 6), or None if no pose varies."""
         if dq is None:
             return state._replace(x=state.x + dx)
-        return State(state.x + dx, state.shift + dq[:, :3], rotations.from_vectors(dq[:, 3:]) @ state.turn)
+        return State(state.x + dx, state.shift + dq[:, :3], Rotation.from_rotvec(dq[:, 3:]).as_matrix() @ state.turn)

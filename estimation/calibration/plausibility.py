@@ -17,6 +17,7 @@ from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ...base.text import quantity
 from ...models import points
@@ -140,8 +141,6 @@ def _too_large(robot: Robot, readings: np.ndarray) -> str | None:
 
 def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
     """Yield ways to read the log, as it is given first."""
-    from scipy.spatial.transform import Rotation
-
     yield first
     position, rotation = first.position, first.rotation
     for factor, unit in FACTORS.items():
@@ -154,12 +153,15 @@ def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
         return
     whole = Rotation.from_matrix(rotation)
     x, y, z, w = whole.as_quat().T
+    scalar_first, scalar_last = (
+        Rotation.from_quat(np.column_stack(parts)).as_matrix() for parts in ([y, z, w, x], [w, x, y, z])
+    )
     turns = {
         "the angles look like degrees read as radians": points.rotations(np.radians(angles)),
         "the angles look like radians read as degrees": points.rotations(np.degrees(angles)),
         "the orientations look inverted, from {G} to the platform": np.swapaxes(rotation, 1, 2),
-        "the quaternions look like (w, x, y, z) read as (x, y, z, w)": _of(np.column_stack([y, z, w, x])),
-        "the quaternions look like (x, y, z, w) read as (w, x, y, z)": _of(np.column_stack([w, x, y, z])),
+        "the quaternions look like (w, x, y, z) read as (x, y, z, w)": scalar_first,
+        "the quaternions look like (x, y, z, w) read as (w, x, y, z)": scalar_last,
         "the angles look like a rotation vector": Rotation.from_rotvec(angles).as_matrix(),
     }
     for axes in permutations("xyz"):
@@ -171,12 +173,6 @@ def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
             turns[f"the angles look like {text} about {', '.join(axes)} of {{G}}, one after the other"] = matrices
     for slip, matrices in turns.items():
         yield _Reading(slip, position, matrices, turns=True)
-
-
-def _of(quaternions: np.ndarray) -> np.ndarray:
-    from .rotations import from_quaternions
-
-    return from_quaternions(quaternions)
 
 
 def _left(robot: Robot, parameters: Parameters, reading: _Reading, y: np.ndarray, columns: np.ndarray) -> np.ndarray:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from copy import copy
 
 import numpy as np
-
-from .rotations import from_quaternions, quaternions_of
+from scipy.spatial.transform import Rotation
 
 __all__ = ["PoseTrack"]
 
@@ -38,7 +37,7 @@ class PoseTrack:
         measured = self._measured
         self._widest = WIDEST * float(np.median(np.diff(measured)))
         self._span = measured[0], measured[-1]
-        quaternions = quaternions_of(rotation[known])
+        quaternions = Rotation.from_matrix(rotation[known]).as_quat()
         # q and -q are the same rotation: neighbours get the same sign.
         signs = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
         quaternions[1:] *= np.cumprod(signs)[:, None]
@@ -78,7 +77,7 @@ class PoseTrack:
         q, dq = q / length, dq / length
         v, w, dv, dw = q[:, :3], q[:, 3:], dq[:, :3], dq[:, 3:]
         rate = 2 * (w * dv - dw * v + np.cross(v, dv))  # the vector part of 2 dq q*, for rates in {G}
-        return values[:, :3], from_quaternions(q), slopes[:, :3], rate
+        return values[:, :3], Rotation.from_quat(q).as_matrix(), slopes[:, :3], rate
 
 
 def _smooth(times: np.ndarray, values: np.ndarray) -> np.ndarray:

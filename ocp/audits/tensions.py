@@ -19,7 +19,6 @@ from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
 from .checks import UNDERACTUATED_TOLERANCE
-from .distance import distances
 
 __all__ = ["INDEPENDENT", "TOLERANCE", "AuditedTensions", "Distribute", "Distribution", "in_all_winds", "scaled"]
 
@@ -70,8 +69,8 @@ class Distribution:
 
     Where the tensions nearest to the preferred ones, without limits, happen to lie inside the limits they are the
     result: a batch of pseudo-inverses gives those. The exact solver solves the other instants. Where no tensions exist
-    the distance of the wrench from the possible ones is computed for all instants at once (`distance`), and the
-    certificate only for the farthest.
+    the distance of the wrench from the possible ones is computed for all instants at once, and the certificate only
+    for the farthest.
 
     Of few cables, whose columns do not span all wrenches, a wrench outside their span is expected to be missed by a
     little. Inside the span nothing may be missed: there the limits count as for any robot.
@@ -103,13 +102,6 @@ class Distribution:
         beyond, worst = 0.0, None
         singly: list[int] = []
         rows = np.flatnonzero(~(inside & good))
-        if rows.size and not few:
-            far = distances(scaled_A[rows], scaled_w[rows], low, high)
-            if far.proven.any():
-                impossible = rows[far.proven]
-                violation[impossible], tensions[impossible] = far.distance[far.proven], np.nan
-                singly.append(int(impossible[np.argmax(violation[impossible])]))
-            rows = rows[~far.proven]
         if rows.size:
             batch = solve_batch(scaled_A[rows], scaled_w[rows], low, high, near[rows])
             solved, proven = batch.feasible, np.isfinite(batch.shortfall)

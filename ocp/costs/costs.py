@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...models import Robot
-from ..limits.limits import BLOCK, Motion, in_blocks, motions
+from ..limits.limits import BLOCK, Motion, in_blocks, motions, of_motions
 from ..limits.state import Body
 from .cost import Cost, CostState, RateCost
 from .terms import Jerk
@@ -43,8 +43,7 @@ class Costs(Displayed):
         """
         count = 1 + len(self.robot.carriers)
         # Pieces of one symbol are no symbols: derivatives are taken with respect to these.
-        parts = [[ca.SX.sym(name, 6) for name in "xva"] for _ in range(2 * count)]
-        bodies = [Body(*part) for part in parts]
+        bodies = [Body(*(ca.SX.sym(name, 6) for name in "xva")) for _ in range(2 * count)]
         tensions, duration, margin = (ca.SX.sym(name, size) for name, size in (("t", self.robot.m), ("T", 1), ("e", 1)))
         state = CostState(
             robot=self.robot,
@@ -65,12 +64,7 @@ class Costs(Displayed):
                 changing.append(ca.vec(values))
             else:
                 total += ca.sumsqr(values) if cost.squared else ca.sum1(ca.vec(values))
-        inputs = [part for body in parts for part in body]
-        inner = ca.Function("costs_of_parts", [*inputs, tensions, duration, margin], [total, ca.vertcat(*changing)])
-        whole = [ca.SX.sym(f"body{i}", 18) for i in range(2 * count)]
-        given = [part for body in whole for part in ca.vertsplit(body, 6)]
-        outputs = inner.call([*given, tensions, duration, margin])
-        return ca.Function("costs", [*whole, tensions, duration, margin], outputs)
+        return of_motions("costs", bodies, [tensions, duration, margin], [total, ca.vertcat(*changing)])
 
     def along(
         self, times: np.ndarray, platform: Motion, carriers: Motion, tensions: np.ndarray, margin: float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -18,7 +18,7 @@ from .distance import Distance, Pair
 from .limit import Limit
 from .state import Body, State
 
-__all__ = ["BLOCK", "Limits", "Separating", "in_blocks", "motions"]
+__all__ = ["BLOCK", "Limits", "Separating", "in_blocks", "motions", "of_motions"]
 
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
 
@@ -69,6 +69,14 @@ def in_blocks(block: ca.Function, arguments: list[np.ndarray]) -> np.ndarray:
     return values[:n]
 
 
+def of_motions(name: str, bodies: Sequence[Body], others: Sequence[ca.SX], values: Sequence[ca.SX]) -> ca.Function:
+    """Return the function of values from the whole motions of bodies, (18,) each, and others of their symbols."""
+    parts = ca.Function("of_parts", [part for body in bodies for part in body] + [*others], [*values])
+    whole = [ca.SX.sym(f"body{i}", 18) for i in range(len(bodies))]
+    given = [part for body in whole for part in ca.vertsplit(body, 6)]
+    return ca.Function(name, [*whole, *others], parts.call([*given, *others]))
+
+
 @dataclass(frozen=True, eq=False)
 class Limits(Displayed):
     """Limits in the order of their values; iterating gives them one by one."""
@@ -91,6 +99,10 @@ class Limits(Displayed):
         )
         return State(self.robot, platform, tuple(carriers), ca.SX.sym("t", self.robot.m), ca.SX.sym("off_path", 6))
 
+    @property
+    def _bodies(self) -> list[Body]:
+        return [self._state.platform, *self._state.carriers]
+
     @cached_property
     def _values(self) -> list[ca.SX]:
         """Return the values of each limit, as expressions of the state."""
@@ -112,14 +124,8 @@ class Limits(Displayed):
         Its inputs are the motion of the platform in {G} (18: pose, velocity, acceleration), those of all carriers (18
         each), the tensions [N] (m) and the platform's offset from its path (6).
         """
-        state = self._state
-        bodies = [state.platform, *state.carriers]
-        parts = [part for body in bodies for part in body]
-        inner = ca.Function("limits_of_parts", [*parts, state.tensions, state.off_path], [ca.vertcat(*self._values)])
-        whole = [ca.SX.sym(f"body{i}", 18) for i in range(len(bodies))]
-        given = [part for body in whole for part in ca.vertsplit(body, 6)]
-        values = inner(*given, state.tensions, state.off_path)
-        return ca.Function("limits", [*whole, state.tensions, state.off_path], [values])
+        others = [self._state.tensions, self._state.off_path]
+        return of_motions("limits", self._bodies, others, [ca.vertcat(*self._values)])
 
     @cached_property
     def places(self) -> list[slice]:
@@ -175,10 +181,11 @@ class Limits(Displayed):
             apart = limit.apart(Pair(first + ca.repmat(shift, 1, first.shape[1]), second))
             plane = ca.substitute(ca.horzcat(apart, ca.jacobian(apart, shift)), shift, ca.SX.zeros(3))
             points = ca.vec(ca.horzcat(first, second))
+            ends = ca.vertcat(*(ca.vec(ca.horzcat(*pair)) for pair in pairs))
             self._separating[limit] = Separating(
                 moving=first.shape[1],
                 pairs=len(pairs),
-                points=self._of_bodies(ca.vertcat(*(ca.vec(ca.horzcat(*pair)) for pair in pairs))).map(BLOCK),
+                points=of_motions("points", self._bodies, [], [ca.densify(ends)]).map(BLOCK),
                 plane=ca.Function("plane", [points], [ca.densify(ca.vec(plane))], {"cse": True}).map(BLOCK),
             )
         return self._separating[limit]
@@ -186,14 +193,6 @@ class Limits(Displayed):
     @cached_property
     def _separating(self) -> dict[Limit, Separating]:
         return {}
-
-    def _of_bodies(self, values: ca.SX) -> ca.Function:
-        """Return the function of values from the motions of platform and carriers, (18,) each."""
-        bodies = [self._state.platform, *self._state.carriers]
-        inner = ca.Function("of_parts", [part for body in bodies for part in body], [ca.densify(values)])
-        whole = [ca.SX.sym(f"body{i}", 18) for i in range(len(bodies))]
-        given = [part for body in whole for part in ca.vertsplit(body, 6)]
-        return ca.Function("of_bodies", whole, [inner(*given)])
 
     def along(
         self, platform: Motion, carriers: Motion, tensions: np.ndarray | None = None, off_path: np.ndarray | None = None

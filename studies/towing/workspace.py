@@ -88,7 +88,6 @@ def loops(
     the robot-ends have the printed x and y and any of the printed heights, which all boxes contain, however wide.
     """
     system, condition = robot("wang-ctmrts", drive), condition or ForceBalance()
-    condition.holds(system, Places.at_home(system, system.home))
     start = time.perf_counter()
     places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]), widths)
     held = condition.holds(system, places)
