@@ -306,7 +306,7 @@ class ComputedTorque(Controller):
             self._actuate(tensions)
             actuation = self._actuation.copy()
             lacking = self._of_carriers["lacking"].max(axis=1)
-            if lacking.max() > NEGLIGIBLE * self.robot.force_scale:
+            if (lacking > NEGLIGIBLE * self.robot.force_scale).any():  # not of a largest one, which may be nan
                 answered, proof = self._with_thrust_lacking(lacking, answered, proof)
         tensions = self._sent(tensions)
         if alone:

@@ -392,6 +392,22 @@ def test_a_team_hovers_with_the_thrust_that_statics_requires():
         assert command.actuation[index, 0] == pytest.approx(force @ axis, rel=1e-9)
 
 
+def test_a_row_that_lacks_thrust_says_so_beside_one_without_a_state():
+    """A quadrotor that falls at 8 m/s beyond its load needs 2 x 5 x 8 m/s^2 more; its cable is at no limit."""
+    robot = load("multi-quadrotor-3")
+    state, reference = at_home(robot, 2)
+    state.carrier_pose[0, 1, 2] = np.nan
+    state.carrier_velocity[1, 0, 2] = -8.0
+    reference = reference._replace(tensions=distribute(robot, robot.home).tensions)
+    hover = ComputedTorque(robot).step(0.0, at_home(robot)[0], reference).actuation[0, 0]
+    command = ComputedTorque(robot).step(0.0, state, reference)
+    assert [ANSWERS[which] for which in command.answered] == ["hold", "soft wrench"]
+    body, most = robot.carriers[0].body, robot.carriers[0].actuators[0].high
+    assert command.actuation[1, 0, 0] == most
+    upwards = Rotation.from_euler("xyz", robot.carrier_home[0, 3:]).as_matrix()[2, 2]
+    assert command.shortfall[1] == pytest.approx(hover + body.mass * 2 * 5.0 * 8.0 * upwards - most)
+
+
 def test_a_quadrotor_that_is_heavier_than_in_its_file_stays_at_its_place():
     """Its estimate of the force that nothing explains is the weight that is missing; without it, it hangs lower."""
     robot = load("multi-quadrotor-3")
