@@ -1,9 +1,7 @@
 """Batches in C: no warning, nothing for sanitizers to find, and the same bits from every compiler and form."""
 
-import shutil
 import subprocess
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,31 +9,26 @@ import pytest
 from towline import core
 from towline.solvers.status import UNSURE
 
+from .c_programs import FLAGS, program_of, require, sources_of
 from .soak.exactness import awkward_problem
 
-CORE = Path(__file__).parent.parent / "core"
-PARTS = ("batch", "available_wrench", "distribution", "numbers")
-SOURCES = [str(path) for part in PARTS for path in sorted((CORE / part).glob("*.c"))]
-WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-psabi", f"-I{CORE}"]
-SAME_BITS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-DTOWLINE_CABLES=32"]
+SOURCES = sources_of("batch", "available_wrench", "distribution", "numbers")
+CABLES = "-DTOWLINE_CABLES=32"
 SHAPES = [(1, 3), (3, 3), (3, 7), (6, 3), (6, 6), (6, 7), (6, 8), (6, 12), (6, 32)]
 
 
 @pytest.fixture(scope="module", params=["gcc", "clang"])
 def compiler(request):
     """Return a compiler that has vectors."""
-    if shutil.which(request.param) is None:
-        pytest.skip(f"there is no {request.param}")
+    require(request.param)
     return request.param
 
 
 @pytest.fixture(scope="module")
 def solve(compiler, tmp_path_factory):
     """Return a function that solves batches in a program of their own, which sanitizers watch."""
-    program = tmp_path_factory.mktemp(compiler) / "batch"
-    watch = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    driver = str(Path(__file__).parent / "core_batch.c")
-    subprocess.run([compiler, *WARNINGS, *SAME_BITS, *watch, driver, *SOURCES, "-lm", "-o", program], check=True)
+    folder = tmp_path_factory.mktemp(compiler)
+    program = program_of(folder, "core_batch.c", SOURCES, CABLES, "-O1", compiler=compiler)
 
     def run(arrays, rho, form):
         rows, n, m = arrays[0].shape
@@ -71,7 +64,7 @@ def awkward(n, m, count):
 
 @pytest.mark.parametrize("lanes", [[], ["-DTOWLINE_NO_LANES"]])
 def test_no_compiler_has_a_warning(compiler, lanes):
-    subprocess.run([compiler, *WARNINGS, *SAME_BITS, *lanes, "-fsyntax-only", *SOURCES], check=True)
+    subprocess.run([compiler, *FLAGS, CABLES, *lanes, "-fsyntax-only", *SOURCES], check=True)
 
 
 @pytest.mark.parametrize(("n", "m"), SHAPES)

@@ -1,8 +1,6 @@
 """The mechanics of the core are those of the CasADi model, in lanes as for one pose, at every attitude."""
 
-import shutil
 import subprocess
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -15,10 +13,8 @@ from towline.core import _core
 from towline.models import mechanics
 from towline.models.record import RECORD, record_of
 
-CORE = Path(__file__).parent.parent / "core"
-SOURCES = [*map(str, sorted((CORE / "mechanics").glob("*.c"))), str(CORE / "numbers" / "processor.c")]
-WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-psabi", f"-I{CORE}"]
-SAME_BITS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+from .c_programs import program_of, sources_of
+
 LEVEL = np.pi / 2
 COUNT = 203  # no multiple of eight
 
@@ -231,44 +227,39 @@ def test_numbers_that_are_none_are_found_at_any_address(number):
 
 
 @pytest.mark.parametrize("lanes", [[], ["-DTOWLINE_NO_LANES"]])
-@pytest.mark.parametrize("name", ["caroca-pulleys", "wang-ctmrts-6"])
-def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path, lanes, name):
+def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path, lanes):
     """Of all results at poses of which some have a number that is none, infinite or huge, with lanes and without."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("there is no C compiler: no command cc")
-    program, driver = tmp_path / "mechanics", str(Path(__file__).parent / "core_mechanics.c")
-    watch = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    command = [compiler, *WARNINGS, *SAME_BITS, *watch, *lanes, driver, *SOURCES, "-lm", "-o", program]
-    subprocess.run(command, check=True)
-    robot, rng = load(name), np.random.default_rng(11)
-    pose, velocity, acceleration, carriers = motions(robot, rng)
-    tensions = rng.normal(size=(COUNT, robot.m))
-    for array in (pose, velocity, carriers.reshape(COUNT, -1), tensions):
-        array[rng.integers(COUNT, size=12), rng.integers(6, size=12) % array.shape[1]] = rng.choice(
-            [np.nan, np.inf, -np.inf, 1e300, -1e300], 12
-        )
-    for rows in (COUNT, 1):
-        given = [array[:rows] for array in (pose, velocity, acceleration, carriers, tensions)]
-        sent = record_of(robot).tobytes() + b"".join(array.tobytes() for array in given)
-        done = subprocess.run([program, str(rows)], input=sent, capture_output=True, check=False)
-        assert done.returncode == 0, done.stderr.decode()
-        record, (m, c) = record_of(robot), (robot.m, given[3])
-        of_lines = [np.empty((rows, size * m)) for size in (1, 6, 6, 3, 7)]
-        ends, S, D, w = (
-            np.empty((2, rows, m, 3)),
-            np.empty((rows, 42 * m)),
-            np.empty((2, rows, 36)),
-            np.empty((rows, 6)),
-        )
-        _core.lines(record, given[0], c, *of_lines)
-        _core.ends(record, given[0], c, *ends)
-        _core.columns_by_geometry(record, given[0], c, S)
-        _core.wrench_by_pose(record, given[0], c, given[4], D[0])
-        _core.wrench_by_axes(record, given[0], c, given[4], D[1])
-        _core.required_wrench(record, pose[:rows], velocity[:rows], acceleration[:rows], None, w)
-        expected = np.concatenate([array.ravel() for array in (*of_lines, ends, S, D, w)])
-        np.testing.assert_array_equal(np.frombuffer(done.stdout), expected)
+    sources = sources_of("mechanics", "numbers/processor.c")
+    program = program_of(tmp_path, "core_mechanics.c", sources, "-O1", *lanes)
+    for name in ("caroca-pulleys", "wang-ctmrts-6"):
+        robot, rng = load(name), np.random.default_rng(11)
+        pose, velocity, acceleration, carriers = motions(robot, rng)
+        tensions = rng.normal(size=(COUNT, robot.m))
+        for array in (pose, velocity, carriers.reshape(COUNT, -1), tensions):
+            array[rng.integers(COUNT, size=12), rng.integers(6, size=12) % array.shape[1]] = rng.choice(
+                [np.nan, np.inf, -np.inf, 1e300, -1e300], 12
+            )
+        for rows in (COUNT, 1):
+            given = [array[:rows] for array in (pose, velocity, acceleration, carriers, tensions)]
+            sent = record_of(robot).tobytes() + b"".join(array.tobytes() for array in given)
+            done = subprocess.run([program, str(rows)], input=sent, capture_output=True, check=False)
+            assert done.returncode == 0, done.stderr.decode()
+            record, (m, c) = record_of(robot), (robot.m, given[3])
+            of_lines = [np.empty((rows, size * m)) for size in (1, 6, 6, 3, 7)]
+            ends, S, D, w = (
+                np.empty((2, rows, m, 3)),
+                np.empty((rows, 42 * m)),
+                np.empty((2, rows, 36)),
+                np.empty((rows, 6)),
+            )
+            _core.lines(record, given[0], c, *of_lines)
+            _core.ends(record, given[0], c, *ends)
+            _core.columns_by_geometry(record, given[0], c, S)
+            _core.wrench_by_pose(record, given[0], c, given[4], D[0])
+            _core.wrench_by_axes(record, given[0], c, given[4], D[1])
+            _core.required_wrench(record, pose[:rows], velocity[:rows], acceleration[:rows], None, w)
+            expected = np.concatenate([array.ravel() for array in (*of_lines, ends, S, D, w)])
+            np.testing.assert_array_equal(np.frombuffer(done.stdout), expected)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, 1e308, 1e-308, 0.0])

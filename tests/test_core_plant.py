@@ -1,8 +1,6 @@
 """The plant in C: no warning, nothing for sanitizers to find in any numbers, and the bits of the extension."""
 
-import shutil
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +9,8 @@ from towline import Dynamics, load
 from towline.core import run_plant, sense
 from towline.plant import Plant
 
-CORE = Path(__file__).parent.parent / "core"
-SOURCES = [str(path) for path in sorted((CORE / "plant").glob("*.c"))]
-WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-psabi", f"-I{CORE}"]
-SAME_BITS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+from .c_programs import program_of, sources_of
+
 NONSENSE = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300]
 ROWS, STEPS, KEEP, SUBSTEPS, PERIOD = 8, 30, 4, 2, 2e-3
 
@@ -22,14 +18,7 @@ ROWS, STEPS, KEEP, SUBSTEPS, PERIOD = 8, 30, 4, 2, 2e-3
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a program that runs a plant, which sanitizers watch."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("there is no C compiler: no command cc")
-    program = tmp_path_factory.mktemp("plant") / "plant"
-    watch = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    driver = str(Path(__file__).parent / "core_plant.c")
-    subprocess.run([compiler, *WARNINGS, *SAME_BITS, *watch, driver, *SOURCES, "-lm", "-o", program], check=True)
-    return program
+    return program_of(tmp_path_factory.mktemp("plant"), "core_plant.c", sources_of("plant"), "-O1")
 
 
 def plant_of(name, drive, stiffness):

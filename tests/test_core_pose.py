@@ -1,8 +1,6 @@
 """Forward kinematics in C: no warning, nothing for sanitizers to find in any numbers, and the right curvature."""
 
-import shutil
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +11,8 @@ from towline.estimation.pose.estimate import moved
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
 
-CORE = Path(__file__).parent.parent / "core"
-SOURCES = [*sorted((CORE / "pose").glob("*.c")), CORE / "numbers" / "processor.c"]
-WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-psabi", f"-I{CORE}"]
-SAME_BITS = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+from .c_programs import program_of, sources_of
+
 NONSENSE = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300, 0.0]
 SIZES = [21, 6, None, 1, 36]  # numbers a row that the program writes: curvature, pose, errors, steps, covariance
 
@@ -24,14 +20,7 @@ SIZES = [21, 6, None, 1, 36]  # numbers a row that the program writes: curvature
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a program that computes poses from lengths, which sanitizers watch."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("there is no C compiler: no command cc")
-    program = tmp_path_factory.mktemp("pose") / "pose"
-    watch = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    driver = Path(__file__).parent / "core_pose.c"
-    subprocess.run([compiler, *WARNINGS, *SAME_BITS, *watch, driver, *SOURCES, "-lm", "-o", program], check=True)
-    return program
+    return program_of(tmp_path_factory.mktemp("pose"), "core_pose.c", sources_of("pose", "numbers/processor.c"))
 
 
 def cases(robot, rows, seed):
