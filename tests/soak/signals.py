@@ -4,6 +4,9 @@
 
 Each command is ended `count` times, by SIGINT or SIGTERM, sent to it alone or to its workers too, at a moment between
 its first reading of signals and its usual end. A command that ends before is counted, and must have ended well.
+
+The commands named "... on dask" send their work to a scheduler with a worker of its own, see `cluster`. Both outlive
+the commands, and must drop the work of each that is ended.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ import numpy as np
 
 from towline import Dynamics, load, plan
 
+from .cluster import Cluster, cluster
+
 PROMPT = 1.0  # [s] from the signal to the end
 LONGEST = 60.0  # [s]
 STOP = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -51,11 +56,12 @@ TRACK = "name: track\npath: {kind: circle, centre: [0, 0, 2], radius: 2, rate: 0
 
 
 class Case(NamedTuple):
-    """A command, how long it takes at least [s], and what it may leave: names of files and folders."""
+    """A command, how long it takes at least [s], what it may leave (files and folders), and whether it uses Dask."""
 
     arguments: str
     seconds: float
     leaves: tuple[str, ...] = ()
+    on_dask: bool = False
 
 
 CHECKPOINT = ("c", "c-wal", "c-shm")
@@ -81,6 +87,11 @@ CASES = {
     "bench": Case("bench tension --count 2000 --out bench", 10.0, ("bench",)),
     "demo": Case("demo", 8.0, ("towline-demo",)),
     "export": Case("export wang-flying --step step", 2.0, ("step",)),
+}
+CASES |= {
+    f"{name} on dask": case._replace(arguments=case.arguments.replace("--workers 2", "--scheduler"), on_dask=True)
+    for name, case in CASES.items()
+    if "--workers 2" in case.arguments
 }
 
 
@@ -120,15 +131,24 @@ def _listens(process: subprocess.Popen[str]) -> None:
         time.sleep(0.01)
 
 
-def attempt(case: Case, given: Path, seed: int) -> str:
-    """End a command once; return "stopped", "ended", or what is wrong."""
+def attempt(case: Case, given: Path, seed: int, beside: Cluster | None = None) -> str:
+    """End a command once; return "stopped", "ended", or what is wrong with it or in the cluster that it uses."""
+    result = _end(case, given, seed, beside)
+    return result if beside is None or not case.on_dask else beside.left() or result
+
+
+def _end(case: Case, given: Path, seed: int, beside: Cluster | None) -> str:
     draw = random.Random(seed)
     number, to_all = draw.choice(list(STOP)), draw.random() < 0.5
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place, "here")
         shutil.copytree(given, folder)
         before = set(os.listdir(folder))
-        command = [Path(sys.executable).with_name("towline"), *shlex.split(case.arguments)]
+        arguments = case.arguments
+        if case.on_dask:
+            assert beside is not None
+            arguments = arguments.replace("--scheduler", f"--scheduler {beside.address}")
+        command = [Path(sys.executable).with_name("towline"), *shlex.split(arguments)]
         pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         process = subprocess.Popen(command, cwd=folder, preexec_fn=_heed, start_new_session=True, **pipes)
         _listens(process)
@@ -168,12 +188,13 @@ def attempt(case: Case, given: Path, seed: int) -> str:
 def soak(start: int, count: int, names: Sequence[str]) -> bool:
     """End each command `count` times, print what is wrong, and return whether nothing is."""
     wrong = 0
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         prepare(Path(folder))
+        beside = stack.enter_context(cluster()) if any(CASES[name].on_dask for name in names) else None
         for name in names:
             counts: Counter[str] = Counter()
             for seed in range(start, start + count):
-                result = attempt(CASES[name], Path(folder), seed)
+                result = attempt(CASES[name], Path(folder), seed, beside)
                 counts[result if result in ("stopped", "ended") else "wrong"] += 1
                 if result not in ("stopped", "ended"):
                     print(f"{name}, seed {seed}: {result}", flush=True)
