@@ -13,7 +13,7 @@ import re
 CORE = "core"
 # The same bits on every processor: no multiplication and addition in one. A root is one instruction if it need not set
 # errno nor trap.
-FLAGS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi", "-g0"]
+FLAGS = ["-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi", "-g0"]
 EDITABLE = ".editable"
 
 # Where a link or a picture of Markdown or HTML leads: a path, neither an address nor a place on the same page.
@@ -50,7 +50,9 @@ def main() -> None:
     """Run setuptools on pyproject.toml with the extension and the description."""
     import sys
     import tomllib
+    from concurrent.futures import ThreadPoolExecutor
     from pathlib import Path
+    from typing import Any
 
     from setuptools import Extension, setup
     from setuptools.command.build_ext import build_ext
@@ -65,6 +67,18 @@ def main() -> None:
         def run(self) -> None:
             compiler.choose()
             super().run()
+
+        def build_extensions(self) -> None:
+            """Compile as many files at once as there are processors."""
+            compile_some = self.compiler.compile
+
+            def compile_all(sources: list[str], **options: Any) -> list[str]:
+                with ThreadPoolExecutor(os.cpu_count()) as pool:
+                    made = pool.map(lambda source: compile_some([source], **options), sources)
+                    return [name for names in made for name in names]
+
+            self.compiler.compile = compile_all
+            super().build_extensions()
 
     class Editable(editable_wheel):
         """An editable installation by a path, or by setuptools' import hook where there can be no link."""

@@ -100,16 +100,17 @@ def test_quadrotors_are_guessed_to_tilt_as_their_cables_pull():
 
 
 def test_a_time_limit_ends_a_search():
-    robot = load("multi-quadrotor-4")
-    for limit in (0.5, 4.0):
+    """Beyond its limit it takes what laying out, building and the step under way take: what one without time does."""
+    robot, took = load("multi-quadrotor-4"), []
+    for limit in (0.01, 4.0):
         before = time.process_time()  # not the time on a clock, most of which other programs may have
         found = plan(robot, there_and_back(steps=100, time_limit=limit))
-        took = time.process_time() - before
+        took.append(time.process_time() - before)
         assert found.status == "not-found"
-        assert took < limit + 6.0  # the step that was under way, on a slow machine
         assert found.message == "time limit"
         assert "the time limit of" in found.report()
         assert found.audit.excess or found.audit.violation.max() > found.audit.tolerance  # of the best attempt
+    assert took[1] < 4.0 + 2 * took[0]
 
 
 def test_quadrotors_go_through_a_slot_and_back():

@@ -80,10 +80,10 @@ def test_no_list_of_points_leaves_its_box_or_its_legs():
     peaks, turning, costs = [], [], []
     for seed in range(LISTS):
         points = random_points(seed)
-        before = time.process_time()
+        begun = time.process_time()
         path = path_of(points)
         motion = path.at(SHARES[::2], 1.0)
-        costs.append(time.process_time() - before)
+        took = time.process_time() - begun
         box = np.ptp(points[:, :3], axis=0)
         place = motion.pose[:, :3]
         tolerance = 1e-12 * np.linalg.norm(box)
@@ -96,9 +96,12 @@ def test_no_list_of_points_leaves_its_box_or_its_legs():
         assert from_legs(place, points[:, :3]).max() <= blend + tolerance, seed
         assert np.linalg.norm(path.missed(1.0)[:, :3], axis=1).max() <= blend + tolerance, seed
         assert path.outside().max() <= tolerance, seed
-        spline, rest = sqrt_spline(points), path_of(points, blend=0)
+        begun = time.process_time()
+        spline = [sqrt_spline(points)(SHARES, k) for k in range(3)]
+        costs.append(took / (time.process_time() - begun))
+        rest = path_of(points, blend=0)
         each = [
-            peaks_of(*(spline(SHARES, k) for k in range(3))),
+            peaks_of(*spline),
             *(peaks_of(*of.at(SHARES, 1.0)) for of in (path, rest)),
         ]
         peaks.append([linear / np.linalg.norm(box) for linear, _ in each])
@@ -110,7 +113,7 @@ def test_no_list_of_points_leaves_its_box_or_its_legs():
     # Where attitudes change, angular accelerations, and both together: a radian counts as a metre.
     spline, legs, _ = np.median(turning, axis=0)
     assert (legs < 0.9 * spline).all()
-    assert np.median(costs) < 0.02  # [s]
+    assert np.median(costs) < 40  # of what SciPy takes for a spline through the points: 13, as measured
 
 
 @pytest.mark.parametrize("seed", range(12))
